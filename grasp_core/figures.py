@@ -75,7 +75,7 @@ def figures(kind: type) -> tuple[Figure, ...]:
 
 
 def cell(value: Any, shown: Shown) -> str:
-    """Write a figure for people; of a sequence, the number of its items."""
+    """Write a figure for people: the ends of a range, and how many items other sequences have."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return NONE
     if isinstance(value, bool):
@@ -84,12 +84,17 @@ def cell(value: Any, shown: Shown) -> str:
         return str(value.value).replace("_", " ")
     if isinstance(value, int | float):
         return format(shown.times * value, shown.form)
-    return value if isinstance(value, str) else str(len(value))
+    if isinstance(value, str):
+        return value
+    items: Sequence[Any] = value
+    numbers = all(isinstance(item, float) for item in items)
+    return " to ".join(cell(item, shown) for item in items) if numbers else str(len(items))
 
 
 def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tuple[str, ...]]]:
-    """Return the headings and the rows of a table of records."""
-    listed = figures(kind)
+    """Return headings and rows of a table of records, without figures that none of them has."""
+    records = list(records)
+    listed = [each for each in figures(kind) if any(each.of(one) is not None for one in records)]
     rows = [tuple(figure.cell(record) for figure in listed) for record in records]
     return [figure.shown.heading for figure in listed], rows
 

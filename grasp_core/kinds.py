@@ -322,7 +322,7 @@ def words(kind: Any) -> str:
     if origin in (Union, UnionType):
         return " or ".join(words(part) for part in parts if part is not type(None))
     if origin is tuple or (isinstance(origin, type) and issubclass(origin, Mapping)):
-        return _words_of_items(origin, parts)
+        return _words_of_items(cast("type", origin), parts)
     if origin is Literal:
         return f"one of {', '.join(map(str, parts))}"
     if isinstance(kind, type) and issubclass(kind, Enum):

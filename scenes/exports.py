@@ -27,7 +27,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import FINGERS, Grasp
 from scenes.drawing import colours
-from scenes.fingertips import fitting_radius
+from scenes.mujoco.fingertips import fitting_radius
 
 ROD_LENGTH = 0.5
 """Length of the rods where no free lines were planned, in object radii."""

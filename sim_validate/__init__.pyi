@@ -1,43 +1,42 @@
+from sim_validate.closure.validate import (
+    simulated_critical_friction as simulated_critical_friction,
+)
+from sim_validate.closure.validate import validate as validate
+from sim_validate.closure.validate import validate_all as validate_all
+from sim_validate.closure.verdict import Verdict as Verdict
+from sim_validate.closure.verdict import Verdicts as Verdicts
+from sim_validate.closure.verdict import load_verdicts as load_verdicts
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
-from sim_validate.dexgraspbench import DexRecord as DexRecord
-from sim_validate.dexgraspbench import dex_record as dex_record
-from sim_validate.dexgraspbench import load_dex_record as load_dex_record
-from sim_validate.dexgraspbench import reach_of_record as reach_of_record
-from sim_validate.dexgraspbench import write_dex_object as write_dex_object
-from sim_validate.dexgraspbench import write_dex_record as write_dex_record
+from sim_validate.engine.schedules import HoldProtocol as HoldProtocol
+from sim_validate.engine.setup import Agenda as Agenda
+from sim_validate.engine.setup import NamedWrench as NamedWrench
+from sim_validate.engine.setup import Noise as Noise
+from sim_validate.engine.setup import Setup as Setup
+from sim_validate.engine.traces import Outcome as Outcome
 from sim_validate.execution.execute import execute as execute
+from sim_validate.execution.executions_json import Executions as Executions
+from sim_validate.execution.executions_json import load_executions as load_executions
 from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
+from sim_validate.hands.dexgraspbench import DexRecord as DexRecord
+from sim_validate.hands.dexgraspbench import dex_record as dex_record
+from sim_validate.hands.dexgraspbench import load_dex_record as load_dex_record
+from sim_validate.hands.dexgraspbench import reach_of_record as reach_of_record
+from sim_validate.hands.dexgraspbench import write_dex_object as write_dex_object
+from sim_validate.hands.dexgraspbench import write_dex_record as write_dex_record
 from sim_validate.hands.execute_hand import execute_hand as execute_hand
 from sim_validate.hands.validate_hand import HandVerdict as HandVerdict
 from sim_validate.hands.validate_hand import hand_setup as hand_setup
 from sim_validate.hands.validate_hand import validate_hand as validate_hand
+from sim_validate.planning.regions_json import load_regions as load_regions
 from sim_validate.protocols.judging import Judgement as Judgement
 from sim_validate.protocols.judging import judge_by as judge_by
 from sim_validate.protocols.judging import judge_hand_by as judge_hand_by
 from sim_validate.protocols.published import PublishedProtocol as PublishedProtocol
 from sim_validate.protocols.published import protocol as protocol
 from sim_validate.protocols.published import protocol_names as protocol_names
-from sim_validate.records.executions import Executions as Executions
-from sim_validate.records.executions import load_executions as load_executions
-from sim_validate.records.regions import load_regions as load_regions
-from sim_validate.records.verdicts import SavedVerdict as SavedVerdict
-from sim_validate.records.verdicts import SavedVerdicts as SavedVerdicts
-from sim_validate.records.verdicts import load_verdicts as load_verdicts
-from sim_validate.reports.charts.margin_charts import margin_figure as margin_figure
-from sim_validate.reports.charts.wrench_charts import wrench_figure as wrench_figure
-from sim_validate.reports.report import write_report as write_report
-from sim_validate.simulation.schedules import HoldProtocol as HoldProtocol
-from sim_validate.simulation.setup import Agenda as Agenda
-from sim_validate.simulation.setup import NamedWrench as NamedWrench
-from sim_validate.simulation.setup import Noise as Noise
-from sim_validate.simulation.setup import Setup as Setup
-from sim_validate.simulation.traces import Outcome as Outcome
-from sim_validate.validation.validation import (
-    simulated_critical_friction as simulated_critical_friction,
-)
-from sim_validate.validation.validation import validate as validate
-from sim_validate.validation.validation import validate_all as validate_all
-from sim_validate.validation.verdict import Verdict as Verdict
+from sim_validate.report.charts.margin_charts import margin_figure as margin_figure
+from sim_validate.report.charts.wrench_charts import wrench_figure as wrench_figure
+from sim_validate.report.report import write_report as write_report

@@ -8,46 +8,70 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pkgutil import resolve_name
-from typing import Any
+from typing import Any, get_args
 
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.declared import FieldError
 from grasp_core.errors import GraspError, InputError
-from sim_validate.cli import baseline_flags, command_flags, dataset_flags, hand_flags
-from sim_validate.cli.baseline_flags import Baseline
-from sim_validate.cli.command_flags import COMMANDS, Command
-from sim_validate.cli.config_file import with_config
-from sim_validate.cli.dataset_flags import Dataset
-from sim_validate.cli.examples import examples_for
-from sim_validate.cli.exit_codes import Exit, FlagsError, exit_code, reason_of
-from sim_validate.cli.flag_groups import Spoken
+from sim_validate.baselines import flags as baseline_flags
+from sim_validate.baselines.flags import Baseline
+from sim_validate.datasets import flags as dataset_flags
+from sim_validate.datasets.flags import Dataset
+from sim_validate.hands.flags import Hand, Reach
+from sim_validate.kit.command_flags import (
+    Analyze,
+    Doctor,
+    Execute,
+    Export,
+    Inspect,
+    Objects,
+    Plan,
+    Regions,
+    Replay,
+    Report,
+    Run,
+    Scene,
+    Transfer,
+    Validate,
+    View,
+)
+from sim_validate.kit.config_file import with_config
+from sim_validate.kit.examples import examples_for
+from sim_validate.kit.exit_codes import Exit, FlagsError, exit_code, reason_of
+from sim_validate.kit.flag_groups import Spoken
 
+Command = (
+    Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
+    | Transfer | Reach | Hand | Dataset | Baseline | Inspect | Objects | Doctor
+)  # fmt: skip
+COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}
+"""The classes of flags, by the names of their commands."""
 ACTIONS: dict[type[Any], str] = {
-    command_flags.Run: "run:run_object",
-    command_flags.Plan: "plan:plan_file",
-    command_flags.Validate: "validate:validate_file",
-    command_flags.Execute: "execute:execute_file",
-    command_flags.Scene: "scene:write_scenes",
-    command_flags.Export: "scene:export_grasps",
-    command_flags.View: "view:view_grasp",
-    command_flags.Report: "view:report_folder",
-    command_flags.Regions: "regions:certify_file",
-    command_flags.Replay: "replay:replay_trial",
-    command_flags.Analyze: "analyze:analyze_file",
-    command_flags.Transfer: "transfer:transfer_file",
-    hand_flags.Reach: "reach:reach_file",
-    hand_flags.Hand: "hand:show_hand",
-    dataset_flags.Build: "dataset:build_dataset",
-    dataset_flags.Import: "dataset:import_dataset",
-    dataset_flags.Verify: "dataset:verify_dataset",
-    dataset_flags.Export: "dataset:export_dataset",
-    baseline_flags.Record: "baseline:record_baseline",
-    baseline_flags.Check: "baseline:check_baseline",
-    command_flags.Inspect: "objects:inspect_object",
-    command_flags.Objects: "objects:list_objects",
-    command_flags.Doctor: "doctor:check_installation",
+    Run: "run:run_object",
+    Plan: "planning.plan:plan_file",
+    Validate: "protocols.command:judge_file",
+    Execute: "execution.command:execute_file",
+    Scene: "execution.scene_command:write_scenes",
+    Export: "execution.scene_command:export_grasps",
+    View: "report.command:view_grasp",
+    Report: "report.command:report_folder",
+    Regions: "planning.regions:certify_file",
+    Replay: "report.replay_command:replay_trial",
+    Analyze: "planning.analyze:analyze_file",
+    Transfer: "planning.transfer:transfer_file",
+    Reach: "protocols.command:judge_reach",
+    Hand: "hands.hand_command:show_hand",
+    dataset_flags.Build: "datasets.command:build_dataset",
+    dataset_flags.Import: "datasets.command:import_dataset",
+    dataset_flags.Verify: "datasets.command:verify_dataset",
+    dataset_flags.Export: "datasets.command:export_dataset",
+    baseline_flags.Record: "baselines.command:record_baseline",
+    baseline_flags.Check: "baselines.command:check_baseline",
+    Inspect: "planning.objects:inspect_object",
+    Objects: "planning.objects:list_objects",
+    Doctor: "closure.doctor_command:check_installation",
 }
 """Module and function of each command. They are named as text, because planning must not wait until
 a simulator is imported."""
@@ -92,16 +116,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def execute(command: Spoken) -> int:
     """Carry out a command and return its exit code."""
-    from sim_validate.cli.console import Reporter
+    from sim_validate.kit.console import Reporter
 
     speech = command.speech
     reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-    return resolve_name(f"sim_validate.commands.{ACTIONS[type(command)]}")(command, reporter)
+    return resolve_name(f"sim_validate.{ACTIONS[type(command)]}")(command, reporter)
 
 
 def _dispatch(command: Spoken) -> int:
     try:
-        from sim_validate.parallel import interrupts
+        from sim_validate.kit import interrupts
 
         with interrupts.noted():
             code = execute(command)
@@ -119,7 +143,7 @@ def _dispatch(command: Spoken) -> int:
 
 
 def _complain(message: str, code: Exit) -> int:
-    from sim_validate.cli.console import printable
+    from sim_validate.kit.console import printable
 
     if sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
         sys.stderr.write(f"graspproof: {printable(message)}\n")
@@ -128,7 +152,7 @@ def _complain(message: str, code: Exit) -> int:
 
 def run_and_exit() -> None:
     """Run the `graspproof` command as a program, and exit with its exit code."""
-    from sim_validate.cli import streams
+    from sim_validate.kit import streams
 
     gc.set_threshold(COLLECTED_AFTER)
     streams.steady()

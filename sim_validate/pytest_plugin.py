@@ -13,8 +13,8 @@ import pytest
 if TYPE_CHECKING:
     from sim_validate.baselines.part import Source
     from sim_validate.baselines.suite import Suite
+    from sim_validate.closure.verdict import Verdict
     from sim_validate.execution.verdict import Execution
-    from sim_validate.validation.verdict import Verdict
 
 ENDING = ".grasps.toml"
 MARKER = (

@@ -11,9 +11,9 @@ from grasp_core.settings import for_users
 from sim_validate.baselines.baseline import Entry, ExecutionEntry
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import Suite, suite_from_toml
-from sim_validate.cli.exit_codes import Exit
+from sim_validate.engine.setup import Noise
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.simulation.setup import Noise
 from tests.sim_validate.plugin.project import run_pytest, run_pytest_alone
 
 ROOT = Path(__file__).parent.parent

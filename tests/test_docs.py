@@ -15,16 +15,16 @@ import pytest
 import grasp_core as gc
 from grasp_core import errors
 from sim_validate import main as commands
-from sim_validate.cli.exit_codes import Exit
-from sim_validate.cli.flag_groups import TRIALS, Executing
+from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.datasets.config import DatasetConfig, Learning, config_from_toml
 from sim_validate.datasets.given_contacts import read_given
+from sim_validate.engine.setup import Setup
+from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import Fate
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.flag_groups import TRIALS, Executing
 from sim_validate.main import main
-from sim_validate.records.setup_toml import setup_from_file
-from sim_validate.records.wrenches import wrenches_from_file
-from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import Outcome
+from sim_validate.planning.wrenches_json import wrenches_from_file
 from tests import api_reference
 from tests.sim_validate.datasets.configs import build_small
 

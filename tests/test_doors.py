@@ -9,9 +9,9 @@ from typing import get_args
 
 import pytest
 
-from sim_validate.cli import baseline_flags, dataset_flags
-from sim_validate.cli.command_flags import Command
-from sim_validate.main import ACTIONS
+from sim_validate.baselines import flags as baseline_flags
+from sim_validate.datasets import flags as dataset_flags
+from sim_validate.main import ACTIONS, Command
 
 ROOT = Path(__file__).parent.parent
 
@@ -25,7 +25,7 @@ NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "s
 NOT_TO_PLAN_AGAIN = (
     *NOT_TO_PLAN, "highspy", "clarabel", "resvg_py", "PIL", "pyarrow", "jinja2",
     "scipy.sparse", "scipy.stats", "grasp_core.regions",
-    "grasp_core.optimizing", "sim_validate.simulation", "sim_validate.reports",
+    "grasp_core.optimizing", "sim_validate.engine", "sim_validate.report",
 )  # fmt: skip
 """What planning the wedge does not need where its loops are kept already."""
 
@@ -44,7 +44,7 @@ def imported(code, among, **environment):
 
 @pytest.mark.parametrize(
     "module",
-    ["grasp_core", "scenes", "sim_validate", "sim_validate.main", "sim_validate.cli.flag_groups"],
+    ["grasp_core", "scenes", "sim_validate", "sim_validate.main", "sim_validate.kit.flag_groups"],
 )
 def test_importing_a_package_imports_nothing_heavy(module):
     assert imported(f"import {module}", HEAVY) == ([], "")
@@ -91,5 +91,5 @@ def test_every_command_has_its_function():
     actions |= {baseline_flags.Record, baseline_flags.Check}
     named = set(get_args(Command)) - {flags.Dataset, baseline_flags.Baseline} | actions
     assert set(ACTIONS) == named
-    places = [f"sim_validate.commands.{place}" for place in ACTIONS.values()]
+    places = [f"sim_validate.{place}" for place in ACTIONS.values()]
     assert all(callable(resolve_name(place)) for place in places)

@@ -11,7 +11,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from sim_validate.cli.command_flags import Command
+from sim_validate.main import Command
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()

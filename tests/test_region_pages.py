@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_validate.cli.exit_codes import Exit
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.records.regions import SCHEMA
+from sim_validate.planning.regions_json import SCHEMA
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "regions.md").read_text()

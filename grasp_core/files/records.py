@@ -19,7 +19,9 @@ from types import UnionType
 from typing import (
     Annotated,
     Any,
+    ClassVar,
     NamedTuple,
+    Self,
     TypeVar,
     Union,
     cast,
@@ -28,9 +30,10 @@ from typing import (
     get_type_hints,
 )
 
-from grasp_core.declared import FieldError, default_of, rules, types
-from grasp_core.errors import InputError
+from grasp_core.declared import Declared, FieldError, default_of, rules, types
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of, shown, text_of
+from grasp_core.files.text_files import read_text
 from grasp_core.kinds import Many, Null, inside
 from grasp_core.settings import at, named, placed
 
@@ -327,13 +330,29 @@ def _agree(said: Any, ours: Any) -> bool:
     return type(cast("Any", said)) is type(ours) and said == ours
 
 
-def text_of_record(value: object, schema: int) -> str:
-    """Return the text of the file that holds a value; equal values give equal texts."""
-    return text_of({"schema": schema, **record_of(value)})
+class RecordFile(Declared):
+    """Base of the records that a file of their own holds."""
 
+    __slots__ = ()
+    FILE: ClassVar[str]
+    """Name of the file, or its kind in words."""
+    SCHEMA: ClassVar[int]
+    """Version of its form."""
 
-def record_in(kind: type[Record], text: str, wanted: str, schema: int) -> Record:
-    """Read the text of the file `wanted` as a value of a class."""
-    found = object_of(text, wanted, schema=schema)
-    del found["schema"]
-    return from_record(kind, found)
+    def text(self) -> str:
+        """Return the text of the file; equal records give equal texts."""
+        return text_of({"schema": self.SCHEMA, **record_of(self)})
+
+    @classmethod
+    def of_text(cls, text: str) -> Self:
+        """Read the text of a file."""
+        found = object_of(text, cls.FILE, schema=cls.SCHEMA)
+        del found["schema"]
+        return from_record(cls, found)
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a file; errors name it and the field."""
+        text = read_text(path)
+        with about(path):
+            return cls.of_text(text)

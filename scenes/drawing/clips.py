@@ -22,8 +22,8 @@ from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.text_files import write_parts
 from scenes.drawing.colours import FINGERS, rgb
-from scenes.execution.held_mjcf import HeldScene
-from scenes.mjcf import Scene
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.held_mjcf import HeldScene
 
 FORMATS = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)

@@ -17,8 +17,8 @@ from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, number_places, s
 from scenes.drawing.shapes import Shape
 from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import Alone, Extent, View, best_view
-from scenes.layout import Layout
-from scenes.mjcf import Scene
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.layout import Layout
 
 SIDE = 260
 MOST_CORNERS = 20_000

@@ -16,7 +16,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from scenes.hand_files.model_text import ModelText, listed
-from scenes.silent_mujoco import mujoco, unlogged
+from scenes.mujoco.silent_mujoco import mujoco, unlogged
 
 EVERY_BIT = 2**31 - 1
 """Bits of geoms that are made to collide with all others."""

@@ -26,10 +26,10 @@ from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from grasp_core.records.grasps_json import RECORDED
 from grasp_core.values import Grasp
+from sim_validate.closure.verdict import Verdict
+from sim_validate.engine.setup import WEAKEST
+from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.simulation.setup import WEAKEST
-from sim_validate.simulation.traces import Outcome
-from sim_validate.validation.verdict import Verdict
 
 DIGITS = 12
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
@@ -264,7 +264,7 @@ def entry_of(
     weakest = next(trial for trial in verdict.wrenches if trial.name == WEAKEST)
     scaled = weakest.wrench / np.array([1.0] * 3 + [radius_m] * 3)
     predicted = weakest.predicted_limit * float(np.linalg.norm(scaled))
-    limit = weakest.simulated_limit
+    limit = weakest.let_go_at
     friction, repeats = verdict.critical_friction, verdict.robustness
     noisy = () if repeats is None else repeats.trials
     holds = [trial.hold for trial in verdict.wrenches]

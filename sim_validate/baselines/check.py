@@ -14,12 +14,12 @@ from sim_validate.baselines.baseline import Baseline, entry_of
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
 from sim_validate.baselines.settings import How, settings_of
+from sim_validate.closure.validate import Job, prepared, verdict_of
+from sim_validate.closure.verdict import Verdict
+from sim_validate.engine.gate import require_faithful
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.parallel.processes import each, processes
-from sim_validate.simulation.gate import require_faithful
-from sim_validate.validation.validation import Job, prepared, verdict_of
-from sim_validate.validation.verdict import Verdict
+from sim_validate.kit.processes import each, processes
 
 Report = Callable[[int, int], None]
 

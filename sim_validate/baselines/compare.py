@@ -17,8 +17,8 @@ from typing import Any, cast
 
 from grasp_core.transferring.transfer import FRICTION_BAND
 from sim_validate.baselines.baseline import DIGITS, Baseline, Entry, ExecutionEntry
+from sim_validate.engine.traces import LET_GO, Outcome
 from sim_validate.execution.verdict import may_slip
-from sim_validate.simulation.traces import LET_GO, Outcome
 
 DIGITS_OF_CHANGE = 2
 LEAST_DIGITS = 4

@@ -15,13 +15,13 @@ from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
 from sim_validate.baselines.part import TABLE, IfChanged, Source, present, source_of
+from sim_validate.closure.validate import validate
+from sim_validate.closure.verdict import Verdict
+from sim_validate.engine.setup import Agenda, NamedWrench, Noise, Setup
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.records.grasps import read_grasps
-from sim_validate.simulation.setup import Agenda, NamedWrench, Noise, Setup
-from sim_validate.validation.validation import validate
-from sim_validate.validation.verdict import Verdict
+from sim_validate.planning.grasps_json import read_grasps
 
 FRICTION = 0.5
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")

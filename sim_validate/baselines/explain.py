@@ -9,9 +9,9 @@ from sim_validate.baselines.baseline import Baseline, Entry
 from sim_validate.baselines.check import Checked
 from sim_validate.baselines.compare import WORDS, Status
 from sim_validate.baselines.part import Present
+from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.engine.setup import AXIS_NAMES, WEAKEST
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
-from sim_validate.simulation.setup import AXIS_NAMES, WEAKEST
-from sim_validate.validation.verdict import Verdict, WrenchVerdict
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:

@@ -12,11 +12,10 @@ from grasp_core.checked import MOST_RANDOM_WRENCHES
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import complaint
 from grasp_core.planning.result import Plan
-from scenes.fingertips import FingerSettings
-from scenes.mjcf import Surface
-from sim_validate.execution.settings import TABLE, AskedExecution, execution_table
-from sim_validate.records.setup_toml import setup_from_file, setup_from_tables, tables_of
-from sim_validate.simulation.setup import (
+from scenes.mujoco.closure_scene import Surface
+from scenes.mujoco.fingertips import FingerSettings
+from sim_validate.closure.setup_toml import setup_from_file, setup_from_tables, tables_of
+from sim_validate.engine.setup import (
     Agenda,
     LimitSearch,
     NamedWrench,
@@ -24,6 +23,7 @@ from sim_validate.simulation.setup import (
     Setup,
     with_planned_radius,
 )
+from sim_validate.execution.settings import TABLE, AskedExecution, execution_table
 
 Count = Annotated[int, Field(ge=0)]
 

@@ -34,11 +34,11 @@ from sim_validate.baselines.part import (
     testable,
 )
 from sim_validate.baselines.settings import How, of_settings, setup_for
+from sim_validate.engine.setup import Agenda, LimitSearch, Noise
 from sim_validate.execution.settings import TABLE, AskedExecution
-from sim_validate.files.toml_tables import read_tables
-from sim_validate.records.grasps import read_grasps
-from sim_validate.records.wrenches import wrenches_from_file
-from sim_validate.simulation.setup import Agenda, LimitSearch, Noise
+from sim_validate.kit.toml_tables import read_tables
+from sim_validate.planning.grasps_json import read_grasps
+from sim_validate.planning.wrenches_json import wrenches_from_file
 
 ENDING = ".grasps.toml"
 DIRECT = ("limits", "random_wrenches", "trials", "seed")

@@ -34,10 +34,10 @@ from sim_validate.datasets.staging import Finished, Staging
 from sim_validate.datasets.tables import Name
 from sim_validate.datasets.units import WorkUnit, provenance, units_of, units_sha256
 from sim_validate.datasets.workers import Engine, drive
-from sim_validate.files.paths import path_inside
-from sim_validate.files.result_folders import alone_in
-from sim_validate.simulation.gate import require_faithful
-from sim_validate.simulation.setup import Setup
+from sim_validate.engine.gate import require_faithful
+from sim_validate.engine.setup import Setup
+from sim_validate.kit.paths import path_inside
+from sim_validate.kit.result_folders import alone_in
 
 DATA = "data"
 TWIN = "the same object as"

@@ -31,7 +31,7 @@ from sim_validate.execution.settings import (
     AskedExecution,
     execution_table,
 )
-from sim_validate.files.toml_tables import read_tables
+from sim_validate.kit.toml_tables import read_tables
 
 LEARNING = "learning"
 """Name of the table in a settings file."""

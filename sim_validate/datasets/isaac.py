@@ -24,15 +24,15 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
-from scenes.fingertips import FingerSettings, fitting_radius
-from scenes.layout import arrange
+from scenes.mujoco.fingertips import FingerSettings, fitting_radius
+from scenes.mujoco.layout import arrange
 from sim_validate.datasets.config import quoted
 from sim_validate.datasets.meshes import mesh_path, stored_body
 from sim_validate.datasets.open_dataset import Row, Selection, select
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN
 from sim_validate.datasets.tables import SHORT, Name, SplitName
-from sim_validate.files.writing import whole_folder, write_lines
+from sim_validate.kit.writing import whole_folder, write_lines
 
 AXES = "xyz"
 HEAD = """\

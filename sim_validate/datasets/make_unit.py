@@ -9,16 +9,16 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
 from grasp_core.values import Grasp
+from sim_validate.closure.controls import Control, try_control
+from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.figures import Executed, executed_by
 from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.meshes import mesh_path, mesh_text
 from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.datasets.varied import Varying, validated_with
+from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
-from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.validation.controls import Control, try_control
-from sim_validate.validation.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +98,14 @@ class _Making:
             self.found.add_given(given, grasp, tried, seated, executed)
             self._vary(grasp, seated.body, tried, executed)
             return
-        control = Control(GIVEN, seated.contacts, friction, grasp)
+        control = Control(GIVEN, friction, grasp)
         verdict = try_control(seated.body, control, self.agenda, Setup())
         self.found.add_open(given, verdict, seated.moved_m)
 
     def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
         asked = self.unit.config.learning
         verdict = validated_with(body, grasp, self.unit.friction, self.agenda, asked)
-        if self.unit.config.scenes:
+        if self.unit.config.scenes and verdict.scene is not None:
             self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
         return verdict
 

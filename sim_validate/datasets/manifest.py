@@ -19,7 +19,7 @@ from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import complaint, object_of, place, record_of, shown
 from grasp_core.files.text_files import read_text, write_text
 from sim_validate.datasets.tables import GROUPS, Name, Tables, dataset_tables
-from sim_validate.files.paths import require_inside
+from sim_validate.kit.paths import require_inside
 
 SCHEMA = 2
 MANIFEST = "manifest.json"

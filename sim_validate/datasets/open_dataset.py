@@ -17,7 +17,7 @@ from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_tom
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.datasets.tables import KEYS, SHORT, SPLITS, Name, Tables
-from sim_validate.files.paths import path_inside
+from sim_validate.kit.paths import path_inside
 
 Row: TypeAlias = Mapping[str, Any]
 ObjectRows: TypeAlias = Mapping[Name, Sequence[Row]]

@@ -11,6 +11,8 @@ import numpy as np
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated
 from grasp_core.values import Contact, Grasp
+from sim_validate.closure.controls import ControlTrial, ControlVerdict
+from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets.figures import (
     Executed,
     Figures,
@@ -22,9 +24,7 @@ from sim_validate.datasets.given_contacts import GivenGrasp
 from sim_validate.datasets.tables import SPLITS, Name, id_beginning
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.datasets.varied import VARIED, Tried, ratio_of
-from sim_validate.simulation.traces import Outcome
-from sim_validate.validation.controls import ControlTrial, ControlVerdict
-from sim_validate.validation.verdict import Verdict, WrenchVerdict
+from sim_validate.engine.traces import Outcome
 
 Row: TypeAlias = Mapping[str, Any]
 Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
@@ -275,7 +275,6 @@ class GraspRows:
                 "failed_after_s": hold.failed_after_s,
             }
             if isinstance(trial, WrenchVerdict):
-                found, predicted = trial.simulated_limit, trial.predicted_limit
-                row["predicted_limit"] = predicted
-                row["simulated_limit"] = None if found is None else found.share * predicted
+                row["predicted_limit"] = trial.predicted_limit
+                row["simulated_limit"] = trial.simulated_limit
             self.trials.append(row)

@@ -23,7 +23,7 @@ from sim_validate.datasets.make_unit import Made
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.tables import Name
 from sim_validate.datasets.units import WorkUnit
-from sim_validate.files.paths import path_inside
+from sim_validate.kit.paths import path_inside
 
 RECORD = "unit.json"
 OTHERS = "others"

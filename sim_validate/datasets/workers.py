@@ -24,7 +24,7 @@ from grasp_core.errors import GraspError
 from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenance
-from sim_validate.parallel import interrupts
+from sim_validate.kit import interrupts
 
 AHEAD = 3
 """Number of units submitted per worker process, so that no worker waits for the next unit."""

@@ -17,12 +17,12 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from scenes.execution.held import hinged, rotations
-from scenes.execution.held_mjcf import SAMPLE_S, HeldScene, palm_armature
-from scenes.mjcf_text import quaternion
-from scenes.silent_mujoco import unlogged
+from scenes.mujoco.held import hinged, rotations
+from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, palm_armature
+from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.silent_mujoco import unlogged
+from sim_validate.engine.bench import batch, compiled, faults, mujoco, step, touched
 from sim_validate.execution.paths import WHOLE, Drive, Table
-from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step, touched
 
 FREE, PALM = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""

@@ -27,7 +27,7 @@ from grasp_core.execution.grips import Grip
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.execution.worst_loads import Reactions
 from grasp_core.solvers.ties import first_best
-from scenes.execution.held import HeldLayout
+from scenes.mujoco.held import HeldLayout
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion
 from sim_validate.execution.paths import Drive, joined

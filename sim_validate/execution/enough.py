@@ -21,8 +21,8 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
-from scenes.execution.held import HeldLayout
-from scenes.execution.held_mjcf import HeldScene
+from scenes.mujoco.held import HeldLayout
+from scenes.mujoco.held_mjcf import HeldScene
 from sim_validate.execution import paths
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
 from sim_validate.execution.settings import ExecutionSettings

@@ -29,10 +29,11 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.execution.held import hinged, rotations
-from scenes.execution.held_mjcf import HeldScene, build_held_scene, held_physics
-from scenes.fingertips import fitting_radius
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.held import hinged, rotations
+from scenes.mujoco.held_mjcf import HeldScene, build_held_scene, held_physics
+from scenes.mujoco.physics import PhysicsSettings
+from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
 from sim_validate.execution.bench import (
     HeldBench,
@@ -50,7 +51,6 @@ from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
 from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Execution, ExecutionTrial
-from sim_validate.simulation.setup import MOST_THREADS
 
 FINE_S = 1.25e-4
 """Length of steps that confirm a loss, at most [s]."""

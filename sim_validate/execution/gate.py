@@ -47,10 +47,12 @@ from grasp_core.checked import SMALLEST
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
-from scenes.execution.held import TOUCH, HeldLayout, HeldSettings
-from scenes.execution.held_mjcf import AWAY, SAMPLE_S, held_physics
-from scenes.fingertips import fitting_radius
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.held import TOUCH, HeldLayout, HeldSettings
+from scenes.mujoco.held_mjcf import AWAY, SAMPLE_S, held_physics
+from scenes.mujoco.physics import PhysicsSettings
+from sim_validate.engine.gate import DEPTH, Gate, angles, touch_checks
+from sim_validate.engine.known_cases import Check, sized
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion
 from sim_validate.execution.held_case import (
@@ -65,8 +67,6 @@ from sim_validate.execution.held_case import (
 )
 from sim_validate.execution.paths import Drive, Table, idle
 from sim_validate.execution.slips import SLID, outcome, seen, slides
-from sim_validate.simulation.gate import DEPTH, Gate, angles, touch_checks
-from sim_validate.simulation.known_cases import Check, sized
 
 
 def require_faithful_execution(

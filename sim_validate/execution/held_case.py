@@ -16,12 +16,12 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from scenes.execution.held import UPRIGHT, HeldSettings
-from scenes.execution.held_mjcf import HeldScene, build_held_scene
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.held import UPRIGHT, HeldSettings
+from scenes.mujoco.held_mjcf import HeldScene, build_held_scene
+from scenes.mujoco.physics import PhysicsSettings
+from sim_validate.engine.known_cases import Check, near, sized
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import samples, smoother
-from sim_validate.simulation.known_cases import Check, near, sized
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN

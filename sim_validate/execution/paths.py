@@ -23,9 +23,9 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from scenes.execution.held_mjcf import SAMPLE_S
-from sim_validate.simulation import schedules
-from sim_validate.simulation.schedules import smooth
+from scenes.mujoco.held_mjcf import SAMPLE_S
+from sim_validate.engine import schedules
+from sim_validate.engine.schedules import smooth
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -44,8 +44,8 @@ from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip
 from grasp_core.solvers.ties import first_best
-from scenes.execution.held import HeldLayout
-from scenes.execution.held_mjcf import SAMPLE_S
+from scenes.mujoco.held import HeldLayout
+from scenes.mujoco.held_mjcf import SAMPLE_S
 from sim_validate.execution.paths import Drive
 
 POSE = 6

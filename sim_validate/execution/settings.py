@@ -10,7 +10,7 @@ from grasp_core.execution.grips import STIFFNESS_N_PER_M
 from grasp_core.kinds import NotNegative, Quantity, Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.settings import Settings, named
-from scenes.execution.held import HeldSettings
+from scenes.mujoco.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
 """What a trial does: it turns gravity through all directions, lifts the object off a table, shakes

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.execution.first_slip import slip_steps
-from scenes.execution.held import HeldLayout, hinged, rotations
+from scenes.mujoco.held import HeldLayout, hinged, rotations
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import Drive
 

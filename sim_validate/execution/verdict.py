@@ -9,7 +9,7 @@ from grasp_core.arrays import Array
 from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.solvers.ties import first_best
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
 from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.trials import Skipped

@@ -1,1 +1,5 @@
-"""Trials of real hands: what their motors are predicted to hold is held in simulation, no more."""
+"""Where does a hand stand in grasps, and what do its motors hold?
+
+What motors are predicted to hold is held in simulation, no more. The commands `reach` and `hand`
+write poses, also as records of DexGraspBench.
+"""

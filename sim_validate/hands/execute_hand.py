@@ -1,7 +1,7 @@
 """Executes grasps with a hand: the trials of `execute` on real chains of joints with servos.
 
 The squeeze is the best one for fingertips on the springs that the servos amount to, within the
-torques of the motors (see `scenes.hands.held_hand`). Servos are told its torques once, and nothing
+torques of the motors (see `scenes.mujoco.held_hand`). Servos are told its torques once, and nothing
 is replanned. Palm and links touch the object where it comes to them.
 """
 
@@ -17,8 +17,8 @@ from grasp_core.hands.hand_grips import hand_grip
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.execution.held_mjcf import HeldScene
-from scenes.hands.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
+from scenes.mujoco.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
+from scenes.mujoco.held_mjcf import HeldScene
 from sim_validate.execution.execute import asked_settings, executed, surface_reach
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp, Execution

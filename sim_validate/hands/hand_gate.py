@@ -29,15 +29,15 @@ from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from scenes.hands.hand_scene import HandScene, build_hand_scene, limited
-from sim_validate.simulation.bench import Bench
-from sim_validate.simulation.gate import Gate
-from sim_validate.simulation.known_cases import Check
-from sim_validate.simulation.limits import ramped_limits
-from sim_validate.simulation.loads import resisted_by
-from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.schedules import Load
-from sim_validate.simulation.setup import Setup
+from scenes.mujoco.hand_scene import HandScene, build_hand_scene, limited
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.gate import Gate
+from sim_validate.engine.known_cases import Check
+from sim_validate.engine.limits import ramped_limits
+from sim_validate.engine.loads import resisted_by
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.schedules import Load
+from sim_validate.engine.setup import Setup
 
 HALF, HEIGHT, TIP, TORQUE = 0.03, 0.08, 0.01, 0.35
 """Half-width of the cube, height of the hinges over the contacts, radius of the fingertips [m], and

@@ -18,21 +18,21 @@ from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.fingertips import FingerSettings
-from scenes.hands.hand_scene import HandScene, build_hand_scene, hand_physics, limited
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, limited
+from sim_validate.closure.validate import held_wrenches
+from sim_validate.closure.verdict import WrenchVerdict
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.gate import require_faithful
+from sim_validate.engine.known_cases import Check
+from sim_validate.engine.limits import part
+from sim_validate.engine.loads import planned_loads
+from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.schedules import Load
+from sim_validate.engine.setup import WEAKEST, Agenda, Setup
+from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
 from sim_validate.hands.hand_gate import require_faithful_hands
-from sim_validate.simulation.bench import Bench
-from sim_validate.simulation.gate import require_faithful
-from sim_validate.simulation.known_cases import Check
-from sim_validate.simulation.limits import part
-from sim_validate.simulation.loads import planned_loads
-from sim_validate.simulation.rig import Rig, squeezed
-from sim_validate.simulation.schedules import Load
-from sim_validate.simulation.setup import WEAKEST, Agenda, Setup
-from sim_validate.simulation.traces import LET_GO, HoldVerdict, Outcome, judge
-from sim_validate.validation.validation import held_wrenches
-from sim_validate.validation.verdict import WrenchVerdict
 
 MOST_PUSH_N = 100.0
 """Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors

@@ -14,9 +14,9 @@ from typing_extensions import TypedDict
 from grasp_core.files.json_text import text_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
+from sim_validate.hands.reaches_json import NotNegative
+from sim_validate.kit.fields import Count, ObjectRecord, Positive, finite, object_record
 from sim_validate.protocols.judging import Judgement
-from sim_validate.records.fields import Count, ObjectRecord, Positive, finite, object_record
-from sim_validate.records.reaches import NotNegative
 
 
 class RunRecord(TypedDict):

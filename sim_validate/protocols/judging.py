@@ -24,21 +24,21 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
-from scenes.hands.hand_scene import build_hand_scene
-from scenes.mjcf import Scene
-from scenes.tested import HandServos, fingertip_scene, hand_scene, planned_postures
-from sim_validate.dexgraspbench import RecordedReach, hand_file, recorded_postures
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.hand_scene import build_hand_scene
+from scenes.mujoco.tested import HandServos, fingertip_scene, hand_scene, planned_postures
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.gate import require_faithful
+from sim_validate.engine.loads import loads_as_they_are
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.setup import Setup
+from sim_validate.engine.traces import Outcome, judge
 from sim_validate.execution.execute import given_contacts
+from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import RunVerdict, their_verdict
-from sim_validate.simulation.bench import Bench
-from sim_validate.simulation.gate import require_faithful
-from sim_validate.simulation.loads import loads_as_they_are
-from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.setup import Setup
-from sim_validate.simulation.traces import Outcome, judge
 
 
 @dataclass(frozen=True, slots=True)

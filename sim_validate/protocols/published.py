@@ -16,8 +16,8 @@ from grasp_core.arrays import Array
 from grasp_core.checked import one_of
 from grasp_core.declared import summary
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.physics import PhysicsSettings
-from scenes.tested import Weld
+from scenes.mujoco.physics import PhysicsSettings
+from scenes.mujoco.tested import Weld
 
 Triple: TypeAlias = tuple[float, float, float]
 NOWHERE: Triple = (0.0, 0.0, 0.0)

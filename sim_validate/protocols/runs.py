@@ -19,12 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.silent_mujoco import unlogged
-from scenes.tested import TestedScene
+from scenes.mujoco.silent_mujoco import unlogged
+from scenes.mujoco.tested import TestedScene
+from sim_validate.engine.bench import batch, compiled, faults, mujoco, step
+from sim_validate.engine.schedules import samples
+from sim_validate.engine.traces import rotation_angles
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run
-from sim_validate.simulation.bench import batch, compiled, faults, mujoco, step
-from sim_validate.simulation.schedules import samples
-from sim_validate.simulation.traces import rotation_angles
 
 CHUNK = 10
 """Simulation steps per sample: DexGraspBench moves its commands every ten steps."""

@@ -21,11 +21,11 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from sim_validate.simulation.bench import Bench
-from sim_validate.simulation.limits import part, ramped_limits
-from sim_validate.simulation.loads import loads_as_they_are, planned_loads
-from sim_validate.simulation.rig import squeezed
-from sim_validate.simulation.traces import holds
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.limits import part, ramped_limits
+from sim_validate.engine.loads import loads_as_they_are, planned_loads
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.traces import holds
 from tests.benchmarks.objects import scaled
 
 FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03

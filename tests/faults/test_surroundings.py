@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from sim_validate.cli.exit_codes import Exit
+from sim_validate.kit import compiling
+from sim_validate.kit import processes as engines
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.parallel import compiling
-from sim_validate.parallel import processes as engines
 from tests.faults.conftest import CLI, KEPT, ROOT, contents
 from tests.patience import HANGING_S
 

@@ -10,8 +10,8 @@ from pyarrow import parquet
 
 from sim_validate.datasets.parquet import parquet_bytes, read_columns
 from sim_validate.datasets.tables import TABLES
-from sim_validate.files.npz import arrays_of
-from sim_validate.records.regions import SHAPES, regions_of
+from sim_validate.kit.npz import arrays_of
+from sim_validate.planning.regions_json import SHAPES, regions_of
 from tests.fuzzing.targets import Target
 
 MEMORY = Path("/dev/shm")  # noqa: S108 - a folder in memory, where there is one

@@ -18,7 +18,8 @@ from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
 from sim_validate.baselines.settings import of_settings
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.cli.config_file import flags_from
+from sim_validate.closure.setup_toml import setup_from_tables, tables_of
+from sim_validate.closure.verdict import verdicts_of
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import (
@@ -29,17 +30,16 @@ from sim_validate.datasets.manifest import (
     manifest_to_json,
 )
 from sim_validate.datasets.staging import UnitRecord
-from sim_validate.files.toml_tables import tables_of_toml
-from sim_validate.records.executions import executions_from_json, executions_to_json
-from sim_validate.records.reaches import reaches_from_json
-from sim_validate.records.regions import RegionsFile
-from sim_validate.records.setup_toml import setup_from_tables, tables_of
-from sim_validate.records.verdicts import verdicts_of
-from sim_validate.records.wrenches import wrenches_from_json
-from sim_validate.simulation.setup import Setup
+from sim_validate.engine.setup import Setup
+from sim_validate.execution.executions_json import executions_from_json, executions_to_json
+from sim_validate.hands.reaches_json import reaches_from_json
+from sim_validate.kit.config_file import flags_from
+from sim_validate.kit.toml_tables import tables_of_toml
+from sim_validate.planning.regions_json import RegionsFile
+from sim_validate.planning.wrenches_json import wrenches_from_json
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text
-from tests.sim_validate.records.executed import executions_text
+from tests.sim_validate.execution.executed import executions_text
 
 STABILITY = Path(__file__).parents[1] / "stability" / "box"
 HASH = "0" * 64

@@ -63,10 +63,11 @@ CALLS = [
         "hand": VALUE | {"another": gc.load_hand("leap")},
         "touch_m": NOT_NEGATIVE,
     }),
-    reading("sv.load_dex_record", "no/such/0.npy", "tests/sim_validate/test_dexgraspbench.py"),
+    reading("sv.load_dex_record", "no/such/0.npy",
+            "tests/sim_validate/hands/test_dexgraspbench.py"),
     Call("sv.write_dex_record", lambda: {"record": record(), "path": "no/such/0.npy"},
-         succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
+         succeeds_in="tests/sim_validate/hands/test_dexgraspbench.py"),
     Call("sv.write_dex_object", lambda: {"body": body(), "folder": "no/such"}, {
         "folder": PATH,
-    }, succeeds_in="tests/sim_validate/test_dexgraspbench.py"),
+    }, succeeds_in="tests/sim_validate/hands/test_dexgraspbench.py"),
 ]  # fmt: skip

@@ -31,7 +31,7 @@ CALLS = [
         "surface": WORD,
     }),
     Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"},
-         succeeds_in="tests/scenes/test_mjcf.py"),
+         succeeds_in="tests/scenes/mujoco/test_closure_scene.py"),
     Call("scenes.export_grasps", lambda: {"plan": plan(), "path": "no/such/a.glb", "to": "gltf"}, {
         "path": PATH | {"unknown ending": "a.obj", "no ending": "a"},
         "to": WORD,
@@ -78,11 +78,11 @@ CALLS = [
     Call("sv.load_dataset", lambda: {"folder": "no/such/folder"}, {
         "folder": PATH | {"nowhere": "no/such/folder"}, "split": optional(WORD),
     }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),
-    reading("sv.load_regions", "no/such/file.npz", "tests/sim_validate/commands/test_regions.py"),
+    reading("sv.load_regions", "no/such/file.npz", "tests/sim_validate/planning/test_regions.py"),
     reading("sv.load_executions", "no/such/executions.json",
-            "tests/sim_validate/records/test_executions.py"),
+            "tests/sim_validate/execution/test_executions_json.py"),
     reading("sv.load_verdicts", "no/such/verdicts.json",
-            "tests/sim_validate/records/test_verdicts.py"),
+            "tests/sim_validate/closure/test_verdicts_json.py"),
     Call("sv.margin_figure", of_grasp(friction=0.5), {
     }, slow=True),
     Call("sv.wrench_figure", of_grasp(friction=0.5)),
@@ -94,7 +94,7 @@ CALLS = [
         "clips": COUNT,
         "progress": {"none": None, "number": 3, "text": "a"},
         "ready": {"none": None, "number": 3, "text": "a"},
-    }, succeeds_in="tests/sim_validate/reports/test_report.py"),
+    }, succeeds_in="tests/sim_validate/report/test_report.py"),
     Call("sv.validate", of_grasp(agenda=sv.Agenda(critical_friction=False, controls=False)),
          {
         "setup": optional(VALUE) | {"of another class": scenes.PhysicsSettings()},

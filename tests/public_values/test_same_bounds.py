@@ -14,20 +14,17 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.kinds import takes
 from grasp_core.objects.surface import PatchLimits
 from scenes.example_objects import example_object
-from scenes.execution.held import HeldSettings
-from scenes.fingertips import FingerSettings
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.held import HeldSettings
+from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.baselines.part import IfChanged
-from sim_validate.cli import (
-    command_flags,
-    dataset_flags,
-    flag_groups,
-    hand_flags,
-)
-from sim_validate.cli.command_flags import Command
+from sim_validate.datasets import flags as dataset_flags
 from sim_validate.datasets.config import Learning
+from sim_validate.engine.setup import Noise
 from sim_validate.execution.settings import ExecutionSettings
-from sim_validate.simulation.setup import Noise
+from sim_validate.hands import flags as hand_flags
+from sim_validate.kit import command_flags, flag_groups
+from sim_validate.main import Command
 from tests.sim_validate.rigs import grasps
 
 ENDS = {end for ends in BOUNDS.values() for end in ends.values()}

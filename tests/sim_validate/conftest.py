@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim_validate.cli.exit_codes import Exit
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import here
 
@@ -10,7 +10,7 @@ from tests.sim_validate.datasets.engines import here
 @pytest.fixture
 def built_here(monkeypatch):
     """Let `dataset build` and `dataset import` compute their units in this process."""
-    monkeypatch.setattr("sim_validate.commands.dataset.local_processes", here)
+    monkeypatch.setattr("sim_validate.datasets.command.local_processes", here)
 
 
 def planned(folder, *words):

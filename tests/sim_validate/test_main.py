@@ -15,10 +15,10 @@ from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
 from scenes.drawing.views import View
 from scenes.example_objects import example_object
 from sim_validate import main as commands
-from sim_validate.cli.examples import EXAMPLES
-from sim_validate.cli.exit_codes import Exit
+from sim_validate.kit import processes
+from sim_validate.kit.examples import EXAMPLES
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.parallel import processes
 from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.patience import HANGING_S
 
@@ -188,14 +188,14 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
 
 @pytest.mark.usefixtures("here")
 def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
-    monkeypatch.setattr("sim_validate.validation.controls.judge", _always_held)
+    monkeypatch.setattr("sim_validate.closure.controls.judge", _always_held)
     assert main(["run", "wedge", "--limit", "1", "--jobs", "1", "--no-report"]) == Exit.NEGATIVE
     assert "negative controls were let go (all should)" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("here")
 def test_a_run_without_controls_says_so(monkeypatch, capsys):
-    monkeypatch.setattr("sim_validate.validation.validation.negative_controls", lambda *_: ())
+    monkeypatch.setattr("sim_validate.closure.validate.negative_controls", lambda *_: ())
     assert main(["run", "tetrahedron", "--jobs", "1", "--no-report"]) == Exit.GOOD
     assert "no negative controls" in capsys.readouterr().err
 
@@ -204,7 +204,7 @@ def test_an_unexpected_error_is_internal_and_shows_its_place_when_asked(monkeypa
     def broken(*_, **__):
         raise RuntimeError("boom")
 
-    monkeypatch.setattr("sim_validate.commands.plan.plan", broken)
+    monkeypatch.setattr("sim_validate.planning.plan.plan", broken)
     assert main(["plan", "wedge"]) == Exit.INTERNAL
     assert "internal error" in capsys.readouterr().err
     assert main(["plan", "wedge", "-v"]) == Exit.INTERNAL
@@ -235,7 +235,7 @@ def test_graphics_that_are_not_here_are_named():
 def test_an_interrupted_run_keeps_what_is_done(here):
     """SIGINT while simulating: exit code 130, a whole grasps.json, verdicts marked incomplete."""
     code = (
-        "from sim_validate.cli import console; console.PLAIN_EVERY_S = 0.2;"
+        "from sim_validate.kit import console; console.PLAIN_EVERY_S = 0.2;"
         "from sim_validate.main import run_and_exit; run_and_exit()"
     )
     command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "150"]
@@ -258,7 +258,7 @@ def test_an_interrupted_run_keeps_what_is_done(here):
 
 
 def _always_held(trace, *_):
-    from sim_validate.simulation.traces import HoldVerdict, Outcome
+    from sim_validate.engine.traces import HoldVerdict, Outcome
 
     return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, 0.0, trace.slips_m.max(axis=0), None)
 

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Fingertip, Hand, Joint, LinkShape
-from sim_validate.records.hand_model import hand_of_model, model_record
+from sim_validate.hands.hand_model import hand_of_model, model_record
 from tests.grasp_core.hands.gripping import plain_hand
 
 HANDS = ["allegro", "leap"]

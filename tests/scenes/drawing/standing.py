@@ -12,7 +12,7 @@ import scenes
 from grasp_core.hands.reach import HandReach
 from grasp_core.values import Contact
 from scenes.drawing.hands import posed_hand
-from sim_validate.records.reaches import reaches_to_json
+from sim_validate.hands.reaches_json import reaches_to_json
 
 FRICTION, CLEARANCE = 0.5, 5e-4
 GRASP = "c-0-1-4-5"

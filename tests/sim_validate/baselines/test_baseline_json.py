@@ -14,8 +14,8 @@ from sim_validate.baselines.baseline import (
     write_baseline,
 )
 from sim_validate.baselines.settings import How, of_settings, settings_of
-from sim_validate.simulation.setup import Agenda, Setup
-from sim_validate.simulation.traces import Outcome
+from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.traces import Outcome
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY
 from tests.sim_validate.rigs import grasps
 

@@ -12,7 +12,7 @@ from sim_validate.baselines.compare import (
     compare,
     failing,
 )
-from sim_validate.simulation.traces import Outcome
+from sim_validate.engine.traces import Outcome
 
 ENTRY = Entry(
     id="c-0-1-2-3",

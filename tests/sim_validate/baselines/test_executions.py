@@ -18,6 +18,7 @@ from sim_validate.baselines.check import Checked, Measured, demanded
 from sim_validate.baselines.compare import Status, compare
 from sim_validate.baselines.settings import How, of_settings, settings_of
 from sim_validate.baselines.suite import suite_from_tables
+from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
@@ -25,7 +26,6 @@ from sim_validate.execution.verdict import (
     ExecutionControl,
     ExecutionTrial,
 )
-from sim_validate.simulation.setup import Agenda, Setup
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 
 TRIAL = ExecutionTrial(

@@ -14,7 +14,7 @@ from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, units_of
 from sim_validate.datasets.workers import do_unit, drive
-from sim_validate.parallel.clusters import dask_workers, ray_workers
+from sim_validate.kit.clusters import dask_workers, ray_workers
 from tests.sim_validate.datasets.configs import CONFIG
 from tests.sim_validate.datasets.engines import contents, silent
 

@@ -9,12 +9,12 @@ import pytest
 import grasp_core as gc
 import sim_validate
 from scenes.example_objects import example_object
-from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.verify import Sample, verify
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
 

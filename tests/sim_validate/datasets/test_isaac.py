@@ -16,12 +16,12 @@ import trimesh
 import grasp_core as gc
 import sim_validate
 from grasp_core.geometry.nearest_points import nearest_on_surface
-from sim_validate.cli.exit_codes import Exit
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.isaac import export, yaml_number
 from sim_validate.datasets.tables import SPLITS, SplitName
-from sim_validate.files.writing import whole_folder
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.writing import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.forging import forged
@@ -220,7 +220,7 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
 KILLED = """
 import os, sys
 from pathlib import Path
-from sim_validate.files.writing import whole_folder
+from sim_validate.kit.writing import whole_folder
 with whole_folder(Path(sys.argv[1])) as place:
     (place / "half").write_text("a")
     os._exit(9)

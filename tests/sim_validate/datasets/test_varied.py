@@ -9,6 +9,7 @@ import grasp_core as gc
 from grasp_core.errors import UnfaithfulError
 from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
+from sim_validate.closure.validate import validate
 from sim_validate.datasets import varied as varied_grasps
 from sim_validate.datasets.config import (
     Learning,
@@ -17,8 +18,7 @@ from sim_validate.datasets.config import (
 from sim_validate.datasets.figures import execution_cells
 from sim_validate.datasets.varied import RATIOS, Varying, region_exit, variants
 from sim_validate.datasets.verify import Sample, verify
-from sim_validate.simulation.setup import Agenda
-from sim_validate.validation.validation import validate
+from sim_validate.engine.setup import Agenda
 from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of
 from tests.sim_validate.datasets.forging import forged
 

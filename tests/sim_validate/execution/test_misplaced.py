@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from grasp_core.execution.grips import unsqueezed
-from scenes.execution.held import TOUCH, held_layout
-from scenes.fingertips import fitting_radius
+from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.held import TOUCH, held_layout
 from sim_validate.execution import trials
 from sim_validate.execution.trials import ROOM, met, misplacements
 from tests.sim_validate.execution.held_rigs import planned

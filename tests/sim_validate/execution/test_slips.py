@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenes.execution.held import hinged, rotations
+from scenes.mujoco.held import hinged, rotations
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import Table, idle
 from sim_validate.execution.slips import (
@@ -18,7 +18,7 @@ from sim_validate.execution.slips import (
     slides,
 )
 from tests.judges import random_rotation
-from tests.scenes.execution.test_turns import quaternions, turn_about
+from tests.scenes.mujoco.test_turns import quaternions, turn_about
 from tests.sim_validate.execution.held_rigs import box_scene
 
 COUNT = 400

@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import grasp_core as gc
-from scenes.hands.held_hand import held_hand_scene
+from scenes.mujoco.held_hand import held_hand_scene
 from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 

@@ -8,10 +8,10 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.errors import InputError, UnfaithfulError
-from scenes.physics import PhysicsSettings
+from scenes.mujoco.physics import PhysicsSettings
+from sim_validate.closure.verdict import AGREEMENT
 from sim_validate.hands.hand_gate import known_hand
 from sim_validate.hands.validate_hand import hand_setup
-from sim_validate.validation.verdict import AGREEMENT
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 DOWN = (0.0, 0.6, -0.8)

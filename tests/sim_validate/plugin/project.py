@@ -23,7 +23,7 @@ def test_it_holds(assert_stable):
 
 def test_it_does_not(assert_stable):
     import dataclasses
-    from sim_validate.simulation.setup import NamedWrench
+    from sim_validate.engine.setup import NamedWrench
     body = scenes.example_object("wedge")
     grasp = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
     push = NamedWrench("push", [0.0, 0.0, 900.0, 0.0, 0.0, 0.0])

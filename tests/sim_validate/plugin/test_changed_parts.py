@@ -16,7 +16,7 @@ from sim_validate.baselines.compare import Status
 from sim_validate.baselines.demands import grasp_cases
 from sim_validate.baselines.part import ChangedPartError, Source, source_of
 from sim_validate.baselines.suite import suite_from_toml
-from sim_validate.cli.exit_codes import Exit
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
 from tests.sim_validate.changing import changed, first_grasp

@@ -7,7 +7,7 @@ import pytest
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import suite_from_toml
-from sim_validate.cli.exit_codes import Exit
+from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.changing import changed, first_grasp
 from tests.sim_validate.plugin.project import (

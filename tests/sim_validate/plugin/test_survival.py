@@ -9,7 +9,7 @@ import sim_validate as sv
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.records.grasps import read_grasps
+from sim_validate.planning.grasps_json import read_grasps
 from tests.sim_validate.plugin.project import properties_in, run_pytest
 
 CODE = """

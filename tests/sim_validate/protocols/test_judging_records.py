@@ -9,9 +9,9 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import InputError
-from scenes.mjcf_text import quaternion
-from scenes.tested import HandServos, hand_scene
-from sim_validate.dexgraspbench import (
+from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.tested import HandServos, hand_scene
+from sim_validate.hands.dexgraspbench import (
     FREE,
     dex_record,
     hand_file,

@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.execution.held import HeldSettings
+from scenes.mujoco.held import HeldSettings
 from sim_validate.execution.gate import cases_of, measured_case, require_faithful_execution
 from tests.marks import MORE, more
 from tests.sim_validate.execution.gate.settings_of_gates import (

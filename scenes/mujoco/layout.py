@@ -1,0 +1,270 @@
+"""Computes positions, masses and drives of a scene from the contacts on an object.
+
+The world frame is the object's frame moved to the centre of mass: T_world_object is the translation
+by minus the centre of mass. Lengths and forces are the true ones, but masses are not. A
+quasi-static test asks whether forces balance, and grasps that differ only in scale should behave
+alike, so the dynamics is scaled by the grasp size: the root mean square lever of the contacts about
+the axis that they are closest to. Object and fingers get the mass that the largest normal force
+moves by one grasp size in a fixed time, centred between the contacts. The servos get a stiffness at
+which such a lever is stable.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices, rounded, to_digits
+from grasp_core.checked import coefficient, number
+from grasp_core.closure.contacts import contact_frames, unit_size
+from grasp_core.closure.decision import deepest_forces
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import ByValue, Declared
+from grasp_core.errors import UndecidedError
+from grasp_core.objects.on_faces import face_under
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
+from scenes.mujoco.fingertips import FingerSettings, fitting_radius
+
+RESPONSE_TIME_S = 0.07
+"""Square root of mass x grasp size / largest normal force [s]. It gives 1 kg for 10 N and 5 cm,
+where the settings were measured."""
+STIFFNESS = 5.0
+"""Servo stiffness in largest normal forces per grasp size. Below 1 a force-controlled grasp is
+unstable; above 50 the servos work against the planned forces."""
+LEAST_SIZE = 0.01
+"""Smallest grasp size that is used, in object radii, for contacts that are nearly on one line."""
+SQUEEZE = 0.6
+"""Largest normal force in the gentle grasp that begins a trial, relative to the largest that
+fingers can apply."""
+PAD_HALF_WIDTH = 0.2
+PAD_DEPTH = 0.1
+"""Thickness of a pad, the box under a contact that its fingertip touches, in object radii;
+`PAD_HALF_WIDTH` has the same unit."""
+FLAT = 1e-6
+"""Share of the largest moment of inertia that is added to all three. Coplanar contacts give moments
+at the very limit of what a body can have, and rounding must not pass that limit."""
+TOUCH = 1e-9
+"""Least depth of fingertips in their faces at the start, in grasp sizes: a ten-thousandth of the
+finer thresholds. At depth zero, rounding would decide which fingertips press in the first step, and
+the impact of the others one step later can tilt lightly held objects by 1e-4."""
+OPEN = -1e-6
+"""Margin of closure below which contacts count as open without a proof. It is far beyond the errors
+of compiled code; the worst that could happen is a squeeze along the normals."""
+RETREAT = 0.5
+"""Distance from which fingers approach, in grasp sizes; from much farther away they would arrive
+too fast."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FingerDrive(Declared):
+    """How one fingertip is built and driven."""
+
+    radius_m: float
+    mass_kg: float
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+    max_normal_force_n: float
+    rigid: bool
+    indentation_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Layout(ByValue):
+    """Positions, masses and drives of everything in a scene, in the world frame."""
+
+    name: str
+    vertices: Array
+    """Object mesh about its centre of mass, (n, 3) [m]."""
+    triangles: Indices
+    """Vertex indices of the object's mesh, (t, 3)."""
+    radius_m: float
+    """Largest distance of the object's surface from its centre of mass [m]."""
+    center: Array
+    """Mean of the contacts, (3,) [m]; the simulated mass is centred there."""
+    grasp_size_m: float
+    """Root mean square lever of the contacts about the axis through `center` that they are closest
+    to [m]."""
+    mass_kg: float
+    inertia_kg_m2: Array
+    """Inertia about `center`, along the world axes, (3, 3) [kg m^2]."""
+    contacts: Array
+    """Contact points, (k, 3) [m]."""
+    frames: Array
+    """Columns (inward normal, tangent, tangent) of each contact, (k, 3, 3)."""
+    borders: tuple[tuple[Array, ...], ...]
+    """Convex pieces of each contact's face, (n, 3) each [m]; empty for a contact that lies on no
+    face."""
+    friction: float
+    drive: FingerDrive
+    squeeze: Array
+    """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
+    approach: Array
+    """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
+    torsion_m: float = 0.0
+    """Torsional coefficient at every contact [m]; zero for hard fingertips."""
+
+    @property
+    def squeeze_forces(self) -> Array:
+        """Return the forces of a gentle grasp along the world's axes, (k, 3) [N]."""
+        return np.einsum("kij,kj->ki", self.frames, self.squeeze)
+
+    @property
+    def tip_radii(self) -> Array:
+        """Return the radii of the fingertips, (k,) [m]."""
+        return np.full(len(self.contacts), self.drive.radius_m)
+
+    @property
+    def tip_centers(self) -> Array:
+        """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
+        height = self.tip_radii - self.drive.indentation_m
+        return self.contacts - height[:, None] * self.frames[:, :, 0]
+
+    @property
+    def has_springs(self) -> bool:
+        """Return whether each fingertip stands on springs of its own, alike in all directions."""
+        return not self.drive.rigid
+
+    def tips(self, joints: Array) -> Array:
+        """Compute where the centres of the fingertips are, (n, k, 3) [m].
+
+        Args:
+            joints: Positions of the fingers' joints, (n, 3k) slides [m]; (n, 0) for rigid ones.
+        """
+        if not joints.shape[1]:
+            return np.broadcast_to(self.tip_centers, (len(joints), *self.contacts.shape))
+        slides = joints.reshape(len(joints), joints.shape[1] // 3, 3)
+        return self.tip_centers + np.einsum("kij,nkj->nki", self.frames, slides)
+
+    def commands(self, forces: Array) -> Array:
+        """Compute what servos are told to make fingertips push with forces, (n, 3k) [m].
+
+        Args:
+            forces: Contact forces on the object, (n, k, 3) [N], world axes.
+
+        Returns:
+            Commands, rounded like the numbers of a scene; (n, 0) for rigid fingers, which have no
+            servos.
+        """
+        if self.drive.rigid:
+            return np.zeros((len(forces), 0))
+        pushes = to_digits(np.einsum("kij,nki->nkj", self.frames, forces))
+        return pushes.reshape(len(forces), -1) / self.drive.stiffness_n_per_m
+
+
+def arrange(
+    body: Polyhedron,
+    grasp: Grasp | Sequence[Contact],
+    friction: float,
+    fingers: FingerSettings | None = None,
+    torsion_m: float = 0.0,
+) -> Layout:
+    """Place object, fingertips and drives for a grasp.
+
+    Contacts are rounded to nine digits of the object's radius. Closing fingers strike and rebound,
+    which turns differences in the last digits of a number, such as those between machines, into
+    visible motions. Everything after the rounding is plain arithmetic with the same result on every
+    machine.
+    """
+    coefficient(friction)
+    fingers = fingers or FingerSettings()
+    contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
+    x, y, z = to_digits(np.array([contact.normal for contact in contacts])).T
+    normals = np.column_stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)[:, None]
+    arms = np.array([contact.position for contact in contacts]) - body.center_of_mass
+    arms = to_digits(arms, body.radius)
+    positions = arms + body.center_of_mass
+    size = max(grasp_size(positions), LEAST_SIZE * body.radius)
+    largest = fingers.max_normal_force_n
+    mass = largest * RESPONSE_TIME_S**2 / size
+    return Layout(
+        name=body.name,
+        vertices=to_digits(body.vertices - body.center_of_mass),
+        triangles=body.triangles,
+        radius_m=rounded(body.radius),
+        center=to_digits(arms.mean(axis=0), body.radius),
+        grasp_size_m=size,
+        mass_kg=mass,
+        inertia_kg_m2=_inertia(mass, positions, size),
+        contacts=arms,
+        frames=contact_frames(normals),
+        borders=tuple(
+            () if face is None else tuple(piece - body.center_of_mass for piece in face.pieces)
+            for face in (face_under(body, contact) for contact in contacts)
+        ),
+        friction=friction,
+        drive=_drive(body, positions, normals, fingers, size),
+        squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, torsion_m),
+        approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
+        torsion_m=torsion_m,
+    )
+
+
+def _drive(
+    body: Polyhedron, positions: Array, normals: Array, fingers: FingerSettings, size: float
+) -> FingerDrive:
+    mass = fingers.mass_kg or fingers.max_normal_force_n * RESPONSE_TIME_S**2 / size
+    stiffness = fingers.stiffness_n_per_m or STIFFNESS * fingers.max_normal_force_n / size
+    if fingers.radius_m is not None:
+        where = ", the object's radius in m, or None"
+        number(fingers.radius_m, "fingers.radius_m", most=body.radius, where=where)
+    radius = fingers.radius_m or rounded(fitting_radius(body, positions, normals))
+    return FingerDrive(
+        radius_m=radius,
+        mass_kg=mass,
+        stiffness_n_per_m=stiffness,
+        damping_n_s_per_m=2.0 * math.sqrt(stiffness * mass),
+        max_normal_force_n=fingers.max_normal_force_n,
+        rigid=fingers.drive == "rigid",
+        indentation_m=max(fingers.indentation, TOUCH) * size,
+    )
+
+
+def _ways_in(grasp: Grasp | Sequence[Contact], normals: Array, fingers: FingerSettings) -> Array:
+    """Choose the unit direction in which each finger arrives, (k, 3)."""
+    if fingers.approach is None:
+        planned = grasp.approach_directions if isinstance(grasp, Grasp) else None
+        return normals if planned is None else planned
+    way = np.asarray(fingers.approach, dtype=np.float64)
+    return np.broadcast_to(way / np.linalg.norm(way), normals.shape)
+
+
+def grasp_size(positions: Array) -> float:
+    """Compute the root mean square distance [m] of contacts from the axis they are closest to."""
+    spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    lever = np.linalg.norm(spread[1:]) / math.sqrt(len(positions))
+    return rounded(float(lever))
+
+
+def _inertia(mass: float, positions: Array, size: float) -> Array:
+    """Compute a quarter of the inertia of the mass shared between contacts, (3, 3) [kg m^2].
+
+    About the axis that the contacts are closest to, it is mass (size / 2)^2; about the other axes
+    it grows with the contacts' levers. An equal inertia about all axes would let long grasps spring
+    loose.
+    """
+    arms = positions - positions.mean(axis=0)
+    second = arms.T @ arms / len(arms)
+    shared = np.trace(second) * np.eye(3) - second
+    _, axes = np.linalg.eigh(shared)
+    levers = np.maximum(np.einsum("ij,ik,kj->j", axes, shared, axes), size**2)
+    levers += FLAT * levers.max()
+    return to_digits(0.25 * mass * (axes * levers) @ axes.T)
+
+
+def _pushes(positions: Array, normals: Array, friction: float, torsion_m: float) -> Array:
+    """Compute balanced forces, (k, 3), or normal ones without closure; the largest push is one."""
+    arms, _, _ = unit_size(positions)
+    _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
+    try:
+        # a proof takes long, and is not needed where hard fingers are open by far
+        hopeless = margins[0, 1] < OPEN and not torsion_m
+        found = (
+            None if hopeless else force_closure(positions, normals, friction, torsion_m=torsion_m)
+        )
+        forces = None if found is None else found.forces
+    except UndecidedError:
+        forces = None
+    local = np.einsum("kij,ki->kj", contact_frames(normals), normals if forces is None else forces)
+    return to_digits(local / local[:, 0].max())

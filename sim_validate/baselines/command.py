@@ -1,0 +1,134 @@
+"""Runs `baseline record` and `baseline check`, which tell when the stability of grasps changes."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from grasp_core.planning.result import Plan
+from sim_validate.baselines import flags as baseline_flags
+from sim_validate.baselines.baseline import check_writable, fields_of, read_baseline, write_baseline
+from sim_validate.baselines.check import Checked, check, complete, measured, seen_from
+from sim_validate.baselines.compare import Finding, Status, failing
+from sim_validate.baselines.part import IfChanged, Present, present, source_of, testable
+from sim_validate.baselines.settings import How, of_settings, setup_for
+from sim_validate.closure.asked_trials import noise_of
+from sim_validate.closure.setup_toml import setup_from_file
+from sim_validate.engine.setup import Agenda
+from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.planning.grasps_json import read_grasps
+from sim_validate.planning.wrenches_json import wrenches_from_file
+
+
+def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
+    """Simulate grasps and write the results as a baseline, to compare later results with."""
+    check_writable(command.out)
+    saved = read_grasps(command.grasps)
+    now = _present(saved, command.grasps, command.out, command.changed)
+    agenda = Agenda(
+        random_wrenches=command.random_wrenches,
+        wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
+        limits=command.limits,
+        trials=command.repeats.trials,
+        noise=noise_of(command.repeats),
+        seed=saved.seed if command.seed is None else command.seed,
+    )
+    how = How(setup_for(saved, command.setup), agenda)
+    about = seen_from(command.out, command.grasps)
+    with reporter.progress("simulating") as steps:
+        tested = testable(now, command.limit)
+        done = measured(tested, (about, command.limit), how, command.jobs, steps.update)
+    found = complete(done, now)
+    write_baseline(command.out, found)
+    held = sum(entry.held for entry in found.entries)
+    reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
+    _say_mesh(now, reporter)
+    reporter.document({"baseline": str(command.out), "grasps": len(found.entries), "held": held})
+    return Exit.GOOD
+
+
+def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
+    """Simulate the grasps of a baseline again and report how each result differs."""
+    before = read_baseline(command.baseline)
+    path = command.grasps or command.baseline.parent / before.grasps_file
+    saved = read_grasps(path)
+    now = _present(saved, path, command.baseline, command.changed, before.scale)
+    now = now.against(before)
+    how = of_settings(before.settings, str(command.baseline))
+    if command.setup is not None:
+        how = replace(how, setup=setup_from_file(command.setup, how.setup))
+    where = seen_from(command.baseline, path)
+    with reporter.progress("simulating") as steps:
+        done = check(before, now, where, how, command.jobs, steps.update)
+    _show(done, reporter)
+    _say_mesh(now, reporter)
+    if command.bless:
+        testable(now, before.limit)
+        write_baseline(command.baseline, complete(done.measured, now))
+        reporter.say(f"wrote {command.baseline}")
+        return Exit.GOOD
+    return exit_code(done.findings, strict=command.strict)
+
+
+def _present(
+    saved: Plan,
+    grasps: Path,
+    baseline: Path,
+    given: baseline_flags.ChangedPart,
+    recorded_scale: float | None = None,
+) -> Present:
+    """Carry grasps over to their part as it is now, as the flags about changed parts ask for."""
+    asked = IfChanged(
+        refuse=given.refuse_changed_part,
+        unit=given.unit,
+        scale=given.scale,
+        distance_m=given.carrying.distance_m,
+        angle_deg=given.carrying.angle_deg,
+    ).with_scale(recorded_scale)
+    source = source_of(saved, grasps, [baseline.parent], given.object, asked.scale)
+    return present(saved, grasps, source, asked)
+
+
+def _say_mesh(now: Present, reporter: Reporter) -> None:
+    """Say what must be known about the mesh that was tested, and which grasps it lost."""
+    if now.note:
+        reporter.say(now.note)
+    for name, why in list(now.gone.items())[:TABLE_ROWS]:
+        reporter.say(f"{name} is gone: {why}")
+
+
+def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
+    """Return 1 if a grasp fails the check, 4 if a grasp cannot be compared, else 0."""
+    came = {finding.status for finding in findings}
+    if came & {*failing(strict=strict)}:
+        return Exit.NEGATIVE
+    return Exit.INPUT if Status.NOT_COMPARABLE in came else Exit.GOOD
+
+
+def _show(done: Checked, reporter: Reporter) -> None:
+    told = [finding for finding in done.findings if finding.status is not Status.SAME]
+    rows = list[tuple[str, ...]]()
+    for each in told:  # reasons, and further differences beyond their bands
+        more = [text for text in each.beyond if text not in each.reasons]
+        rows.append((each.id, each.status.value, "; ".join([*each.reasons, *more])))
+    if rows:
+        title = "grasps that differ from the baseline"
+        reporter.table(title, ("grasp", "status", "why"), rows[:TABLE_ROWS])
+        say_cut(len(rows), reporter)
+    counts = Counter(finding.status.value for finding in done.findings)
+    reporter.say(", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
+    reporter.say(f"compared {done.how}")
+    listed = [_record(finding) for finding in done.findings]
+    reporter.document({"counts": dict(counts), "compared": done.how, "grasps": listed})
+
+
+def _record(finding: Finding) -> dict[str, object]:
+    return {
+        "id": finding.id,
+        "status": finding.status.value,
+        "reasons": list(finding.reasons),
+        "differences": list(finding.differences),
+        "before": None if finding.before is None else fields_of(finding.before),
+        "after": None if finding.after is None else fields_of(finding.after),
+    }

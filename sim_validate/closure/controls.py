@@ -1,0 +1,241 @@
+"""Makes negative controls, contact sets that are proved unable to hold the object, and tries them.
+
+A validator that never rejects anything proves nothing. Each control is derived from a grasp and
+carries a proof that it is not force-closed: a separating wrench that no contact forces within the
+friction cones oppose, whatever the fingers do. In simulation it is loaded with this wrench. If
+contact forces cannot balance even the bare squeeze, it is also tried without a load. The fingers do
+their best: they apply the forces that need the least friction or, if none balance, those closest to
+balance.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Annotated
+
+import numpy as np
+
+from grasp_core.arrays import Array, Wrench, cross, rounded, to_digits
+from grasp_core.closure.contacts import stacked
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.declared import Declared
+from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.figures import Shown
+from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
+from grasp_core.forces.contact_forces import least_friction_forces
+from grasp_core.kinds import Friction, Many
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.values import Contact, Grasp
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.schedules import Load
+from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace, judge
+
+FRICTION_SHARE = 0.9
+"""Friction of the low-friction control, relative to the lowest at which the grasp is in closure."""
+LEAST_FRICTION = 1e-4
+"""Lowest friction of a negative control; the simulator's own limit is 1e-5."""
+SEARCH = 64
+"""Number of random displacements of the contacts that are tried to lose force closure."""
+TOWARD_CORNER = 0.95
+"""How far a moved contact goes towards a corner of its face, as a share of the way."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Control(Declared):
+    """A negative control: contacts that must not hold, with the proof that they cannot."""
+
+    name: Annotated[str, Shown("control")]
+    friction: Annotated[Friction, Shown("friction")]
+    """The coefficient of the control: that of the run, or 0.9 of the critical friction
+    (`low_friction`)."""
+    certificate: ClosureCertificate
+    """The proof that its contacts are not in force closure."""
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts, which the certificate is about."""
+        proof = self.certificate
+        return tuple(map(Contact, proof.positions, proof.normals))
+
+    def separating_wrench(self, center: Array) -> Array:
+        """The wrench that the contacts provably cannot resist, (6,), with torque about `center`."""
+        wrench = self.certificate.separating_wrench
+        assert wrench is not None  # noqa: S101 - controls are refuted by construction
+        return np.concatenate([wrench[:3] + cross(wrench[3:], center), wrench[3:]])
+
+
+def negative_controls(
+    body: Polyhedron, grasp: Grasp, friction: float, seed: int, torsion_m: float = 0.0
+) -> tuple[Control, ...]:
+    """Make the negative controls that exist for a grasp, at most one of each kind.
+
+    The kinds are friction below the critical one, fingers removed, a normal flipped, and contacts
+    moved on their faces, out of the grasp's region. With torsion (`torsion_m` [m]) all of them are
+    proved open as soft fingers.
+    """
+    lower = FRICTION_SHARE * grasp.critical_friction
+    low_friction = _refuted("low_friction", grasp.contacts, lower, torsion_m)
+    candidates = (
+        low_friction if lower >= LEAST_FRICTION else iter(()),
+        _fingers_removed(grasp, friction, torsion_m),
+        _normal_flipped(grasp, friction, torsion_m),
+        _contacts_moved(body, grasp, friction, torsion_m, np.random.default_rng(seed)),
+    )
+    return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
+
+
+def _fingers_removed(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
+    """Yield a negative control with one finger fewer, at lower friction if needed, or two fewer.
+
+    Without friction no three contacts are in closure, so any three are open below some friction.
+    Two hard contacts are open at any friction, because the object can always turn about the line
+    between them.
+    """
+    threes = list(combinations(grasp.contacts, 3))
+    for rest in threes:
+        yield from _refuted("fingers_removed", rest, friction, torsion_m)
+    for rest in threes:
+        lower = math.inf
+        with suppress(SolverError, UndecidedError):
+            lower = FRICTION_SHARE * critical_friction(*stacked(rest), torsion_m=torsion_m)
+        if LEAST_FRICTION <= lower <= friction:
+            yield from _refuted("fingers_removed", rest, lower, torsion_m)
+    for rest in combinations(grasp.contacts, 2):
+        yield from _refuted("fingers_removed", rest, friction, torsion_m)
+
+
+def _normal_flipped(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
+    """Flip a normal, so that a finger pulls instead of pushing, as a wrong sign in a file would."""
+    for finger, contact in enumerate(grasp.contacts):
+        contacts = list(grasp.contacts)
+        contacts[finger] = replace(contact, normal=-contact.normal)
+        yield from _refuted("normal_flipped", contacts, friction, torsion_m)
+
+
+def _contacts_moved(
+    body: Polyhedron, grasp: Grasp, friction: float, torsion_m: float, rng: np.random.Generator
+) -> Iterator[Control]:
+    pieces = [body.faces[face].pieces for face in grasp.faces]
+    for _ in range(SEARCH):
+        moved = list[Contact]()
+        for choice, contact in zip(pieces, grasp.contacts, strict=True):
+            piece = choice[int(rng.integers(len(choice)))]
+            corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
+            moved.append(Contact(middle + TOWARD_CORNER * (corner - middle), contact.normal))
+        yield from _refuted("contacts_moved", moved, friction, torsion_m)
+
+
+def _refuted(
+    name: str, contacts: Sequence[Contact], friction: float, torsion_m: float
+) -> Iterator[Control]:
+    """Yield the negative control if the analysis proves that it is not force-closed."""
+    try:
+        certificate = force_closure(*stacked(contacts), friction, torsion_m=torsion_m)
+    except UndecidedError:
+        return
+    if not certificate.closed:
+        yield Control(name, friction, certificate)
+
+
+SEPARATING = "separating"
+"""Name of the trial with the separating wrench, which the contacts provably cannot resist."""
+UNLOADED = "unloaded"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlLoad:
+    """A load under which a negative control must let go of the object."""
+
+    name: str
+    load: Load
+    settling: float
+    """Friction coefficient while the object settles, before the load is applied."""
+    required_friction: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ControlTrial(Declared):
+    """One simulated trial of a negative control under one load."""
+
+    name: str
+    wrench: Wrench
+    required_friction: float | None
+    """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
+    hold: Annotated[HoldVerdict, FLAT]
+    trace: Annotated[Trace | None, UNRECORDED] = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ControlVerdict(Declared):
+    """How a negative control, a contact set proved not to be force-closed, ended in simulation."""
+
+    control: Annotated[Control, FLAT]
+    tried: Annotated[tuple[ControlTrial, ...], Many(), Key("trials")]
+
+    @recorded
+    def held(self) -> bool:
+        """Whether the control held any of the loads, which it must not."""
+        return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
+
+    @recorded
+    def let_go(self) -> bool:
+        """Whether the object moved in every trial, as it must."""
+        return all(trial.hold.outcome in LET_GO for trial in self.tried)
+
+
+def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
+    """Simulate a negative control under the loads that it must not hold."""
+    rig, loads = control_case(body, control, setup)
+    traces = rig.hold([each.load for each in loads], [each.settling for each in loads])
+    layout = rig.bench.scene.layout
+    tried = tuple(
+        ControlTrial(
+            each.name, each.load.wrench, each.required_friction, judge(trace, layout, setup.hold),
+            trace if agenda.keep_traces else None,
+        )
+        for each, trace in zip(loads, traces, strict=True)
+    )  # fmt: skip
+    return ControlVerdict(control, tried)
+
+
+def control_case(
+    body: Polyhedron, control: Control, setup: Setup
+) -> tuple[Rig, tuple[ControlLoad, ...]]:
+    """Close fingers on a control, and find the loads that it must not hold."""
+    # Other contacts than the grasp's may lack room for its fingertips or lie off the mesh.
+    fingers = replace(setup.fingers, radius_m=None)
+    on_pads = replace(setup, fingers=fingers, surface="pads")
+    scene = on_pads.scene(body, control.contacts, control.friction)
+    idle = _planned(body, control, setup, UNLOADED, np.zeros(6))
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)
+    # The separating wrench is a linear function of wrenches. With torques measured in object
+    # radii its coefficients are times the scale; the wrench along them is times it once more.
+    scale = np.array([1.0] * 3 + [body.radius] * 3)
+    facing = -control.separating_wrench(body.center_of_mass) * scale**2
+    size = setup.hold.control_load * setup.fingers.max_normal_force_n
+    wrench = to_digits(size * facing / float(np.linalg.norm(facing / scale)))
+    loads = [_planned(body, control, setup, SEPARATING, wrench)]
+    if control.certificate.margin < -setup.hold.least_excess:  # no forces balance the bare squeeze
+        loads.append(idle)
+    return rig, tuple(loads)
+
+
+def _planned(
+    body: Polyhedron, control: Control, setup: Setup, name: str, wrench: Array
+) -> ControlLoad:
+    """Plan forces for a wrench: of least friction, or nearest to balance where none balance it."""
+    largest = setup.fingers.max_normal_force_n
+    limits = (setup.hold.least_normal_share * largest, largest)
+    forces, needed = least_friction_forces(
+        *stacked(control.contacts), control.friction, wrench,
+        normal_force=limits, center=body.center_of_mass,
+    )  # fmt: skip
+    needed = None if needed is None else rounded(needed)
+    settling = setup.hold.settling_friction * max(control.friction, needed or 0.0)
+    return ControlLoad(name, Load(wrench, to_digits(forces)), settling, needed)

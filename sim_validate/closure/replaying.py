@@ -1,0 +1,243 @@
+"""Simulates one trial of a recorded verdict again.
+
+Trials of a scene do not influence each other, so one by itself moves as it did among the others.
+It is simulated twice: until its answer is known, for the verdict as it was recorded, and to the
+protocol's full length, to be looked at.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TypeAlias
+
+from grasp_core.closure.contacts import contacts_sha256, stacked
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.result import Plan
+from grasp_core.values import Contact, Grasp
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.fingertips import clashes
+from sim_validate.closure.controls import (
+    Control,
+    ControlLoad,
+    ControlTrial,
+    ControlVerdict,
+    control_case,
+)
+from sim_validate.closure.noise import OPEN, disturbed, for_repeats, noisy_case
+from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.loads import PlannedLoad, planned_loads
+from sim_validate.engine.rig import Rig, Watched, squeezed
+from sim_validate.engine.schedules import Load
+from sim_validate.engine.setup import WEAKEST, Agenda, Setup
+from sim_validate.engine.traces import HoldVerdict, Outcome, judge
+from sim_validate.planning.grasps_json import GRASPS, grasp_with_id, read_grasps, some
+
+VERDICTS = "verdicts.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Which contact set of a file is to be simulated again."""
+
+    grasp: str | None = None
+    control: str | None = None
+    """Name of a negative control (contacts that must fail) made from the grasp."""
+    trial: int | None = None
+    """Number of a repeat with noise; None for the trials without noise."""
+    grasps: Path | None = None
+    """The `grasps.json` that verdicts are about, if it is not beside them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recorded:
+    """A contact set of a file, and how its trials ended: a grasp, negative control, or repeat."""
+
+    name: str
+    body: Polyhedron
+    contacts: tuple[Contact, ...]
+    friction: float
+    setup: Setup
+    agenda: Agenda
+    control: str | None = None
+    grasp: Grasp | None = None
+    """The planned grasp that has these contacts; None if it is not known."""
+    trial: int | None = None
+    outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
+    others: str | None = None
+    """How all trials that `outcomes` does not name ended; None if the file does not say."""
+
+    def outcome_of(self, wrench: str) -> str | None:
+        """Look up how the trial of a wrench ended; None if the file does not say."""
+        return self.outcomes.get(wrench, self.others)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replayed:
+    """The motion and outcome of one trial that was simulated again."""
+
+    name: str
+    load: Load
+    predicted_limit: float | None
+    """Largest multiple of the wrench that is resisted by analysis; None for contacts without force
+    closure."""
+    required_friction: float | None
+    """Friction that the planned forces need; None if no forces balance the wrench."""
+    friction: float
+    hold: HoldVerdict
+    watched: Watched
+    scene: Scene
+
+
+def recorded_in(source: Path, wanted: Wanted) -> Recorded:
+    """Read a contact set from a `verdicts.json`, or from the folder of a run."""
+    path = source / VERDICTS if source.is_dir() else source
+    found = load_verdicts(path)
+    source = wanted.grasps or path.parent / GRASPS
+    if not source.is_file():
+        raise InputError(
+            f"{source}: this file of grasps is missing; say with --grasps where the file is"
+        )
+    saved = read_grasps(source)
+    if saved.body.content_sha256 != found.object_sha256:
+        raise InputError(
+            f"{source}: these grasps are on another object than the results to replay; give the "
+            "right --grasps"
+        )
+    saved = replace(saved, friction=found.friction)
+    verdicts = {each.id: each for each in found}
+    grasp = grasp_with_id(path, saved, wanted.grasp)
+    if grasp.id not in verdicts:
+        raise InputError(
+            f"{path}: no verdict on the grasp {grasp.id}; the file has verdicts on {some(verdicts)}"
+        )
+    return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
+
+
+def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Recorded:
+    """Read a contact set, and how its trials ended, from the verdict on one grasp."""
+    grasp = grasp_with_id(path, saved, wanted.grasp)
+    if contacts_sha256(grasp.contacts) != verdict.contacts_sha256:
+        raise InputError(
+            f"{path}: the contacts of {grasp.id} have changed since these results were recorded; "
+            "record them again"
+        )
+    found = Recorded(
+        grasp.id, saved.body, grasp.contacts, saved.friction, verdict.setup, verdict.agenda,
+        grasp=grasp, trial=wanted.trial,
+    )  # fmt: skip
+    if wanted.trial is not None:
+        return _in_trial(path, found, verdict, wanted.trial)
+    trials: Sequence[WrenchVerdict | ControlTrial] = verdict.wrenches
+    if wanted.control is not None:
+        control = _control(path, verdict, wanted.control)
+        trials = control.tried
+        found = replace(
+            found, name=f"{grasp.id}:{wanted.control}", contacts=control.control.contacts,
+            friction=control.control.friction, control=wanted.control, grasp=None,
+        )  # fmt: skip
+    return replace(found, outcomes={each.name: each.hold.outcome.value for each in trials})
+
+
+def _control(path: Path, verdict: Verdict, name: str) -> ControlVerdict:
+    """Find the verdict on a negative control of a grasp."""
+    found = next((each for each in verdict.controls if each.control.name == name), None)
+    if found is None:
+        raise InputError(
+            f"{path}: grasp {verdict.id} has no negative control {name!r}; choose from "
+            f"{some(each.control.name for each in verdict.controls)}"
+        )
+    return found
+
+
+def _in_trial(path: Path, found: Recorded, verdict: Verdict, trial: int) -> Recorded:
+    """Choose a repeat with noise."""
+    found = replace(found, name=f"{found.name} in trial {trial}")
+    repeats = () if verdict.robustness is None else verdict.robustness.trials
+    if trial >= len(repeats):
+        said = f"choose from 0 to {len(repeats) - 1}"
+        said = said if repeats else "it was recorded without --trials"
+        raise InputError(f"{path}: the file has no repeat with noise numbered {trial}; {said}")
+    ended = repeats[trial]
+    if ended.outcome is Outcome.HELD:
+        return replace(found, others=Outcome.HELD.value)
+    return replace(found, outcomes={ended.wrench: ended.outcome.value})
+
+
+Loads: TypeAlias = Sequence[PlannedLoad | ControlLoad]
+
+
+def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
+    """Simulate one trial of a recorded contact set again."""
+    rig, loads, landed = _case(recorded)
+    limits = {
+        each.name: each.predicted_limit if isinstance(each, PlannedLoad) else None for each in loads
+    }
+    usual = next((name for name, end in recorded.outcomes.items() if end != "held"), None)
+    if usual is None:  # the wrench that is hardest to hold
+        named = recorded.trial is None and WEAKEST in limits
+        usual = WEAKEST if named else min(limits, key=lambda name: limits[name] or 0.0)
+    name = wrench or usual
+    held = next((each for each in loads if each.name == name), None)
+    if held is None:
+        known = ", ".join(limits)
+        raise InputError(f"{recorded.name}: no wrench is named {name!r}; choose from {known}")
+    settling = [held.settling] if isinstance(held, ControlLoad) else None
+    watched = rig.watch(held.load, settling)
+    layout = rig.bench.scene.layout
+    overlap = clashes(recorded.body, *stacked(landed), layout.drive.radius_m) if landed else ()
+    (ended,) = rig.hold([held.load], settling)
+    return Replayed(
+        name=name,
+        load=held.load,
+        predicted_limit=limits[name],
+        required_friction=held.required_friction,
+        friction=rig.friction,
+        hold=judge(ended, layout, recorded.setup.hold, overlap),
+        watched=watched,
+        scene=rig.bench.scene,
+    )
+
+
+def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
+    """Close fingers on the contacts, and plan the loads that can be applied to them.
+
+    Gives also where the fingertips stand; none for contacts without force closure, whose fingertips
+    may overlap.
+    """
+    body, contacts, friction = recorded.body, recorded.contacts, recorded.friction
+    setup = recorded.setup
+    if recorded.control is not None:
+        return _opened(body, recorded.control, contacts, friction, setup)
+    scene = setup.scene(body, recorded.grasp or contacts, friction)
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
+    planned = planned_loads(body, contacts, friction, rig.idle, recorded.agenda, setup)
+    if recorded.trial is None or recorded.grasp is None:
+        return rig, planned, contacts
+    setup, agenda = for_repeats(setup, scene), recorded.agenda
+    case = disturbed(body, recorded.grasp, friction, agenda.noise, agenda.seed, recorded.trial)
+    if case.missed:
+        raise InputError(
+            f"{recorded.name}: this repeat has no trial to simulate, because noise made finger "
+            f"{case.missed[0]} miss its face"
+        )
+    if not force_closure(*stacked(case.contacts), case.friction, torsion_m=setup.torsion_m).closed:
+        return _opened(body, OPEN, case.contacts, case.friction, setup)
+    rig, heavy = noisy_case(body, case, [(each.name, each.load.wrench) for each in planned], setup)
+    return rig, heavy, case.landed
+
+
+def _opened(
+    body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
+) -> tuple[Rig, Loads, tuple[Contact, ...]]:
+    """Prepare contacts without force closure as a negative control."""
+    certificate = force_closure(*stacked(contacts), friction, torsion_m=setup.torsion_m)
+    if certificate.closed:
+        raise InputError(
+            f"{name}: expected contacts without force closure, but these are force-closed at "
+            f"friction {friction}"
+        )
+    return *control_case(body, Control(name, friction, certificate), setup), ()

@@ -1,0 +1,339 @@
+"""Verdicts on a grasp: on each wrench, on repeats with noise, and on all of its trials.
+
+Each sets what was predicted beside what was simulated, and says where the two contradict each
+other. They are also what `verdicts.json` holds.
+"""
+
+import importlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from grasp_core.arrays import Array, Shape, Wrench
+from grasp_core.checked import path_of
+from grasp_core.closure.contacts import contacts_sha256
+from grasp_core.declared import Declared
+from grasp_core.figures import Shown, scalars
+from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
+from grasp_core.grasp_tables import ById, frame_of
+from grasp_core.kinds import Friction, Many, Measured, OrInfinity
+from grasp_core.notebooks import InNotebooks
+from grasp_core.provenance import versions
+from grasp_core.values import Contact
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.layout import FingerDrive, Layout
+from sim_validate.closure.controls import ControlVerdict
+from sim_validate.engine.gate import Gate
+from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
+from sim_validate.engine.setup import Agenda, Noise, Setup
+from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
+from sim_validate.kit.about_object import AboutObject
+
+AGREEMENT = 0.02
+"""Largest relative error of simulated limits and critical frictions: five times the worst that was
+measured."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class WrenchVerdict(Declared):
+    """One wrench on a grasp, predicted and simulated."""
+
+    name: str
+    wrench: Wrench
+    predicted_limit: OrInfinity
+    """Largest multiple of the applied wrench that the analysis says is resisted."""
+    required_friction: OrInfinity
+    """Least coefficient with which the planned contact forces balance the wrench."""
+    hold: Annotated[HoldVerdict, FLAT]
+    let_go_at: SimulatedLimit | None = None
+    """Where the object lets go, in shares of the predicted limit; None if not measured, or not
+    found."""
+    trace: Annotated[Trace | None, UNRECORDED] = field(default=None, compare=False)
+
+    @recorded
+    def simulated_limit(self) -> float | None:
+        """Multiple of the applied wrench at which the object lets go; None if not found."""
+        return None if self.let_go_at is None else self.let_go_at.share * self.predicted_limit
+
+    @property
+    def contradiction(self) -> str:
+        """How simulation contradicts the analysis, in words; empty if it does not."""
+        outcome, predicted = self.hold.outcome, self.predicted_limit
+        wrong = Outcome.HELD if predicted < 1.0 - AGREEMENT else None
+        if (outcome in LET_GO and predicted > 1.0 + AGREEMENT) or outcome is wrong:
+            return (f"{self.name}: {outcome.value}, though the predicted limit is "
+                    f"{predicted:.4g} times the wrench")  # fmt: skip
+        if self.let_go_at and abs(self.let_go_at.share - 1.0) > AGREEMENT:
+            return f"{self.name}: let go at {self.let_go_at.share:.4g} of the predicted limit"
+        return ""
+
+
+@dataclass(frozen=True, slots=True)
+class NoisyTrial(Declared):
+    """The outcome of one repeat with noise."""
+
+    number: int
+    predicted: bool | None
+    """Whether the analysis says that every load is resisted; None if it is undecided."""
+    outcome: Outcome
+    """`held`, or how the first load that did not hold ended."""
+    wrench: str
+    """Name of the first load that did not hold; empty if all held, or if nothing was loaded."""
+    reason: str
+    contradictions: tuple[str, ...]
+    """Where simulation contradicts the analysis, or says nothing about it, in words."""
+    close: bool = False
+    """Whether a predicted limit is so close to a load that the analysis may err either way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robustness(Declared):
+    """All repeats of a grasp with noise, and their statistics."""
+
+    noise: Noise
+    trials: Annotated[tuple[NoisyTrial, ...], Many()]
+
+    @recorded
+    def held(self) -> int:
+        """Number of repeats in which every load held."""
+        return sum(trial.outcome is Outcome.HELD for trial in self.trials)
+
+    @recorded
+    def predicted(self) -> int:
+        """Number of repeats in which every load is resisted according to the analysis."""
+        return sum(trial.predicted is True for trial in self.trials)
+
+    @recorded
+    def interval(self) -> tuple[float, float]:
+        """The 95 % confidence interval of the share of repeats that hold."""
+        return interval(self.held, len(self.trials))
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """Where simulation contradicts the analysis in any repeat, in words."""
+        return tuple(
+            f"trial {trial.number}: {text}"
+            for trial in self.trials
+            for text in trial.contradictions
+        )
+
+
+def interval(count: int, of: int) -> tuple[float, float]:
+    """The 95 % confidence interval of a share, by Clopper and Pearson's exact method."""
+    stats: Any = importlib.import_module("scipy.stats")  # has no types, takes half a second
+    found = stats.binomtest(count, of).proportion_ci(0.95, method="exact")
+    return float(found.low), float(found.high)
+
+
+ROWS = 8
+"""Largest number of trials that notebooks show."""
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Scale(Declared):
+    """The sizes with which the trials of a grasp were simulated."""
+
+    grasp_size_m: float
+    """Root mean square lever of the contacts [m]; displacements are judged relative to it."""
+    object_mass_kg: float
+    """Mass of the object, not its own: it is chosen so that similar grasps behave alike [kg]."""
+    object_inertia_kg_m2: Annotated[Array, Shape(3, 3)]
+    fingers: FingerDrive
+
+    @classmethod
+    def of(cls, layout: Layout) -> Self:
+        """Return the sizes of a scene."""
+        return cls(layout.grasp_size_m, layout.mass_kg, layout.inertia_kg_m2, layout.drive)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Verdict(Declared, InNotebooks):
+    """The result of simulating a grasp: what it held, and whether that fits the analysis."""
+
+    id: Annotated[str, Shown("grasp")]
+    contacts: tuple[Contact, ...]
+    friction: Friction
+    critical_friction: CriticalFriction
+    wrenches: tuple[WrenchVerdict, ...]
+    controls: tuple[ControlVerdict, ...]
+    robustness: Robustness | None
+    """How often the grasp holds with noise, if asked for."""
+    setup: Setup
+    agenda: Agenda
+    scale: Scale
+    gate: Annotated[Gate | None, UNRECORDED] = field(default=None, compare=False)
+    """How the simulator did on cases with known answers; a file has it once, for all verdicts."""
+    scene: Annotated[Scene | None, UNRECORDED] = field(default=None, compare=False)
+    """The scene that was simulated; None if the verdict was read from a file."""
+
+    @recorded
+    def contacts_sha256(self) -> str:
+        """Hash of the contacts, which tells grasps of one id apart."""
+        return contacts_sha256(self.contacts)
+
+    @recorded
+    def predicted_critical_friction(self) -> Annotated[OrInfinity, Shown("mu*", ".4f")]:
+        """The critical friction by analysis."""
+        return self.critical_friction.predicted
+
+    @recorded
+    def simulated_critical_friction(self) -> Annotated[float | None, Shown("in sim", ".4f")]:
+        """The one found in simulation; None if it was not measured or not found."""
+        return self.critical_friction.simulated
+
+    @recorded
+    def shares_found(self) -> Annotated[tuple[float, float] | None, Shown("limits", ".3f")]:
+        """Least and largest share of predicted limits at which the object let go; None if none."""
+        found = [each.let_go_at.share for each in self.wrenches if each.let_go_at]
+        return (min(found), max(found)) if found else None
+
+    @recorded
+    def displacement_m(self) -> Annotated[Measured, Shown("um moved", ".2g", MICRO)]:
+        """Largest displacement of the object in the trials that hold a wrench [m]."""
+        moved = [trial.hold.displacement_m for trial in self.wrenches]
+        return math.nan if any(map(math.isnan, moved)) else max(moved, default=0.0)
+
+    @property
+    def failures(self) -> tuple[WrenchVerdict, ...]:
+        """The wrenches that were not held, in order."""
+        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
+
+    @recorded
+    def outcome(self) -> Annotated[Outcome, Shown("outcome")]:
+        """`held`, or how the first wrench that was not held ended."""
+        return self.failures[0].hold.outcome if self.failures else Outcome.HELD
+
+    @recorded
+    def held(self) -> bool:
+        """Whether every wrench held."""
+        return self.outcome is Outcome.HELD
+
+    @recorded
+    def controls_let_go(self) -> Annotated[bool, Shown("controls let go")]:
+        """Whether every negative control let go of the object, as it must."""
+        return all(control.let_go for control in self.controls)
+
+    @recorded
+    def mismatches(self) -> tuple[str, ...]:
+        """Where simulation contradicts the analysis, one sentence each."""
+        found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
+        if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
+            found.append(f"critical friction: {fault}")
+        if self.agenda.limits != "none":
+            found += [f"{trial.name}: the limit was not found near the predicted one"
+                      for trial in self.wrenches if trial.let_go_at is None]  # fmt: skip
+        if self.robustness is not None:
+            found += self.robustness.contradictions
+        return tuple(found)
+
+    @recorded
+    def good(self) -> bool:
+        """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
+        return self.held and self.controls_let_go and not self.mismatches
+
+    def _html(self) -> str | None:
+        """Return a picture of the scene with how the trials ended, the failed ones first."""
+        if self.scene is None:
+            return None
+        from scenes.drawing.in_notebooks import card, placed
+
+        title = f"{self.id}: {self.outcome.value.replace('_', ' ')}"
+        return card(placed(self.scene.layout), title, _rows(self))
+
+
+def _disagreement(friction: CriticalFriction) -> str:
+    simulated, predicted = friction.simulated, friction.predicted
+    if simulated is None:
+        return "not found near the predicted one"
+    if simulated > 0.0 and abs(simulated - predicted) > AGREEMENT * predicted:
+        return f"{simulated:.4g} in simulation, {predicted:.4g} predicted"
+    return ""
+
+
+def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = [("trial", "outcome", "limit predicted", "simulated")]
+    trials = sorted(verdict.wrenches, key=lambda trial: trial.hold.outcome is Outcome.HELD)
+    for trial in trials[:ROWS]:
+        found = trial.simulated_limit
+        simulated = "-" if found is None else f"{found:.4g}"
+        predicted = f"{trial.predicted_limit:.4g}"
+        rows.append((trial.name, trial.hold.outcome.value, predicted, simulated))
+    let_go = sum(control.let_go for control in verdict.controls)
+    rows.append((f"{len(verdict.failures)} of {len(trials)} trials failed",))
+    rows.append((f"{let_go} of {len(verdict.controls)} negative controls let go",))
+    return rows + [(mismatch,) for mismatch in verdict.mismatches]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Verdicts(RecordFile, ById[Verdict]):
+    """The verdicts on an object's grasps, as `verdicts.json` holds them.
+
+    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
+
+    ITEMS = "verdicts"
+    FILE = "verdicts.json"
+    SCHEMA = 2
+
+    object: AboutObject
+    friction: Friction
+    complete: bool
+    """Whether every grasp that was asked for was tested."""
+    gate: Gate
+    """How the simulator did on cases with known answers."""
+    verdicts: tuple[Verdict, ...]
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @property
+    def object_sha256(self) -> str:
+        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
+        return self.object.content_sha256
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps that held, of negative controls that let go, and contradictions."""
+        controls = [control for verdict in self.verdicts for control in verdict.controls]
+        return {
+            "grasps": len(self.verdicts),
+            "grasps_held": sum(verdict.held for verdict in self.verdicts),
+            "controls": len(controls),
+            "controls_held": sum(control.held for control in controls),
+            "controls_let_go": sum(control.let_go for control in controls),
+            "mismatches": sum(len(verdict.mismatches) for verdict in self.verdicts),
+        }
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each verdict, indexed by the grasp's id.
+
+        It has a column for each figure of a verdict that is a number or a word; of the mismatches,
+        how many there are.
+
+        Raises:
+            InputError: The library pandas is not installed.
+        """
+        return frame_of([scalars(each) for each in self.verdicts], [v.id for v in self.verdicts])
+
+
+def load_verdicts(path: str | Path) -> Verdicts:
+    """Read verdicts, as `graspproof validate` and `graspproof run` write them.
+
+    Args:
+        path: A `verdicts.json`.
+
+    Raises:
+        InputError: The file is missing or invalid; the message names the file and the field.
+    """
+    return Verdicts.read(path_of(path, "path"))
+
+
+def trace_arrays(verdict: Verdict) -> dict[str, Array]:
+    """Collect the recorded motion of every contact as arrays, named by trial and quantity."""
+    fields = ("times_s", "displacements_m", "shifts_m", "rotations_rad", "slips_m", "gaps_m")
+    kept: Sequence[tuple[str, Any]] = [
+        *((trial.name, trial.trace) for trial in verdict.wrenches if trial.trace is not None),
+        *((f"{control.control.name}.{trial.name}", trial.trace)
+          for control in verdict.controls for trial in control.tried if trial.trace is not None),
+    ]  # fmt: skip
+    return {f"{name}.{field}": getattr(trace, field) for name, trace in kept for field in fields}

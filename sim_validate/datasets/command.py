@@ -1,0 +1,163 @@
+"""Runs the commands that build, import, verify and export datasets."""
+
+from contextlib import AbstractContextManager
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any
+
+from grasp_core.errors import InputError
+from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.planning.request import METHODS
+from grasp_core.processes import local_processes
+from sim_validate.datasets import flags as dataset_flags
+from sim_validate.datasets.build import build
+from sim_validate.datasets.card import CARD
+from sim_validate.datasets.config import CREDITS, DatasetConfig, Learning, config_from_toml
+from sim_validate.datasets.isaac import export
+from sim_validate.datasets.manifest import read_manifest
+from sim_validate.datasets.open_dataset import splits_in_words
+from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.workers import Engine
+from sim_validate.kit.clusters import dask_workers, ray_workers
+from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.kit.exit_codes import Exit
+
+FRICTION = 0.5
+"""Friction coefficient for planning and simulation if no flag gives one."""
+
+
+def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
+    """Make a dataset, or resume a build that was interrupted."""
+    return _build(_asked(command), command.out, command.work, reporter)
+
+
+def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
+    """Judge the grasps of another tool, and write the results as a dataset."""
+    config = DatasetConfig(
+        objects=(command.object,),
+        contacts=str(command.contacts),
+        outward=command.outward,
+        **_settings(command.settings),
+    )
+    return _build(config, command.out, command.work, reporter)
+
+
+def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter: Reporter) -> int:
+    _warn_of_missing(config, reporter)
+    with reporter.progress("building") as steps, _engine(work) as engine:
+        built = build(config, out, engine, steps.update, work.timeout_s)
+    rows = built.rows
+    reporter.say(
+        f"{out}: {built.units} units, {built.made} made now, {built.quarantined} quarantined; "
+        f"{rows['objects']} objects, {rows['grasps']} grasps and controls, {rows['trials']} trials"
+        + (f", {rows['executions']} trials of executions" if config.execution else "")
+    )
+    manifest = read_manifest(out)
+    reporter.say(splits_in_words(manifest))
+    if built.quarantined:
+        reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
+    reporter.document({"out": str(out), "manifest": asdict(manifest)})
+    return Exit.PARTIAL if built.quarantined else Exit.GOOD
+
+
+def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
+    if work.engine != "local":
+        start = ray_workers if work.engine == "ray" else dask_workers
+        return start(work.jobs, work.address)
+    if work.address is not None:
+        raise InputError(
+            "--address names a Ray or Dask cluster: give --engine ray or --engine dask too, or "
+            "leave it out"
+        )
+    return local_processes(work.jobs)
+
+
+def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
+    """Check a dataset and list its faults."""
+    sample = Sample(command.share, command.seed) if command.share > 0.0 else None
+    faults = verify(command.dataset, sample)
+    for fault in faults[:TABLE_ROWS]:
+        reporter.warn(fault)
+    say_cut(len(faults), reporter)
+    reporter.say(
+        f"{command.dataset}: {'nothing is wrong' if not faults else f'faults: {len(faults)}'}"
+    )
+    reporter.document({"dataset": str(command.dataset), "faults": faults})
+    return Exit.NEGATIVE if faults else Exit.GOOD
+
+
+def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
+    """Write the grasps of a dataset in force closure for another program."""
+    with reporter.progress("exporting") as steps:
+        done = export(command.dataset, command.out, command.split, steps.update)
+    counts = ", ".join(f"{count} {name}" for name, count in done.rows.items())
+    reporter.say(f"{command.out}: {done.files} files, {counts}")
+    if not done.rows["grasps"]:
+        where = f"the split {command.split} of the dataset" if command.split else "the dataset"
+        reporter.warn(f"{command.dataset}: {where} has no grasps")
+    asked = {"dataset": str(command.dataset), "to": command.to, "split": command.split}
+    reporter.document({**asked, "out": str(command.out), **asdict(done)})
+    return Exit.GOOD
+
+
+def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
+    """Warn of facts that the dataset's README.md will lack, as they cannot be added later."""
+    missing = [name for name in CREDITS if not getattr(config, name)]
+    if missing and not reporter.quiet:
+        given = ", ".join(f"--{name}" for name in missing)
+        reporter.warn(
+            f"{CARD} will lack {', '.join(missing)}, which data catalogues ask for: give {given}, "
+            "or the same settings in a TOML file"
+        )
+
+
+def _asked(command: dataset_flags.Build) -> DatasetConfig:
+    first = Path(command.objects[0]) if command.objects else Path()
+    if first.suffix == ".toml":
+        unsaid = (dataset_flags.Planning(), dataset_flags.Content(), dataset_flags.Learned())
+        if len(command.objects) > 1 or (
+            (command.planning, command.settings, command.learned) != unsaid
+        ):
+            raise InputError(
+                f"{first} holds all settings of the dataset: give no other objects and no flags "
+                "but --out beside it"
+            )
+        config = config_from_toml(first)
+        return replace(config, objects=_listed(config.objects))
+    return DatasetConfig(
+        objects=_listed(command.objects),
+        families=command.planning.family or METHODS,
+        limit=command.planning.limit,
+        cones=command.planning.cones,
+        learning=None if (asked := command.learned.asked()) is None else Learning(**asked),
+        **_settings(command.settings),
+    )
+
+
+def _settings(settings: dataset_flags.Content) -> dict[str, Any]:
+    given = {each.name: getattr(settings, each.name) for each in fields(settings)}
+    lengths = asdict(given.pop("lengths"))
+    return {"frictions": given.pop("friction") or (FRICTION,), **lengths, **given}
+
+
+def is_mesh(path: Path) -> bool:
+    """Tell whether a file of a folder is a mesh: its ending fits, and it is not hidden."""
+    return path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
+
+
+def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
+    found: list[str] = []
+    if not names:
+        raise InputError(
+            "objects: expected at least one mesh file, folder of mesh files, or built-in object"
+        )
+    for name in names:
+        folder = Path(name)
+        if not folder.is_dir():
+            found.append(name)
+            continue
+        meshes = sorted(path for path in folder.iterdir() if is_mesh(path))
+        if not meshes:
+            raise InputError(f"{name}: this folder holds no mesh file ({', '.join(FORMATS)})")
+        found += map(str, meshes)
+    return tuple(found)

@@ -1,0 +1,291 @@
+"""Simulates the scenes of closure tests under schedules, on MuJoCo's own threads.
+
+The text of a scene is always what is compiled, so that the text is the whole experiment. All trials
+of a scene run together; each is bit for bit what a plain loop over `mj_step` gives, whatever the
+number of threads.
+"""
+
+# pyright: basic, reportAttributeAccessIssue=false
+# MuJoCo ships no types for its core; plain arrays and numbers leave this module.
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_core.arrays import Array, Indices, cross, to_digits
+from grasp_core.errors import InputError
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
+from sim_validate.engine.schedules import Schedule
+
+STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")
+"""Parts of a state, which lie in the order of their bits."""
+
+
+def compiled(xml: str) -> mujoco.MjModel:
+    """Compile the text of a scene."""
+    try:
+        with unlogged():
+            return mujoco.MjModel.from_xml_string(xml)
+    except ValueError as error:
+        raise InputError(f"MuJoCo cannot compile the scene: {error}") from error
+
+
+def state_parts(model: mujoco.MjModel) -> dict[str, slice]:
+    """Find where the parts of a state lie that a trial sets or reads, by their names in MuJoCo.
+
+    A batch finds them too, but needs a whole `MjData` for it, which takes longer than most trials.
+    """
+    found, every = {}, int(mujoco.mjtState.mjSTATE_INTEGRATION)
+    for name in STATE:
+        bit = int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}"))
+        end = mujoco.mj_stateSize(model, (2 * bit - 1) & every)
+        found[name] = slice(end - mujoco.mj_stateSize(model, bit), end)
+    return found
+
+
+def step(
+    trials: batch.Batch, errors: dict[int, str], steps: int, going: Indices | None = None
+) -> None:
+    """Step trials (all, or those given by index), except those that an error ended."""
+    running = going
+    if errors:
+        running = np.setdiff1d(np.arange(trials.nsim) if going is None else going, list(errors))
+    try:
+        trials.step(running, nstep=steps)
+    except batch.SimulationError as failure:
+        errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
+
+
+def faults(trials: batch.Batch, trial: int, error: str) -> tuple[str, ...]:
+    """Say what went wrong in a trial, in words."""
+    found = [error] if error else []
+    if not np.isfinite(trials.state[trial]).all():
+        found.append("a number of the simulator's state is not finite")
+    if warnings := int(trials.warning[trial, :, 1].sum()):
+        found.append(f"the simulator raised {warnings} warnings")
+    return tuple(found)
+
+
+def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> tuple[Array, Array]:
+    """Find what each fingertip touches in a state of a scene.
+
+    Gives normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a
+    fingertip that has not exactly one contact.
+    """
+    with unlogged():
+        mujoco.mj_forward(model, data)
+    normals, depths = np.full((len(tips), 3), np.nan), np.full(len(tips), np.nan)
+    for finger, tip in enumerate(tips):
+        own = [contact for contact in data.contact if tip in contact.geom]
+        if len(own) == 1:
+            (contact,) = own
+            normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
+            depths[finger] = -contact.dist
+    return normals, depths
+
+
+Mask: TypeAlias = NDArray[np.bool_]
+FEWEST = 2
+"""Fewest trials that room is made for: one to close the fingers, and most controls have two."""
+CHUNK = 5
+"""Simulation steps per sample; loads change, and motion is recorded, once per sample."""
+CLOCK_SLACK_S = 1e-9
+"""Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
+reset would change it by milliseconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """Whether the simulator did what it was told in a trial."""
+
+    finite: bool = True
+    warnings: int = 0
+    clock_error_s: float = 0.0
+    """Simulated time minus the time stepped [s]; it is not zero after a silent reset."""
+    error: str = ""
+    """The simulator's own message if it gave up."""
+    timed_out: bool = False
+
+    @property
+    def fault(self) -> str:
+        """Why the trial proves nothing about the object, such as divergence; else empty."""
+        if self.error:
+            return self.error
+        if self.timed_out:
+            return "stopped before its end"
+        if not self.finite:
+            return "a number of the state is not finite"
+        if self.warnings:
+            return f"the simulator raised {self.warnings} warnings"
+        if abs(self.clock_error_s) > CLOCK_SLACK_S:
+            return f"the simulator's clock is off by {self.clock_error_s:.3g} s: it was reset"
+        return ""
+
+    def after(self, earlier: "Health") -> "Health":
+        """Add the faults of an earlier trial whose end state this one started from."""
+        return Health(
+            finite=earlier.finite and self.finite,
+            warnings=earlier.warnings + self.warnings,
+            clock_error_s=earlier.clock_error_s + self.clock_error_s,
+            error=earlier.error or self.error,
+            timed_out=earlier.timed_out or self.timed_out,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Where object and fingertips were in each of the n samples of a trial, in the world frame."""
+
+    times_s: Array
+    joints: Array
+    """Joint positions, (n, 7 + 3k), or (n, 7) for rigid fingertips [m]: position (3) and quaternion
+    (4) of the object's frame, then the slides (3) of each fingertip along its contact's axes."""
+    state: Array
+    """Complete state of the simulator at the end, from which a further trial can start."""
+    health: Health
+    skipped: int = 0
+    """How many samples of its schedule were left out before friction was lowered, because the
+    object had settled."""
+
+    def after(self, earlier: "Motion") -> "Motion":
+        """Add the faults of the earlier motion whose end state this motion started from."""
+        return replace(self, health=self.health.after(earlier.health))
+
+
+class Ends(Protocol):
+    """What tells which trials may end before their schedules do: `EarlyEnds`."""
+
+    earliest: int
+    """The first sample after which it wants to look."""
+
+    def look(
+        self, places: Indices, samples: Indices, joints: Array, speeds: Array
+    ) -> tuple[Mask, Mask]:
+        """Tell which trials need not settle any longer, and which are answered, (n,) each."""
+        ...
+
+
+class Bench:
+    """A compiled scene on which many trials run at once."""
+
+    def __init__(self, scene: Scene, *, threads: int = 1, timeout_s: float = math.inf) -> None:
+        self.scene, self.threads = scene, threads
+        self.deadline = time.monotonic() + timeout_s
+        self.model = compiled(scene.xml)
+        self.sample_s = CHUNK * float(self.model.opt.timestep)
+        self.body = self.model.body("object").id
+        self.parts = state_parts(self.model)
+        touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+        # what lies between the first and the last may get their friction, too: it touches nothing
+        self.touching = slice(touching[0], touching[-1] + 1)
+        self.batch: batch.Batch | None = None
+
+    def _trials(self, count: int) -> batch.Batch:
+        """Return at least `count` trials at rest at their contacts; they are made only once."""
+        if self.batch is None or self.batch.nsim < count:
+            self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
+        self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        return self.batch
+
+    def run(
+        self, schedules: Sequence[Schedule], start: Array | None = None, ends: Ends | None = None
+    ) -> tuple[Motion, ...]:
+        """Simulate trials of equal length, all from the same state."""
+        trials = self._trials(len(schedules))
+        if start is not None:
+            trials.state[: len(schedules)] = start
+        clock = trials.state[:, self.parts["time"]][:, 0]
+        begun = float(clock[0])
+        every, counts, skipped, stopped, errors = self._step_through(trials, schedules, ends)
+        warned = trials.warning[:, :, 1].sum(axis=1)
+        times = self.model.opt.timestep * (CHUNK * np.arange(1, every.shape[1] + 1))
+        found: list[Motion] = []
+        for trial, count in enumerate(counts):
+            joints, state = every[trial, :count], trials.state[trial].copy()
+            expected = begun + CHUNK * int(count) * self.model.opt.timestep
+            health = Health(
+                bool(np.isfinite(state).all() and np.isfinite(joints).all()), int(warned[trial]),
+                float(clock[trial] - expected), errors.get(trial, ""), bool(stopped[trial]),
+            )  # fmt: skip
+            found.append(Motion(times[:count], joints, state, health, int(skipped[trial])))
+        return tuple(found)
+
+    def _step_through(
+        self, trials: batch.Batch, schedules: Sequence[Schedule], ends: Ends | None
+    ) -> tuple[Array, Indices, Indices, Mask, dict[int, str]]:
+        """Step m trials to their ends.
+
+        Gives joint positions, (m, n, q), of which each trial has filled in its own number of
+        samples; these numbers, those of samples left out, and whether time ran out, (m,) each; and
+        the simulator's own messages by trial.
+        """
+        wrenches, controls, frictions = self._applied(schedules)
+        count, length = frictions.shape
+        watched = np.array([schedule.watched for schedule in schedules])
+        applied, servos, joints, speeds = (
+            trials.state[:, self.parts[name]] for name in ("xfrc_applied", "ctrl", "qpos", "qvel")
+        )
+        applied = applied.reshape(len(applied), -1, 6)[:, self.body]
+        friction = trials.expand("geom_friction")[:, self.touching, 0]
+        every = np.empty((count, length, joints.shape[1]))
+        counts, skipped, sample = (np.zeros(count, dtype=np.intp) for _ in range(3))
+        going, stopped, errors = np.arange(count), np.zeros(count, dtype=bool), dict[int, str]()
+        # before any may end, all trials are at the same sample: slices are quicker than indices
+        alike = length if ends is None else ends.earliest
+        with unlogged():
+            while going.size:
+                if time.monotonic() > self.deadline:
+                    stopped[going] = True
+                    break
+                together = sample[0] < alike
+                rows = slice(count) if together else going
+                now = int(sample[0]) if together else sample[going]
+                done = now if together else counts[going]
+                applied[rows] = wrenches[rows, now]
+                servos[rows] = controls[rows, now]
+                friction[rows] = frictions[rows, now, None]
+                step(trials, errors, CHUNK, going)
+                every[rows, done] = joints[rows]
+                counts[rows] += 1
+                if ends is not None and not together:
+                    settled, answered = ends.look(
+                        going, sample[going], joints[going], speeds[going]
+                    )
+                    early = going[settled]
+                    if early.size:
+                        skipped[early] += watched[early] - 1 - sample[early]
+                        sample[early] = watched[early] - 1
+                    going = going[~answered]
+                sample[rows] += 1
+                if not together or now == length - 1:
+                    going = going[sample[going] < length]
+        return every, counts, skipped, stopped, errors
+
+    def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
+        """Return what is applied in each of n samples of m trials, as the simulator takes it.
+
+        Gives external wrenches, (m, n, 6), commands of the servos, (m, n, q), frictions, (m, n).
+        """
+        layout = self.scene.layout
+        wrenches = np.array([schedule.wrenches for schedule in schedules])
+        wrenches[..., 3:] -= cross(layout.center, wrenches[..., :3])
+        # rounded like the scene's numbers (see `layout.arrange`)
+        for trial in range(len(schedules)):
+            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:]):
+                part[...] = to_digits(part)
+        controls = np.array([layout.commands(schedule.forces) for schedule in schedules])
+        frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
+        return wrenches, controls, frictions
+
+
+def first_touch(scene: Scene) -> tuple[Array, Array]:
+    """Find what each fingertip touches before anything moves, as `touched` gives it."""
+    model = compiled(scene.xml)
+    tips = [model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))]
+    return touched(model, mujoco.MjData(model), tips)

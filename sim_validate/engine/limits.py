@@ -1,0 +1,231 @@
+"""Finds by simulation the largest multiple of a wrench and the least friction that a grasp bears.
+
+Largest wrenches are found by a ramp or by bisection. Both load the object with a share of the
+predicted limit and the forces planned for it, which lie that share of the way from the gentle
+squeeze to the forces at the limit. They balance the load, because both ends do. Below the limit
+they are inside the cones and the limits on the push, again because both ends are. Above it, up to
+twice the limit, the forces still balance on paper, but friction gives way, or a finger cannot push
+harder.
+
+A ramp passes the limit slowly. The load left over grows in proportion to the time since, so the
+displacement grows with its third power and the ramp ends late. A displacement eight times as large
+is reached when twice as much time has passed since the limit. Extrapolating the two times back
+gives a bound from below.
+
+For the critical friction, fingers squeeze with forces that balance at the predicted one, mu*, and
+need it, and friction falls until the object slips. Above mu* these forces are inside their friction
+cones. Below mu* there are no balanced forces with which all of these fingers push, so the object
+must move. Where two fingers alone need mu*, the others must push as well: otherwise the object
+turns about the line between the two far above mu*. Therefore the forces are planned for a friction
+just above mu*, with the smallest push as large as possible.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.declared import Declared
+from grasp_core.errors import NoForcesError, SolverError, UndecidedError
+from grasp_core.forces.contact_forces import even_forces
+from grasp_core.kinds import OrInfinity
+from scenes.mujoco.layout import SQUEEZE
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.schedules import FrictionProtocol, Load
+from sim_validate.engine.setup import Setup
+from sim_validate.engine.traces import Trace, holds
+
+LATER = 8.0
+"""Displacement at the second reading of a ramp, relative to the first; 8 = 2 cubed."""
+OVERLOAD = 2.0
+"""Largest share of the limit for which forces are planned; for larger loads the forces stay the
+same."""
+HELD, SLID, UNKNOWN = 1, 0, -1
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedLimit(Declared):
+    """Two shares of a wrench's predicted limit: the object holds the first and not the second."""
+
+    lower: float
+    upper: float
+    share: float
+    """Best estimate of where the object lets go: a ramp's threshold, or a bisection's middle."""
+
+
+def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
+    """Find by slowly rising loads the shares of the limits at which the object lets go."""
+    threshold = rig.setup.limit.ramp_threshold * rig.bench.scene.layout.grasp_size_m
+
+    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+        traces, shares = rig.ramp(chosen, (1.0 - span, 1.0 + span))
+        return [_onset(trace, shares, threshold) for trace in traces]
+
+    return _in_some_span(rig, limits, search)
+
+
+def _in_some_span(
+    rig: Rig,
+    limits: Sequence[Load],
+    search: Callable[[Sequence[Load], float], Sequence[SimulatedLimit | None]],
+) -> tuple[SimulatedLimit | None, ...]:
+    """Search near each predicted limit first, then in wider intervals; None if nothing is found."""
+    found: dict[int, SimulatedLimit] = {}
+    for span in rig.setup.limit.spans:
+        rest = [place for place in range(len(limits)) if place not in found]
+        if not rest:
+            break
+        answers = search([limits[place] for place in rest], span)
+        found |= {place: at for place, at in zip(rest, answers, strict=True) if at is not None}
+    return tuple(found.get(place) for place in range(len(limits)))
+
+
+def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | None:
+    """Find where a ramp lets go; None if it does not let go, or does at its very start."""
+    moved = trace.displacements_m
+    passed = np.flatnonzero(moved >= threshold)
+    if not passed.size or passed[0] == 0 or trace.health.fault:
+        return None
+    first = int(passed[0])
+    before, after = shares[first - 1], shares[first]
+    # Interpolate the cube root of the displacement, which is linear in time.
+    roots = np.cbrt([moved[first - 1], threshold, moved[first]])
+    at = before + (after - before) * (roots[1] - roots[0]) / (roots[2] - roots[0])
+    later = np.flatnonzero(moved >= LATER * threshold)
+    # Twice the time since the limit has passed at eight times the displacement, so the limit lies
+    # as far before the first reading as the second lies after it.
+    lower = 2.0 * before - shares[later[0]] if later.size else shares[0]
+    return SimulatedLimit(lower=float(lower), upper=float(after), share=float(at))
+
+
+def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
+    """Find the shares of the limits at which the object lets go, by bisection."""
+
+    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+        held, let_go = np.full(len(chosen), 1.0 - span), np.full(len(chosen), 1.0 + span)
+        inside = (_ends(rig, chosen, held) == HELD) & (_ends(rig, chosen, let_go) == SLID)
+        for _ in range(rig.setup.limit.rounds):
+            open_places = np.flatnonzero(inside)
+            if not open_places.size:
+                break
+            middle = 0.5 * (held + let_go)[open_places]
+            ends = _ends(rig, [chosen[int(place)] for place in open_places], middle)
+            held[open_places[ends == HELD]] = middle[ends == HELD]
+            let_go[open_places[ends == SLID]] = middle[ends == SLID]
+            inside[open_places[ends == UNKNOWN]] = False
+        return [
+            SimulatedLimit(float(low), float(high), float(0.5 * (low + high))) if found else None
+            for low, high, found in zip(held, let_go, inside, strict=True)
+        ]
+
+    return _in_some_span(rig, limits, search)
+
+
+def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
+    """Tell whether shares of loads hold: `HELD`, `SLID`, or `UNKNOWN` if a trial is not valid."""
+    loads = [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
+    layout, protocol = rig.bench.scene.layout, rig.setup.hold
+    ends = [holds(trace, layout, protocol) for trace in rig.hold(loads)]
+    return np.array([UNKNOWN if end is None else int(end) for end in ends])
+
+
+def part(idle: Load, limit: Load, share: float) -> Load:
+    """Return a share of a wrench, with forces between those without load and those at the limit."""
+    planned = min(float(share), OVERLOAD)
+    wrench = idle.wrench + share * (limit.wrench - idle.wrench)
+    return Load(wrench, (1.0 - planned) * idle.forces + planned * limit.forces)
+
+
+ABOVE = (5e-4, 1e-3, 2e-3, 3e-3)
+"""Excess of the friction that forces are planned for, relative to the critical friction. The values
+are tried in turn. The simulated critical friction is too high by the same excess."""
+LEAST_PUSH = 1e-3
+"""Least normal force that counts as pushing, relative to the largest one. With less than half of
+it, boxes were seen to turn up to 9 % above their critical friction."""
+TILT = 2e-3
+"""Largest displacement at which the object still counts as staying, relative to the grasp size
+times the critical friction. A tilt of the object acts like that much additional friction; servos
+hide a force imbalance of five times as much, in largest normal forces."""
+
+
+@dataclass(frozen=True, slots=True)
+class CriticalFriction(Declared):
+    """The critical friction that the analysis predicts, and the one that simulation finds."""
+
+    predicted: OrInfinity
+    """The critical friction by analysis."""
+    simulated: float | None = None
+    """The middle of the bracket. It is zero if the object stays even at `least_friction`, and None
+    if nothing was measured or the object does not begin to slip near the prediction."""
+    bracket: tuple[float, float] | None = None
+    """The object slipped at the first friction and stayed at the second."""
+
+
+def released_friction(
+    bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup, *,
+    whole: bool = False,
+) -> CriticalFriction:  # fmt: skip
+    """Measure the critical friction of a grasp whose scene is compiled with any friction."""
+    protocol = setup.friction
+    high = protocol.settling_friction * max(predicted, protocol.least_friction)
+    # The excess is relative, so a prediction of zero needs a friction to be relative to.
+    least = max(predicted, 0.5 * protocol.least_friction)
+    forces = forces_just_above(positions, normals, least, setup.torsion_m)
+    forces *= SQUEEZE * setup.fingers.max_normal_force_n
+    rig = replace(squeezed(bench, setup, forces, predicted, high).at_rest(high), whole=whole)
+
+    share = min(protocol.threshold, TILT * max(predicted, protocol.least_friction))
+
+    def stays(frictions: list[float]) -> list[bool | None]:
+        threshold = share * bench.scene.layout.grasp_size_m
+        return [trace.stayed(threshold) for trace in rig.release(high, frictions, threshold)]
+
+    if predicted < protocol.least_friction:
+        (held,) = stays([protocol.least_friction])
+        bracket = (0.0, protocol.least_friction) if held else None
+        return CriticalFriction(predicted, 0.0 if held else None, bracket)
+    bracket = bisected(stays, predicted, protocol)
+    middle = None if bracket is None else 0.5 * (bracket[0] + bracket[1])
+    return CriticalFriction(predicted, middle, bracket)
+
+
+def bisected(
+    stays: Callable[[list[float]], list[bool | None]], predicted: float, protocol: FrictionProtocol
+) -> tuple[float, float] | None:
+    """Bracket the friction at which the object begins to stay; None if not near the prediction."""
+    for span in protocol.spans:
+        lower, upper = (1.0 - span) * predicted, (1.0 + span) * predicted
+        if stays([lower, upper]) == [False, True]:
+            for _ in range(protocol.rounds):
+                middle = 0.5 * (lower + upper)
+                (stayed,) = stays([middle])
+                if stayed is None:
+                    return None
+                lower, upper = (lower, middle) if stayed else (middle, upper)
+            return lower, upper
+    return None
+
+
+def forces_just_above(
+    positions: Array, normals: Array, critical: float, torsion_m: float = 0.0
+) -> Array:
+    """Find balanced forces that need almost the critical friction, (k, 3), largest push 1 N.
+
+    Every finger pushes enough with them, or they are for the largest friction in `ABOVE`.
+    """
+    forces = None
+    for above in ABOVE:
+        try:
+            forces = even_forces(positions, normals, (1.0 + above) * critical, torsion_m=torsion_m)
+        except (NoForcesError, SolverError):
+            continue
+        if np.einsum("ki,ki->k", forces, normals).min() >= LEAST_PUSH:
+            break
+    if forces is None:
+        raise UndecidedError(
+            "no balanced forces were found in which every finger pushes, at frictions just above "
+            f"the critical friction {critical:.6g}"
+        )
+    return forces

@@ -1,0 +1,181 @@
+"""Settings that users may choose: how trials are simulated, and which trials a grasp undergoes."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal, TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Wrench, frozen_copy, to_digits
+from grasp_core.checked import LARGEST, MOST_RANDOM_WRENCHES, MOST_TRIALS, SMALLEST
+from grasp_core.declared import Declared
+from grasp_core.errors import InputError
+from grasp_core.files.json_text import shown
+from grasp_core.files.records import UNRECORDED
+from grasp_core.kinds import Range, Seed
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.reach import Finger
+from grasp_core.settings import CHOSEN, Settings
+from grasp_core.values import Contact, Grasp
+from scenes.mujoco.closure_scene import Scene, Surface, build_scene
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.physics import PhysicsSettings
+from sim_validate.engine.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
+
+AXIS_NAMES = tuple(
+    f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
+)
+NAME = re.compile(r"[\w+\- ]{1,100}")
+WEAKEST = "weakest"
+RANDOM = "random_{}"
+MOST_THREADS = 1024
+HARD_FINGER = 3
+"""MuJoCo's `condim` of a contact whose force has a normal and two tangential parts."""
+Share = Annotated[float, Range(least=0.0, most=1.0)]
+Tilt = Annotated[float, Range(least=0.0, most=45.0)]
+LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Setup(Settings):
+    """How trials are simulated: physics, fingertips, surface, durations and thresholds.
+
+    Raises:
+        InputError: A part has the wrong type, a number is out of its range, or the physics is not
+            the physics of the predictions.
+    """
+
+    fingers: FingerSettings = field(default_factory=FingerSettings)
+    physics: PhysicsSettings = field(default_factory=PhysicsSettings)
+    surface: Annotated[Surface, CHOSEN] = "pads"
+    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
+    of a convex object."""
+    hold: HoldProtocol = field(default_factory=HoldProtocol)
+    limit: LimitProtocol = field(default_factory=LimitProtocol)
+    friction: FrictionProtocol = field(default_factory=FrictionProtocol)
+    threads: Annotated[int, Range(least=1, most=MOST_THREADS), CHOSEN, UNRECORDED] = field(
+        default=1, compare=False
+    )
+    """Number of threads that the simulator uses; results do not depend on it."""
+    timeout_s: Annotated[float, Range(above=0.0, most=math.inf), CHOSEN, UNRECORDED] = field(
+        default=math.inf, compare=False
+    )
+    """Time after which the trials of one contact set are stopped [s]."""
+
+    def _check_together(self) -> None:
+        physics = self.physics
+        # forces that the analysis does not model
+        if any(physics.gravity):
+            raise InputError(
+                f"physics.gravity must be zero, got {physics.gravity}: masses are scaled, so it "
+                "would not be the object's weight; give the weight as a wrench (--weight-n, or "
+                "Agenda.wrenches)"
+            )
+        if physics.condim != HARD_FINGER:
+            raise InputError(
+                f"physics.condim must be {HARD_FINGER}, got {physics.condim}: predictions are for "
+                "hard fingers, whose contacts have friction and no torsion; for soft ones give "
+                "physics.torsion_m"
+            )
+
+    @property
+    def torsion_m(self) -> float:
+        """Return the torsional coefficient of every contact [m]; zero for hard fingertips."""
+        return self.physics.torsion_m
+
+    def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
+        """Build the MuJoCo scene of a grasp with these settings."""
+        return build_scene(
+            body, grasp, friction, fingers=self.fingers, physics=self.physics, surface=self.surface
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class NamedWrench(Declared):
+    """An external wrench with a name that the user gives it."""
+
+    name: str
+    wrench: Wrench
+    """Force, then torque about the centre of mass, in the object's frame, (6,) [N, N m]."""
+
+    def _check_together(self) -> None:
+        object.__setattr__(self, "wrench", frozen_copy(to_digits(self.wrench)))
+        size = float(np.abs(self.wrench).max())
+        if not SMALLEST <= size <= LARGEST:
+            raise InputError(
+                f"wrench {shown(self.name)}: its largest component must be from {SMALLEST:g} to "
+                f"{LARGEST:g} (N or N m), got {size:g}"
+            )
+        if not NAME.fullmatch(self.name):
+            raise InputError(
+                f"a wrench's name has up to 100 letters, digits, '_', '+', '-' and spaces; "
+                f"got {shown(self.name)}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Noise(Settings):
+    """How uncertain the pose, surface, friction and mass are, as standard deviations.
+
+    Raises:
+        InputError: A number is negative or out of its range.
+    """
+
+    shift: Share = 0.01
+    """Deviation of the object's position along each axis, in object radii."""
+    turn_deg: Tilt = 1.0
+    """Deviation of the object's orientation about each axis through its centre of mass [deg]."""
+    normal_deg: Tilt = 1.0
+    """Deviation of the surface normal at each contact, about two axes in the surface [deg]."""
+    friction: Share = 0.05
+    """Deviation of the friction coefficient, relative to the coefficient."""
+    mass: Share = 0.05
+    """Deviation of the mass and of every load, relative to the planned values."""
+
+
+@dataclass(frozen=True, slots=True)
+class Agenda(Settings):
+    """Which trials a grasp goes through.
+
+    The twelve axis wrenches and the weakest one are always held, at a share of what the analysis
+    says is resisted. Random wrenches are held at the same share. A user's wrenches are held as they
+    are.
+    """
+
+    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
+    wrenches: tuple[NamedWrench, ...] = ()
+    critical_friction: bool = True
+    """Whether to find the critical friction in simulation."""
+    limits: LimitSearch = "none"
+    """How the largest multiple of each wrench is found in simulation, if at all."""
+    controls: bool = True
+    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] = 0
+    """How many times all trials that hold a wrench are repeated with noise."""
+    noise: Noise = field(default_factory=Noise)
+    keep_traces: Annotated[bool, UNRECORDED] = field(default=False, compare=False)
+    seed: Seed = 0
+    """Seed of the random wrenches, of noise, and of how contacts are moved to make a negative
+    control (contacts that must fail)."""
+
+    def _check_together(self) -> None:
+        taken = drawn_names(self.random_wrenches)
+        for each in self.wrenches:
+            if each.name in taken:
+                raise InputError(
+                    f"two wrenches are named {each.name!r}: give one of them another name"
+                )
+            taken.add(each.name)
+
+
+def drawn_names(random_wrenches: int) -> set[str]:
+    """Return the names of the wrenches of a grasp that are not a user's."""
+    return {*AXIS_NAMES, WEAKEST, *(RANDOM.format(place) for place in range(random_wrenches))}
+
+
+def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:
+    """Give fingertips the radius that grasps are planned for, unless they have their own."""
+    if planned is None or fingers.radius_m is not None:
+        return fingers
+    return replace(fingers, radius_m=planned.radius_m)

@@ -1,0 +1,539 @@
+"""Reads and writes DexGraspBench's records: a hand's pregrasp, grasp and squeeze at an object.
+
+A record is a dictionary in a `.npy` file. A configuration of a hand (`..._qpos`) is the pose of the
+hand's root, position and quaternion (w, x, y, z), then the joints in the order of the hand's file;
+`obj_pose` is that of the object, `obj_scale` a factor on its mesh, and `obj_path` a folder that the
+tool MeshProcess has filled. The root is the world of the hand's file: the palm has a pose in it.
+The palm of any hand that is not built in is taken as its root.
+
+With the joint angles q of the grasp, the levers L of `Motors`, contact forces f and the servos'
+stiffness k, the servos squeeze when they are told
+
+    q + L f / k                                                                          (1)
+
+as Dexonomy makes its squeezes.
+
+Sources: github.com/JYChen18/DexGraspBench at 1e7a5a6fce27cc92911080cbdc5ce9da56fddbf0, README.md,
+src/task/eval_func/base.py, src/util/hand_util.py, and its assets/hand, with MuJoCo Menagerie's
+`leap_hand`, which its file includes, and meshes of Menagerie's `wonik_allegro`, of which MuJoCo
+3.3.2 makes Allegro's links, with the density 800 of the file.
+"""
+
+import io
+import math
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+
+from grasp_core.arrays import Array, frozen, real_array, to_digits
+from grasp_core.checked import coefficient, instance, number, path_of, positive, text
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import ByValue, summary
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import shown, text_of
+from grasp_core.files.text_files import read_bytes, write_parts, write_text
+from grasp_core.hands.collisions import tip_gaps
+from grasp_core.hands.hand import PALM, Hand
+from grasp_core.hands.hand_motors import chains, hand_motors
+from grasp_core.hands.kinematics import places, tip_jacobians
+from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
+from grasp_core.objects.on_faces import check_body, face_under
+from grasp_core.objects.polyhedron import Polyhedron, is_convex
+from grasp_core.values import Contact
+from scenes.mujoco.held import rotations
+from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.tested import Postures
+
+FREE = 7
+"""Numbers of a pose: position and quaternion."""
+UNIT = 1e-3
+"""How far the length of a quaternion may be from 1: records have numbers of single precision."""
+WANTED = ("obj_path", "obj_scale", "obj_pose", "pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
+"""Fields that a record must have, in the order of those of `DexRecord`."""
+MOST_BYTES = 16 * 2**20
+"""Largest size of a file: a record has some thousand bytes."""
+DENSITY = 1000.0
+"""Density with which the file of an object states its mass [kg/m^3]."""
+TOUCH_M = 0.002
+"""Gap or overlap up to which a fingertip counts as touching [m]: DexGraspBench's own."""
+PUSH_N = 5.0
+"""Largest normal force of the squeeze unless stated [N]."""
+STRONG_N_M = 1e6
+"""Torque limit of a hand whose levers are asked for: no limit matters to them."""
+GAP_M = 0.005
+"""How far fingertips have opened in a record's pregrasp unless stated [m]."""
+SHARES = 65
+"""Number of postures looked at on the way from the grasp to the pregrasp."""
+FEWEST = 3
+"""Fewest fingertips that can hold an object without torsion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class DexRecord(ByValue):
+    """A grasp of a hand as DexGraspBench records it."""
+
+    object_path: str
+    """Folder of the object, as the record names it."""
+    object_scale: float
+    """Factor on the lengths of the object's mesh."""
+    object_pose: Array
+    """Position and quaternion (w, x, y, z) of the object, (7,)."""
+    pregrasp: Array
+    """Pose of the hand's root, then joint angles, (7 + j,) [m, rad]."""
+    grasp: Array
+    """Pose of the root and joint angles where the hand touches, (7 + j,) [m, rad]."""
+    squeeze: Array
+    """Pose of the root and joint angles that servos are told to squeeze with, (7 + j,) [m, rad]."""
+
+    def __post_init__(self) -> None:
+        text(self.object_path, "object_path")
+        positive(self.object_scale, "object_scale")
+        object.__setattr__(self, "object_pose", _pose(self.object_pose, "object_pose", FREE))
+        size = len(frozen(self.grasp, (None,), "grasp"))
+        if size <= FREE:
+            raise InputError(
+                f"grasp must be a pose of {FREE} numbers and at least one joint, got {size} numbers"
+            )
+        for name in ("pregrasp", "grasp", "squeeze"):
+            object.__setattr__(self, name, _pose(getattr(self, name), name, size))
+
+    def __repr__(self) -> str:
+        return summary("DexRecord", self.object_path, joints=len(self.grasp) - FREE)
+
+
+def _pose(given: Any, name: str, size: int) -> Array:
+    found = frozen(given, (size,), name)
+    length = float(np.linalg.norm(found[3:FREE]))
+    if abs(length - 1.0) > UNIT:
+        raise InputError(
+            f"{name} must have a quaternion (w, x, y, z) of length 1 in numbers 3 to 6, got "
+            f"{length:.6g}"
+        )
+    return found
+
+
+def load_dex_record(path: str | Path) -> DexRecord:
+    """Read a record of DexGraspBench; nothing in the file is executed.
+
+    Args:
+        path: A `.npy` file with a dictionary.
+
+    Raises:
+        InputError: The file cannot be read, or lacks a field.
+    """
+    place = path_of(path, "path")
+    data = read_bytes(place, MOST_BYTES)
+    with about(place):
+        return _record(_unpickled(data))
+
+
+class _Numbers:
+    """An array in a pickle: its values come later, as its state."""
+
+    def __init__(self, *_: Any) -> None:
+        self.values: Array | list[Any] | None = None
+
+    def __setstate__(self, state: Any) -> None:
+        _, shape, kind, by_columns, data = state
+        own = kind.plain.kind == "O"
+        self.values = list(data) if own else _filled(data, kind, shape, "F" if by_columns else "C")
+
+
+class _Kind:
+    """The type of an array's entries in a pickle."""
+
+    def __init__(self, code: Any, *_: Any) -> None:
+        self.plain = np.dtype(str(code))
+        if self.plain.kind not in "fiubO":
+            raise InputError(f"an array has the type {shown(str(code))}, expected numbers")
+
+    def __setstate__(self, state: Any) -> None:
+        self.plain = self.plain.newbyteorder(state[1])
+
+
+def _filled(data: Any, kind: Any, shape: tuple[int, ...], order: Any) -> Array:
+    if kind.plain.kind == "O" or math.prod(shape) * kind.plain.itemsize != len(data):
+        raise InputError(f"an array has {len(data)} bytes, which do not fit the shape {shape}")
+    return np.frombuffer(data, kind.plain).reshape(shape, order=order)
+
+
+def _scalar(kind: Any, data: Any) -> Array:
+    return _filled(data, kind, (), "C")
+
+
+ALLOWED: dict[str, Any] = {"numpy.ndarray": _Numbers, "numpy.dtype": _Kind}
+for core in ("numpy.core", "numpy._core"):
+    ALLOWED[f"{core}.multiarray._reconstruct"] = _Numbers
+    ALLOWED[f"{core}.multiarray.scalar"] = _scalar
+    ALLOWED[f"{core}.numeric._frombuffer"] = _filled
+"""What makes plain values in place of the functions that NumPy 1 and 2 name in pickles. NumPy's own
+would trust the state that a file gives them."""
+
+
+class _Unpickler(pickle.Unpickler):
+    def find_class(self, module: str, name: str, /) -> Any:
+        make = ALLOWED.get(f"{module}.{name}")
+        if make is None:
+            raise InputError(
+                f"the file names {shown(f'{module}.{name}')}, which is not looked up; save plain "
+                "dictionaries of arrays, numbers and text"
+            )
+
+        def made(*given: Any) -> Any:  # a new one: files can set attributes of what they get
+            return make(*given)
+
+        return made
+
+
+def _unpickled(data: bytes) -> Any:
+    """Return the value that `numpy.save` has pickled, or a list of several."""
+    stream = io.BytesIO(data)
+    try:
+        read = {
+            (1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0
+        }[np.lib.format.read_magic(stream)]  # fmt: skip
+        shape, _, dtype = read(stream)
+        if dtype.kind != "O":
+            raise InputError(f"expected a dictionary, got an array of numbers of shape {shape}")
+        values = _Unpickler(stream).load().values
+        return values[0] if shape == () else values
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file can make each step raise anything
+        raise InputError(
+            "expected a .npy file in which numpy.save has pickled a plain dictionary "
+            f"({shown(str(error))})"
+        ) from error
+
+
+def _record(found: Any) -> DexRecord:
+    """Make a record of the fields of a dictionary; those that are not known are left alone."""
+    if not isinstance(found, dict):
+        raise InputError(
+            f"expected the dictionary of one grasp, got a {type(found).__name__}. Save each grasp "
+            f"as a file of its own with the fields {', '.join(WANTED)} (docs/protocols.md says "
+            "what they are)"
+        )
+    fields = cast("Mapping[str, Any]", found)
+    for name in WANTED:
+        if name not in fields:
+            raise InputError(
+                f"the dictionary has no {name}; records have {', '.join(WANTED)}. Records of arms "
+                "(approach_qpos alone), and batches, are not read"
+            )
+    scale = _numbers(fields, "obj_scale")
+    if scale.size != 1:
+        raise InputError(f"obj_scale: expected one number, got {scale.size}")
+    arrays = (_numbers(fields, name) for name in WANTED[2:])
+    return DexRecord(fields["obj_path"], float(scale.item()), *arrays)
+
+
+def _numbers(fields: Mapping[str, Any], name: str) -> Array:
+    """Return a field's numbers: an array, one number, or a list of numbers."""
+    found: Any = fields[name]
+    found = found.values if isinstance(found, _Numbers) else found
+    every = cast("Sequence[Any]", found if isinstance(found, list | tuple) else [found])
+    if not (isinstance(found, np.ndarray) or all(isinstance(each, int | float) for each in every)):
+        raise InputError(f"{name}: expected an array of numbers, got something else")
+    return real_array(cast("Any", found), name)
+
+
+def write_dex_record(record: DexRecord, path: str | Path) -> Path:
+    """Write a record so that DexGraspBench reads it; return its path.
+
+    Numbers have double precision. The format is a pickle in a `.npy` file, which `numpy.load`
+    reads only where it is told to trust it.
+
+    Raises:
+        InputError: `record` is no record, or `path` no path.
+    """
+    instance(record, DexRecord, "record")
+    arrays = (record.object_pose, record.pregrasp, record.grasp, record.squeeze)
+    values = (record.object_path, record.object_scale, *map(np.array, arrays))
+    fields = np.array(dict(zip(WANTED, values, strict=True)), dtype=object)
+    held = io.BytesIO()
+    np.save(held, fields, allow_pickle=True)
+    return write_parts(path_of(path, "path"), [held.getvalue()])
+
+
+Row: TypeAlias = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandFile:
+    """What a file of a hand says about its root, servos and masses."""
+
+    servo_n_m_per_rad: float = 5.0
+    damping_n_m_s_per_rad: float = 0.1
+    root: Array = field(default_factory=lambda: np.eye(4))
+    """Pose of the palm in the world of the file, (4, 4)."""
+    inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
+    """MJCF's inertials of palm and links by name; empty where the file has none."""
+
+
+LINKS = ("base", "proximal", "medial", "distal")
+ALLEGRO: tuple[Row, ...] = (
+    (351.4, -8.986, -3.957, -40.27, 447.7, 261.1, 283.1, 0.023, -1.612, -26.37),
+    (7.232, -0.778, -0.01, 8.282, 0.748, 0.355, 0.707, 0.0, 0.032, -0.001),
+    (27.28, 0.0, -0.091, 27.0, 11.86, 11.28, 2.266, 0.0, 0.0, 0.0),
+    (18.46, -0.193, -0.078, 22.59, 4.285, 3.636, 1.676, 0.0, -0.073, -0.001),
+    (14.36, -0.273, -0.002, 15.9, 2.418, 2.015, 1.193, 0.0, -0.061, 0.0),
+    (38.26, -17.92, 8.024, 12.31, 9.166, 10.64, 7.217, -0.018, 0.007, 0.619),
+    (7.219, -0.782, -0.01, 8.105, 0.746, 0.354, 0.705, 0.0, 0.032, -0.001),
+    (22.5, -0.164, 0.017, 21.11, 7.526, 6.583, 2.143, 0.0, 0.097, 0.0),
+    (23.18, 0.0, 0.003, 21.32, 7.132, 6.808, 1.806, 0.0, 0.0, 0.005),
+)
+"""Palm, links of a finger, links of the thumb: mass [g], centre [mm] and inertia about it [kg mm^2]
+(xx, yy, zz, xy, xz, yz), in the link's frame."""
+LEAP_THUMB = ("mp", "base", "proximal", "distal")
+LEAP: tuple[Row, ...] = (
+    (237.0, -49.54, -42.91, -10.23, 293.5, 192.2, 407.2, -35.62, -0.439, -6.247),
+    (44.0, -22.52, 33.88, 16.36, 13.16, 10.3, 17.4, 4.266, 0.507, -0.162),
+    (32.0, 7.5, -0.2, -11.0, 3.093, 4.373, 4.885, 0.0, 0.0, 0.0),
+    (37.0, 5.421, -29.15, 15.0, 7.676, 5.999, 8.16, 1.174, 0.0, 0.0),
+    (16.0, -0.879, -27.02, 14.59, 3.711, 1.659, 3.024, -0.125, -0.001, -0.015),
+    (32.0, 7.5, -0.2, -11.0, 3.093, 4.373, 4.885, 0.0, 0.0, 0.0),
+    (3.0, 0.0, 0.0, -7.081, 0.619, 0.215, 0.535, 0.0, 0.0, 0.0),
+    (38.0, -2.059, 15.91, -13.73, 9.814, 4.365, 9.381, 0.124, 0.163, 0.03),
+    (49.0, 0.962, -24.2, -14.42, 20.48, 4.778, 20.72, -1.009, -0.206, 0.097),
+)
+"""Palm, links of a finger, links of LEAP's thumb, in the columns of `ALLEGRO`."""
+
+
+def _inertials(
+    rows: tuple[Row, ...], fingers: tuple[str, ...], thumb: tuple[str, ...]
+) -> dict[str, dict[str, object]]:
+    """Return the inertials of a table by the names of links."""
+    named = [f"{name}_{link}" for name in fingers for link in LINKS]
+    names = [PALM, *named, *(f"thumb_{link}" for link in thumb)]
+    every = [rows[0], *rows[1:5] * len(fingers), *rows[5:]]
+    return {
+        name: {"pos": 1e-3 * np.array(row[1:4]), "mass": 1e-3 * row[0],
+               "fullinertia": 1e-6 * np.array(row[4:])}
+        for name, row in zip(names, every, strict=True)
+    }  # fmt: skip
+
+
+HAND_FILES = {
+    "allegro": HandFile(
+        5.0, 0.1,
+        np.array([[0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]], np.float64),
+        _inertials(ALLEGRO, ("first", "middle", "ring"), LINKS),
+    ),
+    "leap": HandFile(
+        3.0, 0.04,
+        np.array([[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0.1], [0, 0, 0, 1]], np.float64),
+        _inertials(LEAP, ("index", "middle", "ring"), LEAP_THUMB),
+    ),
+}  # fmt: skip
+"""By the names of built-in hands."""
+HAND_FILES["allegro-urdf"] = HAND_FILES["allegro"]
+
+
+def hand_file(hand: Hand) -> HandFile:
+    """Return what the file of a hand says; for others than the built-in ones, the usual values."""
+    return HAND_FILES.get(hand.name, HandFile())
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RecordedReach(HandReach):
+    """What is found of a recorded grasp; tests of other tools judge the record itself."""
+
+    record: DexRecord = field(kw_only=True)
+
+
+def pose_of(seven: Array) -> Array:
+    """Return the pose (4, 4) of a position and a quaternion (w, x, y, z) of any length."""
+    found = np.eye(4)
+    found[:3, 3] = seven[:3]
+    found[:3, :3] = rotations((seven[3:FREE] / np.linalg.norm(seven[3:FREE]))[None])[0]
+    return found
+
+
+def dex_record(
+    hand: Hand, reach: HandReach, object_path: str, *, push_n: float = PUSH_N,
+    servo_n_m_per_rad: float | None = None, gap_m: float | None = GAP_M,
+) -> DexRecord:  # fmt: skip
+    """Record where a hand stands in a grasp, for DexGraspBench.
+
+    The object is at the origin of the record's world, at scale 1.
+
+    Args:
+        hand: The hand.
+        reach: The pose in which it stands (see `gc.reach_with`). Without a pregrasp the record
+            starts at the grasp.
+        object_path: Folder of the object, as DexGraspBench is to find it.
+        push_n: Largest normal force of the squeeze [N].
+        servo_n_m_per_rad: Stiffness of the servos that are told to squeeze; None for that of
+            DexGraspBench's file of the hand.
+        gap_m: How far each fingertip has opened in the record's pregrasp [m], so that all meet the
+            object at one moment; less where one opens by less in that of the pose. None for that
+            one.
+
+    Raises:
+        InputError: The pose is another hand's, or none was found.
+    """
+    stance = stance_of(uncoupled(hand, "a record of DexGraspBench"), reach)
+    positive(push_n, "push_n")
+    servo = hand_file(hand).servo_n_m_per_rad if servo_n_m_per_rad is None else servo_n_m_per_rad
+    positive(servo, "servo_n_m_per_rad")
+    text(object_path, "object_path")
+    strong = hand.with_torque_limits(STRONG_N_M, "none: only levers are asked for")
+    levers = hand_motors(strong, reach).levers
+    normals = np.array([contact.normal for contact in stance.contacts])
+    largest = float(np.einsum("ki,ki->k", stance.forces, normals).max())
+    forces = push_n / largest * stance.forces
+    told = levers @ forces.ravel() / servo
+    pose = stance.palm_pose @ np.linalg.inv(hand_file(hand).root)
+    root = np.concatenate([pose[:3, 3], quaternion(pose[:3, :3])])
+    opened = stance.joints if reach.pregrasp is None else reach.pregrasp
+    if gap_m is not None:
+        opened = _opened_by(stance, opened, positive(gap_m, "gap_m"))
+    return DexRecord(
+        object_path, 1.0, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        *(np.concatenate([root, joints]) for joints in (opened, stance.joints,
+                                                        stance.joints + to_digits(told))),
+    )  # fmt: skip
+
+
+def _opened_by(stance: Stance, opened: Array, gap_m: float) -> Array:
+    """Open each finger on its way to a posture until its tip is a gap away along the normal."""
+    shares = np.linspace(0.0, 1.0, SHARES)
+    ways = stance.joints + shares[:, None] * (opened - stance.joints)
+    tips = places(stance.hand, ways, stance.palm_pose).tips
+    gaps = [
+        np.maximum.accumulate((tips[0, finger] - tips[:, finger]) @ contact.normal)
+        for finger, contact in zip(stance.fingers, stance.contacts, strict=True)
+    ]
+    gap = min(gap_m, *(float(each[-1]) for each in gaps))
+    found, joints = opened.copy(), chains(stance.hand)
+    for finger, each in zip(stance.fingers, gaps, strict=True):
+        share, own = float(np.interp(gap, each, shares)), list(joints[finger])
+        found[own] = stance.joints[own] + share * (opened - stance.joints)[own]
+    return found
+
+
+def reach_of_record(
+    record: DexRecord, hand: Hand, body: Polyhedron, friction: float, *,
+    touch_m: float = TOUCH_M, name: str = "record",
+) -> RecordedReach:  # fmt: skip
+    """Find the contacts of a recorded grasp, and prove whether they are in force closure.
+
+    A fingertip's contact is the point of the surface that is nearest to it, or to its deepest
+    corner, if the fingertip is at most `touch_m` away from the surface or in it. Links other than
+    fingertips are not looked at, and neither are overlaps: a record may hold any pose.
+
+    Args:
+        record: The recorded grasp.
+        hand: The hand, with its joints in the order of the record.
+        body: The object, its lengths multiplied by the record's scale.
+        friction: Coulomb coefficient at every contact.
+        touch_m: Largest gap or overlap of a fingertip that counts as touching [m].
+        name: Id of the grasp.
+
+    Returns:
+        The pose with its contacts and proof; or `no closure` with a proof, or `not found` where
+        fewer than three fingertips touch. `judge_hand_by` judges the record in each case.
+
+    Raises:
+        InputError: The record has not as many joints as the hand.
+    """
+    instance(record, DexRecord, "record", "load_dex_record reads one")
+    instance(hand, Hand, "hand", "load_hand makes one")
+    check_body(body)
+    coefficient(friction)
+    number(touch_m, "touch_m", least=0.0, most=1.0)
+    text(name, "name")
+    joints = record.grasp[FREE:]
+    if len(joints) != len(hand.joints):
+        raise InputError(
+            f"record must have the {len(hand.joints)} joints of {hand.name}, got {len(joints)}; "
+            "give the hand that was recorded"
+        )
+    palm = _palms(record, hand)[1]
+    found = partial(RecordedReach, hand.name, name, record=record)
+    touching, contacts = _touched(hand, body, joints, palm, touch_m)
+    if len(touching) < FEWEST:
+        said = f"only {len(touching)} fingertips are within {1e3 * touch_m:g} mm of the surface"
+        return found("not found", said, 1, 0.0)
+    proof = force_closure(contacts, friction=friction)
+    if not proof.closed:
+        said = f"the contacts of {len(touching)} fingertips are proved not to be in force closure"
+        return found("no closure", said, 1, 0.0, open_choices=(proof,))
+    return found(
+        "", "", 1, 0.0, np.array(touching), joints, palm, contacts, proof,
+        pregrasp=record.pregrasp[FREE:], used=np.arange(len(touching)),
+    )  # fmt: skip
+
+
+def recorded_postures(reach: RecordedReach, hand: Hand, servo_n_m_per_rad: float) -> Postures:
+    """Return where a record has a hand: open, touching, and as servos are told to squeeze.
+
+    The pushes are those with which fingertips, all of them taken to touch, best explain the
+    squeeze's torques.
+    """
+    if reach.hand != hand.name:
+        raise InputError(f"hand must be the recorded one, {reach.hand}, got {hand.name}")
+    record = reach.record
+    joints = np.array([each[FREE:] for each in (record.pregrasp, record.grasp, record.squeeze)])
+    palms = _palms(record, hand)
+    torques = servo_n_m_per_rad * (joints[2] - joints[1])
+    J = tip_jacobians(hand, joints[1], palms[1])[0].reshape(-1, len(torques))
+    forces = np.asarray(np.linalg.lstsq(J.T, torques, rcond=None)[0], dtype=np.float64)
+    axes = pose_of(record.object_pose)[:3, :3].T
+    return Postures(palms, joints, np.linalg.norm(forces.reshape(-1, 3), axis=1), axes=axes)
+
+
+def _palms(record: DexRecord, hand: Hand) -> Array:
+    """Return the poses of the palm in the object's frame, open, touching and squeezing."""
+    roots = [pose_of(each) for each in (record.pregrasp, record.grasp, record.squeeze)]
+    return np.linalg.inv(pose_of(record.object_pose)) @ np.array(roots) @ hand_file(hand).root
+
+
+def _touched(
+    hand: Hand, body: Polyhedron, joints: Array, palm: Array, touch_m: float
+) -> tuple[list[int], tuple[Contact, ...]]:
+    """Find the fingers that touch, and where."""
+    found = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
+    fingers, contacts = np.flatnonzero(np.abs(found.gaps) <= touch_m).tolist(), list[Contact]()
+    for finger in fingers:
+        point = found.on_object[finger]
+        way = point - found.on_tips[finger]
+        away = Contact(point, way / float(np.linalg.norm(way)))
+        face = face_under(body, away)
+        contacts.append(away if face is None else Contact(point, np.array(face.normal)))
+    return fingers, tuple(contacts)
+
+
+def write_dex_object(body: Polyhedron, folder: str | Path) -> Path:
+    """Write a convex object for DexGraspBench, at scale 1 in metres; return the folder.
+
+    DexGraspBench takes all files of `urdf/meshes` as convex pieces, and the mass that an object has
+    at scale 1 and density 1 from `info/simplified.json`. A convex object is its own only piece;
+    others must be taken apart by the tool MeshProcess, as pieces that only cover the surface have
+    no mass.
+
+    Raises:
+        InputError: The object is not convex.
+    """
+    check_body(body)
+    place = path_of(folder, "folder")
+    if not is_convex(body):
+        raise InputError(
+            f"body must be convex, but {body.name} is not: DexGraspBench simulates convex pieces, "
+            "which its companion MeshProcess makes; give its folder as the object's path instead"
+        )
+    # every digit, corners counted from 1
+    corners = ("v " + " ".join(map(repr, point)) for point in body.vertices.tolist())
+    faces = ("f " + " ".join(map(str, each)) for each in (body.triangles + 1).tolist())
+    mesh = "\n".join([*corners, *faces, ""])
+    write_text(place / "urdf" / "meshes" / "convex_piece_000.obj", mesh)
+    write_text(place / "mesh" / "simplified.obj", mesh)
+    facts = {"mass": body.mass_at(DENSITY), "density": DENSITY, "scale": 1.0}
+    write_text(place / "info" / "simplified.json", text_of(facts))
+    return place

@@ -1,0 +1,345 @@
+"""The flags of commands: one class per command, one field per flag."""
+
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+
+from grasp_core.checked import BOUNDS, MOST_COUNT
+from grasp_core.kinds import Ending, Range
+from sim_validate.kit.flag_groups import (
+    UPRIGHT,
+    Carrying,
+    Count,
+    Direction,
+    Edges,
+    Executing,
+    Fingers,
+    Friction,
+    Gap,
+    Jobs,
+    Lengths,
+    Mass,
+    Mesh,
+    MeshLimits,
+    NotNegative,
+    ObjectName,
+    Planning,
+    Point,
+    ProtocolName,
+    Quantity,
+    Seed,
+    Spoken,
+    Testing,
+    Tips,
+    Trials,
+    Wrench,
+)
+from sim_validate.kit.processes import available_cores
+
+PICTURES, CLIPS, PAGES = (".svg", ".png"), (".gif", ".webp"), (".html", ".htm")
+RUN_LIMIT = 100
+"""Number of grasps that `run` simulates by default, which takes some ten seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run(Spoken):
+    """Plan grasps, simulate them and negative controls (contacts that must fail); write all."""
+
+    object: Positional[ObjectName]
+    planning: OmitArgPrefixes[Planning] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
+    testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
+    out: Path | None = None
+    """Folder for the results; if not given, graspproof-out/OBJECT."""
+    no_report: bool = False
+    """Write no pages about the results; `graspproof report` can write them later."""
+    execute: bool = False
+    """Also simulate the grasps as a robot executes them, with the object's true mass, springy
+    fingers and one fixed squeeze, and write executions.json."""
+    executing: OmitArgPrefixes[Executing] = field(default_factory=Executing)
+    execute_trials: Annotated[Trials, arg(metavar="NAME,NAME,...")] = ()
+    """With --execute: names of the trials, separated by commas (weight, lift, shake, stop, knock,
+    misplaced); all if not given."""
+    execute_down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
+    """With --execute: direction of gravity in the object's frame, in the trials that do not choose
+    their own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan(Spoken):
+    """Find force-closure grasps of an object, each with a checked certificate of force closure."""
+
+    object: Positional[ObjectName]
+    planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
+    best: bool = False
+    """Also search for the grasp of the largest --measure on any faces, and prove how much better
+    any other can be. It comes first; best.json and best-proof.npz hold the proof. Its
+    contacts stay --edge-clearance-m from edges, or half the radius of the largest disc in a face
+    where that is less; a twentieth of the object's radius if not given."""
+    gap: Gap = 0.05
+    """With --best: share of the proved bound that the quality may be below it."""
+    time_limit_s: Annotated[float, Range(**BOUNDS["time_limit_s"])] | None = None
+    """With --best: time after which the search ends with the gap reached [s]."""
+    measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
+    """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
+    orientation; or the multiple of a task's --wrenches that is resisted."""
+    wrenches: Path | None = None
+    """With --measure task: JSON file of the task's wrenches (see docs/files.md)."""
+    jobs: Jobs = field(default_factory=available_cores)
+    out: Path | None = None
+    """Folder for grasps.json; if not given, no file is written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Validate(Spoken):
+    """Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must fail."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasps to simulate."""
+    friction: Friction | None = None
+    """Coulomb coefficient to simulate with; if not given, the one planned for."""
+    limit: Count | None = None
+    """Simulate only this many grasps, from the first."""
+    seed: Seed | None = None
+    """Seed of random wrenches and of moved contacts; if not given, the seed of the plan."""
+    protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
+    """Judge the grasps by the published test of another tool, beside our verdict under its loads
+    and the predicted margin, instead of by our usual trials; may be repeated."""
+    testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
+    out: Path | None = None
+    """Folder for verdicts.json, or for judgements.json with --protocol; if not given, no file is
+    written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Execute(Spoken):
+    """Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasps to execute."""
+    grasp: str | None = None
+    """Id of the grasp to execute; if not given, all grasps are executed."""
+    friction: Friction | None = None
+    """Coulomb coefficient to simulate with; if not given, the one planned for."""
+    limit: Count | None = None
+    """Execute only this many grasps, from the first."""
+    trials: Annotated[Trials, arg(metavar="NAME,NAME,...")] = ()
+    """Names of the trials: weight, lift, shake, stop, knock, misplaced, separated by commas; all if
+    not given."""
+    down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
+    """Direction of gravity in the object's frame, in the trials that do not choose their own."""
+    seed: Seed | None = None
+    """Seed of the directions of misplaced objects; if not given, the seed of the plan."""
+    executing: OmitArgPrefixes[Executing] = field(default_factory=Executing)
+    setup: Path | None = None
+    """A TOML file whose table `physics` has settings of the simulator (see docs/files.md)."""
+    jobs: Jobs = field(default_factory=available_cores)
+    out: Path | None = None
+    """Folder for executions.json; if not given, no file is written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene(Spoken):
+    """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.
+
+    Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, and
+    there is no gravity. With a mass or a density, objects have their true mass and are held under
+    gravity, as in the command `execute`.
+    """
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasps to write as scenes."""
+    grasp: str | None = None
+    """Id of the grasp to write; if not given, all grasps are written."""
+    friction: Friction | None = None
+    """Coulomb coefficient in the scene; if not given, the one planned for."""
+    fingers: OmitArgPrefixes[Fingers] = field(default_factory=Fingers)
+    surface: Literal["pads", "mesh"] = "pads"
+    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
+    of a convex object."""
+    mass: OmitArgPrefixes[Mass] = field(default_factory=Mass)
+    tips: OmitArgPrefixes[Tips] = field(default_factory=Tips)
+    down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
+    """With a mass or a density: direction of gravity in the object's frame."""
+    out: Path | None = None
+    """Folder for the scenes; if not given, a single scene is printed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Export(Spoken):
+    """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasps to write."""
+    to: Literal["moveit", "gltf"]
+    """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
+    see docs/exports.md."""
+    out: Annotated[Path, arg(aliases=("-o",))]
+    """File to write, which ends in .yaml for moveit and .glb for gltf."""
+    grasp: str | None = None
+    """Id of the grasp to write; if not given, all grasps are written."""
+    limit: Count | None = None
+    """Write only this many grasps, from the first."""
+    fingertip_radius_m: Quantity | None = None
+    """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
+    radius, or less if that does not fit."""
+
+
+@dataclass(frozen=True, slots=True)
+class View(Spoken):
+    """Look at a grasp: in MuJoCo's viewer if there is a display, or in a file."""
+
+    grasps: Positional[Path]
+    """The grasps.json with the grasp to show, or the folder of a run."""
+    grasp: str | None = None
+    """Id of the grasp to show; if not given, the first one."""
+    friction: Friction | None = None
+    """Coulomb coefficient; if not given, the one planned for."""
+    picture: Annotated[Path, Ending(PICTURES)] | None = None
+    """Write the grasp as a picture like the paper's (svg, png)."""
+    page: Annotated[Path, Ending(PAGES)] | None = None
+    """Write a page (html) on which the grasp can be turned."""
+    clip: Annotated[Path, Ending(CLIPS)] | None = None
+    """Write a clip (webp, gif) of the fingers closing, which MuJoCo renders where there are
+    graphics."""
+    hand: bool = True
+    """Show the hand of the reaches.json beside the grasps, where it reaches the grasp, in the
+    picture and on the page."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report(Spoken):
+    """Write the results of a run as pages that open in a browser, without any network."""
+
+    folder: Positional[Path]
+    """Folder of a run, with its grasps.json; or a folder of such folders."""
+    limit: Count | None = None
+    """Draw only this many grasps per run, those with problems before others; if not given, all."""
+    clips: Annotated[int, Range(least=0, most=MOST_COUNT)] = 0
+    """Number of grasps per run of which clips of trials are made, those with problems first, if
+    graphics are available."""
+    jobs: Count = field(default_factory=available_cores)
+    """Largest number of processes."""
+    out: Path | None = None
+    """Folder for the pages; if not given, `report` in the run's folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class Regions(Spoken):
+    """Prove regions in which each finger may stand anywhere, whatever the others do."""
+
+    grasps: Positional[Path]
+    """The grasps.json whose contacts get regions."""
+    grasp: str | None = None
+    """Id of the grasp that gets regions; if not given, all grasps do."""
+    limit: Count | None = None
+    """Compute regions for only this many grasps, from the first."""
+    friction: Friction | None = None
+    """Coulomb coefficient of the proof; if not given, the one planned for."""
+    reserve: Annotated[float, Range(**BOUNDS["reserve"])] = 0.0
+    """Share of the friction that the proof does not count on."""
+    recenter: bool = False
+    """Move the regions to where discs inside the faces can be largest; contacts may then lie
+    outside their regions."""
+    edge_clearance_m: NotNegative = 0.0
+    """How far regions stay from the edges of their faces [m]."""
+    max_cones: Annotated[int, Range(**BOUNDS["max_cones"])] = 10_000
+    """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
+    by some hundredths, or not at all where they are as large as possible."""
+    jobs: Jobs = field(default_factory=available_cores)
+    out: Path | None = None
+    """Folder for regions.json and the proofs; if not given, no file is written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Replay(Spoken):
+    """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
+
+    source: Positional[Path]
+    """Where the trial is recorded: a verdicts.json, the folder of a run, or a dataset."""
+    grasp: str | None = None
+    """Id of the grasp; may be left out if there is only one."""
+    wrench: str | None = None
+    """Name of the wrench; if not given, the first one that was not held, or else the one that is
+    hardest to hold."""
+    control: str | None = None
+    """Name of a negative control (contacts made from the grasp that must fail) to replay instead of
+    the grasp."""
+    trial: Annotated[int, Range(least=0, most=MOST_COUNT)] | None = None
+    """Number of a repeat with noise to replay instead of the trial without noise."""
+    grasps: Path | None = None
+    """The grasps.json that the verdicts are about, if it is not beside them."""
+    out: Path | None = None
+    """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
+
+
+@dataclass(frozen=True, slots=True)
+class Analyze(Spoken):
+    """Judge contacts of any origin: force closure with a certificate, quality, wrench limits."""
+
+    contacts: Positional[Path]
+    """A contacts file (see docs/files.md), or a grasps.json."""
+    friction: Annotated[float, Range(**BOUNDS["friction_or_zero"])] | None = None
+    """Coulomb coefficient of contacts that have none of their own; if not given, the one in the
+    file."""
+    torque_scale_m: Quantity | None = None
+    """Length by which torques are divided to compare them with forces [m]; if not given, the one in
+    the file."""
+    max_normal_force: Quantity = 10.0
+    """Largest normal force of each contact [N]."""
+    wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
+    """An external wrench whose largest resisted multiple is wanted [N, N m], torque about the
+    center; may be repeated."""
+    outward: bool = False
+    """Read the file's normals as pointing out of the object, not into it."""
+    edges: Edges = 8
+    """Number of edges of the pyramids that replace friction cones in two quality measures,
+    min-weight and hull volume."""
+    jobs: Jobs = field(default_factory=available_cores)
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer(Spoken):
+    """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
+
+    grasps: Positional[Path]
+    """The grasps.json that was planned on the old part."""
+    part: Positional[str]
+    """The changed part, in the same frame: a mesh file (obj, stl, ply, off, glb) or the name of a
+    built-in object."""
+    carrying: OmitArgPrefixes[Carrying] = field(default_factory=Carrying)
+    friction: Friction | None = None
+    """Coulomb coefficient to judge with, before and after; if not given, the one planned for."""
+    lengths: OmitArgPrefixes[Lengths] = field(default_factory=Lengths)
+    center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
+    """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
+    uniform density, or the old part's if that was given."""
+    limits: OmitArgPrefixes[MeshLimits] = field(default_factory=MeshLimits)
+    out: Path | None = None
+    """Folder for transfer.json and the grasps.json of the changed part; if not given, no file is
+    written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Inspect(Spoken):
+    """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
+
+    object: Positional[ObjectName]
+    picture: Annotated[Path, Ending(PICTURES)] | None = None
+    """Write the object as a picture (svg, png)."""
+    mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
+
+
+@dataclass(frozen=True, slots=True)
+class Objects(Spoken):
+    """List the names of the built-in objects."""
+
+
+@dataclass(frozen=True, slots=True)
+class Doctor(Spoken):
+    """Check this installation: versions, solvers and simulator."""
+
+    compile: bool = False
+    """Compile all inner loops first, on two cores if there are two, as for an image."""

@@ -1,0 +1,150 @@
+"""Compiles inner loops before they are needed, in two processes at once.
+
+Compiling all that a plan needs takes a minute of one core, once, and what reaches with a hand half
+a minute more. Each call here uses some kernels on a small example, so that their loops are kept;
+two processes that make different calls compile different loops, but for a few that both need.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import wait
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeAlias
+
+import numpy as np
+
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.compiled import is_kept
+from grasp_core.planning.planner import plan
+from grasp_core.processes import local_processes
+from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.values import Family
+from scenes.example_objects import example_object
+
+OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+"""Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""
+CONTACTS = OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0)
+FRICTION = 0.5
+Calls: TypeAlias = Sequence[Callable[[], object]]
+
+
+@dataclass(frozen=True, slots=True)
+class Loops:
+    """Kernels, and the calls that compile them, in two halves that take equally long."""
+
+    kernels: Sequence[str]
+    """Some kernels whose loops are kept once all calls were made, without package and ending."""
+    here: Calls
+    beside: Calls
+    """Calls for another process."""
+
+
+def _nearest() -> None:
+    least_distance(CONTACTS[0][:3], -np.ones((1, 3)))
+
+
+def _closure() -> None:
+    force_closure(*CONTACTS, FRICTION)
+    critical_friction(*CONTACTS)
+
+
+def _quality() -> None:
+    ferrari_canny(*CONTACTS, FRICTION, torque_scale=1.0)
+
+
+def _planned(*families: Family) -> None:
+    plan(example_object("tetrahedron"), FRICTION, families=families)
+
+
+def _regions() -> None:
+    from grasp_core.regions.certify_regions import certify_regions
+
+    body = example_object("tetrahedron")
+    certify_regions(body, plan(body, FRICTION, limit=1).grasps[0], FRICTION)
+
+
+def _best() -> None:
+    from grasp_core.optimizing.best.best_grasp import best_grasp
+
+    best_grasp(example_object("tetrahedron"), FRICTION, gap=0.5).verify()
+
+
+def _clearance() -> None:
+    from scenes.mujoco.surface import touched_solids
+
+    body = example_object("l-bracket")
+    touched_solids(body, body.vertices[:1], body.radius)
+
+
+def _hand_checks() -> None:
+    from grasp_core.hands.collisions import clearances
+    from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.starts import postures
+
+    hand, body = load_hand("allegro"), example_object("tetrahedron")
+    (joints, *_), _ = postures(hand, 0)
+    clearances(hand, body, joints, np.eye(4), np.arange(len(hand.fingers)))
+
+
+def _hand_posing() -> None:
+    from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.pose_search import compile_posing
+
+    compile_posing(load_hand("allegro"), example_object("tetrahedron"))
+
+
+def _hand_reach() -> None:
+    from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.reach import reach_with
+
+    body = example_object("tetrahedron")
+    grasp = plan(body, FRICTION, limit=1).grasps[0]
+    reach_with(load_hand("allegro"), body, grasp, FRICTION, table_down=(0.0, 0.0, -1.0))
+
+
+PLANNING = Loops(
+    ("families.discs", "families.regulus", "closure.critical_friction",
+     "quality.ferrari_canny"),
+    (partial(_planned, "concurrent", "pencil"),),
+    # first what the other half needs late
+    (_nearest, _closure, partial(_planned, "regulus"), _quality),
+)  # fmt: skip
+"""What compiles the loops that plans need."""
+REACHING = Loops(
+    ("hands.collisions", "hands.pose"), (_hand_checks,), (_hand_posing,)
+)  # fmt: skip
+"""What compiles the loops that put hands to contacts."""
+EVERYTHING = Loops(
+    (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.best.search"),
+    (*PLANNING.here, _hand_checks, _hand_posing, _hand_reach, _regions, _clearance),
+    (*PLANNING.beside, _best),
+)
+"""What compiles all loops that there are."""
+
+
+def must_compile(loops: Loops, jobs: int) -> bool:
+    """Return whether some of the loops are not kept yet, and two processes may compile them.
+
+    With one job, loops are compiled where they are needed, and no others.
+    """
+    kept = (is_kept(f"grasp_core.{name}_kernel") for name in loops.kernels)
+    return jobs > 1 and not all(kept)
+
+
+def compile_loops(loops: Loops, jobs: int = 2) -> None:
+    """Compile loops, or load what is kept, in this process and in another."""
+    if jobs < 2:  # noqa: PLR2004 - this process and another
+        for call in (*loops.here, *loops.beside):
+            call()
+        return
+    with local_processes(1) as other:
+        calls = [other.submit(_made, call) for call in loops.beside]
+        for call in loops.here:
+            call()
+        wait(calls)  # where the other process fails, loops are compiled when they are needed
+
+
+def _made(call: Callable[[], object]) -> None:
+    call()

@@ -1,0 +1,240 @@
+"""Writes console output: results on standard output, everything else on standard error.
+
+It also collects what long work gives, so that an interrupt loses nothing that is done.
+"""
+
+import importlib
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from grasp_core.figures import table
+from grasp_core.files.json_text import text_of
+from grasp_core.files.records import RecordFile
+from grasp_core.files.text_files import write_text
+from sim_validate.kit import interrupts
+
+Result = TypeVar("Result")
+File = TypeVar("File", bound=RecordFile)
+PLAIN_EVERY_S = 5.0
+"""Time between two lines of progress if the output is no terminal [s]."""
+EARLIEST = 0.02
+"""Share of the work that must be done before the remaining time is estimated."""
+
+
+def printable(text: str) -> str:
+    """Replace control characters, so that a file's name cannot steer the terminal."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+GAP, MARGIN = 2, 1
+"""Widths of the space behind a column of a table, and before the first one, in characters."""
+TABLE_ROWS = 20
+"""Largest number of rows shown in a table; files and JSON documents have all of them."""
+
+
+@dataclass(slots=True)
+class Reporter:
+    """Writes a command's output; with `json_only`, standard output gets only one JSON document."""
+
+    quiet: bool = False
+    verbose: bool = False
+    json_only: bool = False
+    out: Console = field(default_factory=lambda: Console(highlight=False))
+    err: Console = field(default_factory=lambda: Console(stderr=True, highlight=False))
+
+    def say(self, text: str) -> None:
+        """Print a line of results: on standard output or, with --json, on standard error."""
+        if not self.quiet:
+            console = self.err if self.json_only else self.out
+            console.print(Text(printable(text)), soft_wrap=True)
+
+    def detail(self, text: str) -> None:
+        """Print a line only with --verbose."""
+        if self.verbose:
+            self.err.print(Text(printable(text)), soft_wrap=True)
+
+    def warn(self, text: str) -> None:
+        """Print a line on standard error, even when quiet."""
+        self.err.print(Text(printable(text)), soft_wrap=True)
+
+    def document(self, value: Mapping[str, object]) -> None:
+        """Print the one JSON document of a command run with --json."""
+        if self.json_only:
+            self.text(text_of(value))
+
+    def text(self, text: str) -> None:
+        """Print the text of the one JSON document of a command run with --json."""
+        if self.json_only:
+            sys.stdout.write(text)
+
+    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Print a table on the same stream as lines of results.
+
+        A table that would have to break words or numbers is divided: the columns that do not fit
+        follow below, again beside the first one.
+        """
+        if self.quiet:
+            return
+        console = self.err if self.json_only else self.out
+        for part in _parts(columns, rows, console.width):
+            table = Table(
+                title=Text(printable(title)),
+                title_justify="left",
+                box=SIMPLE_HEAD,
+                padding=(0, 1, 0, 0),
+            )
+            for place in part:
+                side = "left" if place == part[0] else "right"
+                last = place == part[-1]
+                table.add_column(columns[place], justify=side, overflow="fold", no_wrap=not last)
+            for row in rows:
+                table.add_row(*(Text(printable(row[place])) for place in part))
+            console.print(table)
+
+    def records(self, title: str, records: Sequence[object]) -> None:
+        """Print the figures of records of one class as a table."""
+        if records:
+            self.table(title, *table(records[:TABLE_ROWS], type(records[0])))
+            say_cut(len(records), self)
+
+    def counted(
+        self, title: str, results: Iterable[Result], total: int, word: str,
+        is_good: Callable[[Result], bool],
+    ) -> Iterator[Result]:  # fmt: skip
+        """Yield results, and show how many of all have come and how many of them are good."""
+        good = 0
+        with self.progress(title) as steps:
+            for done, result in enumerate(results, 1):
+                good += is_good(result)
+                yield result
+                steps.update(done, total, f"({good} {word})")
+
+    def progress(self, title: str) -> "Steps":
+        """Show progress of long work: a bar on a terminal, plain lines elsewhere."""
+        return Steps(title, self.err, shown=not self.quiet)
+
+
+def _parts(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], width: int
+) -> list[list[int]]:  # fmt: skip
+    """Divide the columns of a table, by their places, into parts that fit; each has the first one.
+
+    The last column may break its lines between words, so it needs as much as its longest word.
+    """
+    texts = [[name, *(row[place] for row in rows)] for place, name in enumerate(columns)]
+    needed = [max(map(len, each)) + GAP for each in texts]
+    needed[-1] = max(len(word) for text in texts[-1] for word in text.split() or [""]) + GAP
+    parts = [[0]]
+    for place in range(1, len(columns)):
+        used = sum(needed[each] for each in parts[-1])
+        if len(parts[-1]) > 1 and MARGIN + used + needed[place] > width:
+            parts.append([0])
+        parts[-1].append(place)
+    return parts
+
+
+class Steps:
+    """Shows the progress of long work in a `with` block."""
+
+    def __init__(self, title: str, console: Console, *, shown: bool) -> None:
+        self.title, self.console, self.shown = title, console, shown
+        self.bar: Any = None
+        self.task: Any = None
+        self.begun = self.last = time.monotonic()
+
+    def __enter__(self) -> "Steps":
+        if self.shown and self.console.is_terminal:
+            bars: Any = importlib.import_module("rich.progress")  # for terminals only
+            self.bar = bars.Progress(
+                bars.TextColumn("{task.description}"),
+                bars.BarColumn(),
+                bars.MofNCompleteColumn(),
+                bars.TimeElapsedColumn(),
+                bars.TimeRemainingColumn(),
+                console=self.console,
+                transient=True,
+            )
+            self.bar.start()
+            self.task = self.bar.add_task(self.title, total=None)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+    def update(self, done: int, total: int, note: str = "") -> None:
+        """Show how many steps are done; an interrupt that was swallowed is raised here."""
+        interrupts.check()
+        if self.bar is not None:
+            title = f"{self.title} {note}" if note else self.title
+            self.bar.update(self.task, completed=done, total=total, description=title)
+        elif self.shown and time.monotonic() - self.last > PLAIN_EVERY_S:
+            self.last = time.monotonic()
+            rate = done / (self.last - self.begun)
+            line = f"{self.title} {done}/{total} {note} {rate:.1f}/s"
+            if done > EARLIEST * total:
+                line += f", {(total - done) / rate:.0f} s left"
+            self.console.print(Text(line), soft_wrap=True)
+
+
+def finished(
+    results: Iterable[Result], total: int, collect: Callable[..., File], path: Path | None,
+    reporter: Reporter,
+) -> File:  # fmt: skip
+    """Collect results in the record of a file, and write it even if the work is interrupted.
+
+    Without a result nothing is written.
+    """
+    done = list[Result]()
+    try:
+        for result in results:
+            done.append(result)
+    finally:
+        complete = len(done) == total
+        found = collect(tuple(done), complete=complete)
+        if path and done:
+            write_text(path, found.text())
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    return found
+
+
+def finished_text(
+    results: Iterable[Result], total: int, text_of: Callable[..., str], path: Path | None,
+    reporter: Reporter,
+) -> tuple[list[Result], str]:  # fmt: skip
+    """Collect results, and write the text about them even if the work is interrupted."""
+    done = list[Result]()
+    try:
+        for result in results:
+            done.append(result)
+    finally:
+        complete = len(done) == total
+        text = text_of(done, complete=complete)
+        if path and done:
+            write_text(path, text)
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    return done, text
+
+
+def warn_of(lines: Sequence[str], file: str, reporter: Reporter) -> None:
+    """Print the first lines of warnings, and say which file has all of them."""
+    for line in lines[:TABLE_ROWS]:
+        reporter.warn(line)
+    if len(lines) > TABLE_ROWS:
+        left = len(lines) - TABLE_ROWS
+        reporter.warn(f"and {left} more: {file} (--out DIR) has all of them")
+
+
+def say_cut(count: int, reporter: Reporter) -> None:
+    """Say how many rows a table left out."""
+    if count > TABLE_ROWS:
+        reporter.say(f"... and {count - TABLE_ROWS} more")

@@ -1,0 +1,99 @@
+"""Searches for the best grasp of an object, shows it beside the planned ones, and writes both."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from grasp_core.arrays import Array
+from grasp_core.files.json_text import text_of
+from grasp_core.files.text_files import write_text
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.optimizing.best.best_grasp import best_grasp
+from grasp_core.optimizing.best.proof_file import write_proof
+from grasp_core.optimizing.best.result import BestGrasp, GapAt, measured
+from grasp_core.values import Grasp
+from sim_validate.kit import command_flags
+from sim_validate.kit.console import TABLE_ROWS, Reporter
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.planning.best_json import Rated, best_to_document
+
+FILE, PROOF = "best.json", "best-proof.npz"
+STEPS = 100
+WHY = {
+    "gap": "the gap asked for is reached",
+    "time": "the time limit is reached",
+    "interrupt": "it was interrupted",
+    "undivided": "what is left of the faces is too small, or too much, to be divided further",
+}
+"""Why a search ended, in words."""
+ROUGH = 1e-3
+"""Gap between the bounds of what planned grasps hold."""
+UNITS = {
+    "ferrari-canny": ("quality", " N"), "weight": ("weight", " N"), "task": ("multiple", ""),
+}  # fmt: skip
+"""What each measure gives, and its unit, for normal forces that sum to one newton."""
+
+
+def search_best(
+    body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, reporter: Reporter
+) -> BestGrasp:  # fmt: skip
+    """Search for the best grasp, for wrenches (m, 6) if asked, and show how the gap closes."""
+    planning = command.planning
+    with reporter.progress("bounding") as steps:
+
+        def tell(now: GapAt) -> None:
+            closed = round(STEPS * (1.0 - max(now.gap - command.gap, 0.0)))
+            word = UNITS[command.measure][0]
+            note = f"({word} {now.quality:.4f}, bound {now.bound:.4f}, gap {100 * now.gap:.1f} %)"
+            steps.update(closed, STEPS, note)
+
+        return best_grasp(
+            body, planning.friction, gap=command.gap, time_limit_s=command.time_limit_s,
+            clearance=planning.edge_clearance_m or None, seed=planning.seed, jobs=command.jobs,
+            measure=command.measure, wrenches=wrenches, progress=tell,
+        )  # fmt: skip
+
+
+def write_best(
+    body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp], folder: Path | None,
+    reporter: Reporter,
+) -> list[Rated]:  # fmt: skip
+    """Write result and proof, and return the planned grasps with bounds of the same measure."""
+    measure, friction = best.proof.measure, best.proof.friction
+    bounds = [grasp.ferrari_canny for grasp in planned]
+    if not measure.is_usual:
+        found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
+        bounds = [(each.lower, each.upper) for each in found]
+    compared = list(map(Rated, planned, bounds))
+    document = best_to_document(body, best, compared, PROOF if folder else None)
+    if folder:
+        write_proof(folder / PROOF, best.proof)
+        write_text(folder / FILE, text_of(document))
+        reporter.say(f"wrote {folder / FILE} and {folder / PROOF}")
+    reporter.document(document)
+    return compared
+
+
+def show_best(best: BestGrasp, planned: Sequence[Rated], reporter: Reporter) -> int:
+    """Show the best grasp, the bound, and how much of the possible each planned grasp reaches."""
+    last = best.history[-1]
+    word, unit = UNITS[best.measure]
+    reporter.say(
+        f"best grasp {best.grasp.id}: {word} {best.quality.lower:.4f}{unit}; no four contacts "
+        f"{1e3 * best.clearance:.3g} mm from edges exceed {best.bound:.4f}{unit} (gap "
+        f"{100.0 * best.gap:.2f} %); {WHY[best.ended]}, after {last.nodes} nodes"
+    )
+    first = (best.quality.lower, best.quality.upper)
+    if best.proof.measure.is_usual:
+        first = best.grasp.ferrari_canny
+    rows = [
+        (each.grasp.id, each.grasp.family, f"{each.quality[0]:.4f}",
+         f"{100.0 * each.quality[0] / best.bound:.1f}")
+        for each in (Rated(best.grasp, first), *planned)[:TABLE_ROWS]
+    ]  # fmt: skip
+    reporter.table(
+        "the possible, and what grasps reach of it",
+        ("grasp", "family", f"{word}{unit}", "of the bound %"), rows,
+    )  # fmt: skip
+    if best.ended == "interrupt":
+        return Exit.INTERRUPTED
+    return Exit.GOOD if best.ended == "gap" else Exit.PARTIAL

@@ -1,0 +1,239 @@
+"""Runs the command `plan`, which finds certified grasps of an object and writes them to a file.
+
+What only --optimize, --regions and --best need is imported where they ask for it.
+"""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.files.text_files import write_text
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.planner import plan
+from grasp_core.planning.request import methods_for
+from grasp_core.planning.result import Moved, Plan
+from grasp_core.planning.selection import carried
+from grasp_core.records.grasps_json import plan_to_json
+from grasp_core.values import Grasp
+from sim_validate.kit import command_flags, flag_groups
+from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
+from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.kit.exit_codes import Exit, FlagsError
+from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.planning.asked_objects import asked_finger, object_to_plan
+
+if TYPE_CHECKING:
+    from grasp_core.optimizing.best.result import BestGrasp
+    from sim_validate.planning.best_json import Rated
+    from sim_validate.planning.certifying import Found
+
+"""Column of what grasps carry, by the rank that orders them."""
+
+
+def plan_object(
+    body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
+) -> Plan:
+    """Plan the grasps of an object and, if asked for, improve them."""
+    if must_compile(PLANNING, jobs):
+        reporter.say("compiling inner loops once, which takes a minute of one core")
+        compile_loops(PLANNING)
+    with reporter.progress("planning") as steps:
+        found = plan(
+            body,
+            planning.friction,
+            families=planning.family or methods_for(body),
+            cones=planning.cones,
+            theta_deg=planning.theta_deg,
+            limit=planning.limit,
+            rank_by=planning.rank_by,
+            seed=planning.seed,
+            max_face_parts=planning.max_face_parts,
+            complete=planning.complete,
+            finger=asked_finger(planning),
+            clearance=planning.edge_clearance_m,
+            share_faces=planning.share_faces_m,
+            progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
+            jobs=jobs,
+        )
+    if planning.optimize and found.grasps:
+        from sim_validate.planning.improving import improved
+
+        with reporter.progress("optimising") as steps:
+            found = improved(
+                body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling,
+                jobs=jobs, progress=steps.update,
+            )  # fmt: skip
+        if left_out := len(found.moves) - len(found):
+            reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")
+    return found
+
+
+def with_regions(
+    body: Polyhedron, found: Plan, planning: flag_groups.Planning, folder: Path | None, jobs: int,
+    reporter: Reporter,
+) -> Plan:  # fmt: skip
+    """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
+    if not (planning.regions and found.grasps):
+        return found
+    from sim_validate.planning.certifying import Asked, certified, wider
+    from sim_validate.planning.regions_json import write_regions
+
+    asked = Asked(found.friction, clearance=planning.edge_clearance_m)
+    grasps = list[Grasp]()
+
+    def kept(each: "Iterator[Found]") -> "Iterator[Found]":
+        for grasp, proved in each:
+            grasps.append(wider(grasp, proved))
+            yield grasp, proved
+
+    with reporter.progress("certifying") as steps:
+        each = certified(body, found.grasps, asked, jobs=jobs, progress=steps.update)
+        write_regions(folder, body, asked, kept(each))
+    widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
+    reporter.say(f"{widened} of {len(grasps)} grasps got larger regions, each with its own proof")
+    return replace(found, grasps=tuple(grasps))
+
+
+def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
+    """Plan grasps, write them to a file, and show the best of them."""
+    wrenches = _task(command)
+    body = object_to_plan(command.object, command.planning, reporter)
+    with alone_in(command.out):
+        found = plan_object(body, command.planning, command.jobs, reporter)
+        best: BestGrasp | None = None
+        if command.best:
+            from sim_validate.planning.best import search_best
+
+            best = search_best(body, command, wrenches, reporter)
+        if command.out:
+            remove_results(command.out)
+        found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
+        planned, compared = found.grasps, list["Rated"]()
+        if best is not None:
+            found = replace(found, grasps=(best.grasp, *planned), absence=None)
+        text = plan_to_json(body, found)
+        if command.out:
+            path = write_text(command.out / "grasps.json", text)
+            reporter.say(f"wrote {path}")
+        if best is not None:
+            from sim_validate.planning.best import write_best
+
+            compared = write_best(body, best, planned, command.out, reporter)
+        elif reporter.json_only:
+            print(text, end="")  # noqa: T201 - the document itself
+    say_counts(body, found, reporter)
+    if found.absence:
+        reporter.say(found.absence)
+        return Exit.NONE
+    columns, rows = _table(body, found, carry=command.planning.rank_by == "payload")
+    reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
+    say_cut(len(found.grasps), reporter)
+    if found.moves:
+        show_gains(found.moves, reporter)
+    if best is None:
+        return Exit.GOOD
+    from sim_validate.planning.best import show_best
+
+    return show_best(best, compared, reporter)
+
+
+def _task(command: command_flags.Plan) -> Array | None:
+    """Return the wrenches of a task, (m, 6), if it is to be done well."""
+    if not command.best and (command.measure != "ferrari-canny" or command.wrenches):
+        raise FlagsError(
+            "--measure and --wrenches say which grasp is best: give --best too, or leave them out"
+        )
+    if (command.measure == "task") != (command.wrenches is not None):
+        raise FlagsError("--measure task and --wrenches FILE go together: give both, or neither")
+    if command.wrenches is None:
+        return None
+    from sim_validate.planning.wrenches_json import wrenches_from_file
+
+    return np.array([each.wrench for each in wrenches_from_file(command.wrenches)])
+
+
+def _table(
+    body: Polyhedron, found: Plan, *, carry: bool
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the columns and rows that show the best grasps.
+
+    What grasps carry is not kept with them. Where they are ordered by it, it is computed again, and
+    stands in the place of the margin, for which there would be no room.
+    """
+    shown = found.grasps[:TABLE_ROWS]
+    friction, finger = found.friction, found.finger
+    heading = "payload kg" if carry else "margin"
+    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", heading, "quality N")
+    figures = [
+        f"{carried(body, g, friction, finger):.4g}" if carry else f"{g.closure_margin:.4f}"
+        for g in shown
+    ]
+    rows = [
+        (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
+         f"{math.degrees(g.span_angle):.2f}", figure, f"{g.ferrari_canny[0]:.4f}")
+        for g, figure in zip(shown, figures, strict=True)
+    ]  # fmt: skip
+    return columns, rows
+
+
+def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
+    """Say how many sets of faces were tried, and how many gave a certified grasp."""
+    counts = found.counts
+    reporter.say(
+        f"{body.name}: {counts.faces} faces, {counts.quadruples} face quadruples, "
+        + (f"{counts.spanning} with spanning normals (P3), " if counts.spanning is not None else "")
+        + f"friction {found.friction:g}, "
+        f"cone half-angle {math.degrees(found.theta):.4g} deg"
+    )
+    known = found.outcomes
+    reporter.say(
+        f"face quadruples: {known.held} with a certified grasp, {known.absent} proved to have "
+        f"none, {len(found.undecided)} undecided, {known.open - len(found.undecided)} left open"
+        + (f", {known.out_of_reach} out of reach" if found.unreached else "")
+    )
+    for method, tally in counts.families.items():
+        undecided = f"{tally.undecided} undecided, " if method == "free" else ""
+        undecided += f"{tally.unreachable} out of reach, " if found.unreached else ""
+        reporter.say(
+            f"{method} candidates: {tally.tried} tried, {tally.pruned} pruned, {tally.infeasible} "
+            f"infeasible, {undecided}{tally.duplicates} duplicates, {tally.found} found, "
+            f"{tally.rejected} rejected, {found.seconds[method]:.2f} s"
+        )
+    if found.undecided:
+        named = [f"{'-'.join(map(str, faces))} ({100.0 * share:.3g} % open)"
+                 for faces, share in found.undecided.items()]  # fmt: skip
+        reporter.say(f"undecided face quadruples: {', '.join(named[:TABLE_ROWS])}")
+        say_cut(len(named), reporter)
+    reasons = Counter(_whoever(why) for why in found.unreached.values())
+    for why, count in reasons.most_common():
+        reporter.say(f"out of reach: {why}, on {count} face quadruples")
+
+
+def _whoever(why: str) -> str:
+    """Remove the finger numbers from a reason, so that equal reasons can be counted together."""
+    why = re.sub(r"fingertips \d+ and \d+", "two fingertips", why)
+    return re.sub(r"(finger(?:tip)?) \d+", r"a \1", why)
+
+
+def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
+    """Show how optimisation changed the quality of each grasp, with percentiles."""
+    rows = [
+        (move.id, f"{move.before[0]:.4f}", f"{move.after[0]:.4f}", f"{move.gain:.3f}",
+         "" if move.ceiling is None else f"{move.ceiling:.4f}")
+        for move in moves[:TABLE_ROWS]
+    ]  # fmt: skip
+    columns = ("grasp", "quality before", "after", "gain", "upper bound")
+    reporter.table("Ferrari-Canny l1 [N]", columns, rows)
+    gains = np.array([move.gain for move in moves])
+    low, quarter, middle, upper, high = np.percentile(gains, [0, 25, 50, 75, 100])
+    reporter.say(
+        f"{int((gains > 1.0).sum())} of {len(gains)} grasps improved; gain from {low:.3f} to "
+        f"{high:.3f}, median {middle:.3f}, half of them between {quarter:.3f} and {upper:.3f}"
+    )

@@ -1,0 +1,120 @@
+"""Runs the command `transfer`, which carries grasps over to a part that has changed."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from grasp_core.declared import counted
+from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_text
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.shells import SMALL
+from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
+from grasp_core.transferring.face_changes import check_planar
+from grasp_core.transferring.transfer import (
+    CHANGES,
+    CarriedGrasp,
+    Change,
+    GraspFigures,
+    Transfer,
+    transfer,
+)
+from sim_validate.kit import command_flags, flag_groups
+from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.planning.asked_objects import asked_grasps, load_object
+from sim_validate.planning.grasps_json import GRASPS
+from sim_validate.planning.transfer_json import TRANSFER, carried_to_json, transfer_to_json
+
+MM = 1e3
+ABSENT = "-"
+COLUMNS = ("grasp", "status", "mm", "deg", "mu*", "now", "quality N", "now", "faces")
+"""How far contacts moved and turned, what they reach, and faces under them that changed."""
+BAD: tuple[Change, ...] = ("worse", "gone")
+"""What becomes of a grasp if its part should not have changed like that."""
+
+
+def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
+    """Carry the grasps of a file over to a changed part, write them, and say what has changed."""
+    saved = asked_grasps(command.grasps, reporter, friction=command.friction)
+    if saved is None:
+        return Exit.NONE
+    check_planar(saved.body, "the old part")
+    kept = None if command.out is None else command.out / GRASPS
+    # from which grasps can be carried again
+    if kept is not None and kept.exists() and kept.samefile(command.grasps):
+        raise InputError(
+            f"{command.out}: the grasps of the old part are in this folder and would be "
+            "overwritten; give another --out"
+        )
+    new = _changed_part(command, saved.body)
+    if not 1.0 / SURE_GROWTH <= (times := growth(saved.body, new)) <= SURE_GROWTH:
+        reporter.warn(
+            f"{command.part}: the changed part is {times:.4g} times as large as the old one; if "
+            "that is not so, say its unit with --unit, or its scale with --scale"
+        )
+    with alone_in(command.out), reporter.progress("carrying over"):
+        found = transfer(
+            saved.body, new, saved.grasps, saved.friction, distance=command.carrying.distance_m,
+            angle_deg=command.carrying.angle_deg, finger=saved.finger,
+        )  # fmt: skip
+        text = transfer_to_json(found)
+        if command.out is not None:
+            remove_results(command.out)
+            grasps = write_text(command.out / GRASPS, carried_to_json(found, saved))
+            path = write_text(command.out / TRANSFER, text)
+            reporter.say(f"wrote {grasps} and {path}")
+    reporter.text(text)
+    _show(found, reporter)
+    if not found.carried:
+        return Exit.NONE
+    return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
+
+
+def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
+    center, part = command.center_of_mass_m, Path(command.part)
+    asked = flag_groups.Mesh(command.lengths, center_of_mass_m=center, limits=command.limits)
+    if part.suffix or part.is_file():  # a built-in object is as it is
+        if center is None and (kept := given_center(old)) is not None:
+            x, y, z = kept.tolist()
+            center = x, y, z
+        largest = old.surface.dropped > SMALL
+        asked = replace(asked, faces="planar", center_of_mass_m=center, largest_part=largest)
+    return load_object(command.part, asked)
+
+
+def _show(found: Transfer, reporter: Reporter) -> None:
+    order = sorted(found.grasps, key=lambda each: -CHANGES.index(each.status))
+    shown = order[:TABLE_ROWS]
+    title = f"{counted(len(order), 'grasp')} of {found.old.name} on {found.new.name}"
+    changed = {each.old for each in found.faces if each.moved or each.reshaped}
+    reporter.table(title, COLUMNS, [_row(each, changed) for each in shown])
+    say_cut(len(order), reporter)
+    reporter.say(f"{found.new.name}: {found.faces_in_words}")
+    counts = ", ".join(f"{found.count(status)} {status}" for status in CHANGES)
+    reporter.say(
+        f"{len(found.carried)} of {len(found.grasps)} grasps were carried over, with contacts "
+        f"that may move by {MM * found.distance:.4g} mm: {counts}"
+    )
+    for each in shown:
+        if each.status in BAD:
+            reporter.warn(f"{each.old.id}: {each.status}: {each.reason}")
+    if not found.carried:
+        reporter.warn("no grasp is left; plan on the changed part anew")
+
+
+def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
+    moved = turned = ABSENT
+    if all(contact.contact is not None for contact in each.contacts):
+        moved = f"{MM * max(contact.distance for contact in each.contacts):.2f}"
+        turned = f"{math.degrees(max(contact.turn for contact in each.contacts)):.2f}"
+    old, new = _figures(each.before), _figures(each.after)
+    faces = ", ".join(map(str, sorted(changed & {*each.old.faces}))) or ABSENT
+    return (each.old.id, each.status, moved, turned, old[0], new[0], old[1], new[1], faces)
+
+
+def _figures(figures: GraspFigures | None) -> tuple[str, str]:
+    if figures is None:
+        return ABSENT, ABSENT
+    return f"{figures.critical_friction:.4f}", f"{figures.ferrari_canny[0]:.4f}"

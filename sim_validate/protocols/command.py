@@ -1,0 +1,114 @@
+"""Judges grasps, or hands in them, by published tests, and shows and writes the judgements."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from operator import call
+from pathlib import Path
+
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.planning.result import Plan
+from sim_validate.closure.command import validate_file
+from sim_validate.engine.setup import Setup
+from sim_validate.hands import flags as hand_flags
+from sim_validate.hands.reach_command import reach_file
+from sim_validate.kit import command_flags, processes
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished_text, say_cut
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.result_folders import JUDGEMENTS, remove_results
+from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
+from sim_validate.protocols.judging import Judgement, judge_by, judge_hand_by
+
+COLUMNS = ("grasp", "test", "theirs", "ours", "margin", "moved mm", "deg")
+TOTALS = ("test", "grasps", "theirs passed", "ours held", "predicted", "theirs as ours")
+
+
+def judge_file(command: command_flags.Validate, reporter: Reporter) -> int:
+    """Judge the grasps of a file by the published tests that are named, or else by our own."""
+    by = partial(
+        judge_grasps, names=command.protocol, jobs=command.testing.jobs, folder=command.out,
+        reporter=reporter,
+    )  # fmt: skip
+    return validate_file(command, reporter, by if command.protocol else None)
+
+
+def judge_reach(command: hand_flags.Reach, reporter: Reporter) -> int:
+    """Look for poses of a hand in grasps, and judge them by the published tests that are named."""
+    by = partial(
+        judge_hands, names=command.protocol, jobs=command.jobs, folder=command.out,
+        reporter=reporter,
+    )  # fmt: skip
+    return reach_file(command, reporter, by if command.protocol else None)
+
+
+def judge_grasps(
+    saved: Plan, setup: Setup, *, names: Sequence[str], jobs: int, folder: Path | None,
+    reporter: Reporter,
+) -> tuple[Exit, str]:  # fmt: skip
+    """Judge grasps by tests with four fingertips; return exit code and text of judgements.json."""
+    cases = [
+        partial(judge_by, name, saved.body, grasp, saved.friction, setup=setup)
+        for name in names
+        for grasp in saved.grasps
+    ]
+    return _judged(saved, cases, jobs, folder, reporter)
+
+
+def judge_hands(
+    saved: Plan, hand: Hand, found: Sequence[HandReach], *, names: Sequence[str],
+    jobs: int, folder: Path | None, reporter: Reporter,
+) -> tuple[Exit, str]:  # fmt: skip
+    """Judge the poses of a hand by tests; return the exit code and the text of judgements.json."""
+    cases = [
+        partial(judge_hand_by, name, hand, saved.body, reach, saved.friction)
+        for name in names
+        for reach in found
+        if reach.reached
+    ]
+    return _judged(saved, cases, jobs, folder, reporter)
+
+
+def _judged(
+    saved: Plan, cases: Sequence[Callable[[], Judgement]], jobs: int, folder: Path | None,
+    reporter: Reporter,
+) -> tuple[Exit, str]:  # fmt: skip
+    if folder:
+        remove_results(folder, "judgements")
+    found = processes.each(call, cases, jobs=jobs)
+    results = reporter.counted("judging", found, len(cases), "passed", lambda one: one.theirs)
+    text_of = partial(judgements_to_json, saved.body, saved.friction)
+    done, text = finished_text(
+        results, len(cases), text_of, folder and folder / JUDGEMENTS, reporter
+    )
+    if done:
+        _show(done, reporter)
+    return (Exit.GOOD if all(one.good for one in done) else Exit.NEGATIVE), text
+
+
+def _show(judgements: Sequence[Judgement], reporter: Reporter) -> None:
+    rows = [_row(each) for each in judgements[:TABLE_ROWS]]
+    reporter.table("judged by published tests", COLUMNS, rows)
+    say_cut(len(judgements), reporter)
+    totals = [
+        (name, *map(str, counts.values()))
+        for name, counts in judgements_summary(judgements).items()
+    ]
+    reporter.table("in all", TOTALS, totals)
+    for each in judgements[:TABLE_ROWS]:
+        about = f"{each.grasp}: {each.protocol.name}"
+        for run in [run for run in each.runs if not run.passed][:1]:
+            reporter.warn(f"{about}: run {run.number}: {run.reason}")
+        if not each.ours.held:
+            reporter.warn(f"{about}: ours: {each.ours.reason}")
+
+
+def _row(each: Judgement) -> tuple[str, ...]:
+    moved = max((run.displacement_m for run in each.runs), default=0.0)
+    turned = max((run.turn_deg for run in each.runs), default=0.0)
+    margin = "no load" if math.isinf(each.ours.margin) else f"{each.ours.margin:.3g}"
+    theirs = "passed" if each.theirs else "failed"
+    return (
+        each.grasp, each.protocol.name, theirs, "held" if each.ours.held else "not held", margin,
+        f"{1e3 * moved:.2g}", f"{turned:.2g}",
+    )  # fmt: skip

@@ -1,0 +1,148 @@
+"""Runs the commands that show results: one grasp (`view`), or a run as pages (`report`)."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_text
+from grasp_core.planning.result import Plan
+from grasp_core.values import Grasp
+from scenes.drawing.clips import GraphicsError, has_display, write_clip
+from scenes.drawing.pictures import grasp_sheet
+from scenes.drawing.turntable import turntable_page
+from scenes.mujoco.closure_scene import Scene, build_scene
+from scenes.mujoco.fingertips import FingerSettings
+from sim_validate.engine.setup import with_planned_radius
+from sim_validate.kit import command_flags
+from sim_validate.kit.console import Reporter
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.result_folders import alone_in
+from sim_validate.planning.grasps_json import GRASPS, grasp_with_id, read_grasps
+from sim_validate.report.reached_grasps import held_in, why_not_held
+from sim_validate.report.report import Report, write_report
+from sim_validate.report.run_folder import folder_of, reaches_beside
+
+COMING, RESTING = 60, 20
+"""Number of clip frames in which fingers come in, and in which they then stay."""
+SWING_DEG, ELEVATION_DEG = 120.0, 25.0
+"""Angle by which the camera moves around during a clip, and its elevation [deg]."""
+
+
+def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
+    """Show a grasp in MuJoCo's viewer, or write it to the files that are asked for."""
+    path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
+    saved = read_grasps(path)
+    if not saved.grasps:
+        raise InputError(f"{path}: expected at least one grasp to show, found none")
+    grasp = grasp_with_id(path, saved, command.grasp or saved.grasps[0].id)
+    friction = saved.friction if command.friction is None else command.friction
+    if friction <= grasp.critical_friction:
+        reporter.warn(
+            f"{grasp.id} is not in force closure at friction {friction:g}: it needs more than "
+            f"{grasp.critical_friction:.4g}"
+        )
+    if command.picture is None and command.page is None and command.clip is None:
+        _in_viewer(_scene(saved, grasp, friction), grasp, reporter)
+        reporter.document({"id": grasp.id, "files": []})
+        return Exit.GOOD
+    reaches = reaches_beside(path, saved) if command.hand else None
+    held = held_in(reaches, grasp)
+    if reaches is not None and held is None:
+        reporter.warn(f"the hand is not shown: {why_not_held(reaches, grasp)}")
+    files = list[str]()
+
+    def keep(path: Path) -> None:
+        reporter.say(f"wrote {path}")
+        files.append(str(path))
+
+    if command.picture is not None:
+        sheet = grasp_sheet(saved.body, grasp, friction, legend=True, held=held)
+        keep(sheet.write(command.picture))
+    if command.page is not None:
+        keep(write_text(command.page, turntable_page(saved.body, grasp, friction, held)))
+    if command.clip is not None:
+        keep(write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip))
+    reporter.document({"id": grasp.id, "files": files})
+    return Exit.GOOD
+
+
+def _scene(saved: Plan, grasp: Grasp, friction: float) -> Scene:
+    fingers = with_planned_radius(FingerSettings(), saved.finger)
+    return build_scene(saved.body, grasp, friction, fingers=fingers)
+
+
+def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
+    if not has_display():
+        raise InputError(
+            "there is no display for MuJoCo's viewer (neither DISPLAY nor WAYLAND_DISPLAY is set): "
+            "give --picture FILE.png, --page FILE.html or --clip FILE.webp"
+        )
+    reporter.say(f"{grasp.id} in MuJoCo's viewer; load the keyframe `approach` to see it close")
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_text(Path(folder) / f"{grasp.id}.xml", scene.xml)
+        # -P: modules of the working folder are not run
+        command = [sys.executable, "-P", "-m", "mujoco.viewer", f"--mjcf={path}"]
+        # the viewer writes its log where it runs
+        ended = subprocess.run(command, cwd=folder, check=False).returncode  # noqa: S603 - MuJoCo's
+    if ended:
+        raise GraphicsError(
+            f"MuJoCo's viewer failed with exit code {ended}; show the grasp with --picture, "
+            "--page or --clip"
+        )
+
+
+def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
+    """Write a clip in which fingers come in to their contacts while the camera moves around."""
+    joints = closing(scene)
+    azimuths = np.linspace(0.0, SWING_DEG, len(joints))
+    angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])
+    return write_clip(scene, joints, path, grasp.id, angles_deg=angles)
+
+
+def closing(scene: Scene) -> Array:
+    """Return joint positions while fingertips come in along their lines and then stay."""
+    layout = scene.layout
+    away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
+    left = np.linspace(1.0, 0.0, COMING) ** 2
+    slides = np.vstack([left[:, None] * away, np.zeros((RESTING, len(away)))])
+    home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return np.column_stack([np.tile(home, (len(slides), 1)), slides])
+
+
+def report_folder(command: command_flags.Report, reporter: Reporter) -> int:
+    """Write the results of a run as pages, and print where they are."""
+    at = command.out or folder_of(command.folder)
+    with alone_in(at if command.out or at.is_dir() else None):
+        report = shown_report(command, reporter)
+    reporter.document({"report": str(report.index), "grasps": report.grasps})
+    return Exit.GOOD
+
+
+def shown_report(asked: command_flags.Report, reporter: Reporter) -> Report:
+    """Write the pages of a run, and say where they are."""
+
+    def say_ready(index: Path, drawn: int, total: int) -> None:
+        reporter.say(
+            f"report: {index} can be opened now; {drawn} of {total} cards are drawn, "
+            "the others follow"
+        )
+
+    with reporter.progress("drawing") as steps:
+        report = write_report(
+            asked.folder,
+            asked.out,
+            jobs=asked.jobs,
+            limit=asked.limit,
+            clips=asked.clips,
+            progress=steps.update,
+            ready=say_ready,
+        )
+    if report.no_clip:
+        reporter.warn(f"no clips: {report.no_clip}")
+    reporter.say(f"report: open {report.index} in a browser")
+    return report

@@ -1,0 +1,193 @@
+"""Draws one grasp: its picture and the charts of its page; any process can do the work.
+
+Charts of motion need a trial: the first that was not held, or else the weakest wrench, is simulated
+again.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import about
+from grasp_core.files.text_files import write_text
+from grasp_core.planning.result import Plan
+from grasp_core.values import ContactRegion, Grasp, four
+from scenes.drawing.clips import GraphicsError, write_trial_clip
+from scenes.drawing.hands import PosedHand
+from scenes.drawing.pictures import grasp_sheet
+from scenes.drawing.sheets import svg_of
+from scenes.drawing.views import best_view
+from scenes.mujoco.fingertips import FingerSettings
+from sim_validate.closure.replaying import Wanted, of_verdict, replayed
+from sim_validate.closure.verdict import Verdict
+from sim_validate.execution.executions_json import EXECUTIONS, Executions
+from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
+from sim_validate.kit.result_folders import CLIPS, PICTURES
+from sim_validate.report.agreement import Record
+from sim_validate.report.charts.margin_charts import margin_panels
+from sim_validate.report.charts.motion_charts import motion_panels
+from sim_validate.report.charts.wrench_charts import wrench_panels
+from sim_validate.report.reached_grasps import held_in
+from sim_validate.report.run_folder import RunFolder
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """A grasp to draw, in a form that can be sent to another process."""
+
+    saved: Plan
+    friction: float
+    verdict: Verdict | None
+    regions: Record | None
+    executions: Executions | None
+    held: PosedHand | None
+    """The hand in the grasp; None if there is none, or it does not reach the grasp."""
+    source: Path
+    """Path of the file with the verdict, which error messages name."""
+    folder: Path
+    name: str
+    clip: bool
+
+    @property
+    def grasp(self) -> Grasp:
+        """The grasp, with its certified regions if it has any."""
+        return certified(self.saved.grasps[0], self.regions)
+
+
+@dataclass(frozen=True, slots=True)
+class FilmedTrial:
+    """A clip of a trial of an execution."""
+
+    path: str
+    trial: str
+    fate: str
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A grasp's charts as SVG text, and paths of its pictures relative to the report's folder."""
+
+    picture: str
+    hand: str = ""
+    """Path of the picture with the hand in the grasp; empty if there is none."""
+    wrenches: tuple[str, ...] = ()
+    """Panels of the chart of wrenches; none if the contacts are not in force closure at this
+    friction."""
+    margins: tuple[str, ...] = ()
+    motion: tuple[str, ...] = ()
+    """Panels of the chart of motion; none if no trial was simulated."""
+    clip: str | None = None
+    trial: str = ""
+    outcome: str = ""
+    executed: tuple[FilmedTrial, ...] = ()
+    no_clip: str = ""
+    """Reason why no clip could be drawn; empty if there is a clip or none was asked for."""
+
+
+def tasks_of(
+    run: RunFolder, grasps: Sequence[Grasp], folder: Path, prefix: str, clips: int
+) -> list[Task]:
+    """List grasps of a run as tasks to draw, with clips of some, those with problems first."""
+    filmed = {each.id for each in sorted(grasps, key=lambda each: not run.alarms(each.id))[:clips]}
+    return [
+        Task(
+            saved=replace(run.saved, grasps=(grasp,), friction=run.friction),
+            friction=run.friction,
+            verdict=run.verdicts.get(grasp.id),
+            regions=run.shaded.get(grasp.id),
+            executions=None
+            if run.executions is None or (found := run.executed(grasp.id)) is None
+            else replace(run.executions, grasps=(found,)),
+            held=held_in(run.reaches, grasp),
+            source=run.verdicts_path,
+            folder=folder,
+            name=f"{prefix}{grasp.id}",
+            clip=grasp.id in filmed,
+        )
+        for grasp in grasps
+    ]
+
+
+def certified(grasp: Grasp, record: Record | None) -> Grasp:
+    """Replace the regions of a grasp by those of a record, if the record has regions."""
+    if record is None or record["regions"] is None:
+        return grasp
+    regions = [
+        ContactRegion("certified", np.array(each["polygon_m"]), each["inscribed_radius_m"])
+        for each in record["regions"]
+    ]
+    return replace(grasp, regions=four(regions))
+
+
+def draw(task: Task) -> Drawn:
+    """Draw one grasp and write its pictures and charts."""
+    body, grasp = task.saved.body, task.grasp
+    view = best_view(body, grasp)
+    path = task.folder / PICTURES / f"{task.name}.svg"
+    write_text(path, svg_of(grasp_sheet(body, grasp, task.friction, view=view), alone=True))
+    drawn = Drawn(f"{PICTURES}/{path.name}")
+    if task.held is not None:
+        path = task.folder / PICTURES / f"{task.name}-hand.svg"
+        sheet = grasp_sheet(body, grasp, task.friction, held=task.held)
+        write_text(path, svg_of(sheet, alone=True))
+        drawn = replace(drawn, hand=f"{PICTURES}/{path.name}")
+    if force_closure(grasp, friction=task.friction).closed:
+        largest = largest_push(task.verdict)
+        wrenches = wrench_panels(body, grasp, task.friction, view=view)
+        margins = margin_panels(body, grasp, task.friction, max_normal_force_n=largest)
+        drawn = replace(
+            drawn, wrenches=tuple(map(svg_of, wrenches)), margins=tuple(map(svg_of, margins))
+        )
+    if task.verdict is not None:
+        drawn = _with_motion(task, task.verdict, drawn)
+    return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
+
+
+def _with_motion(task: Task, verdict: Verdict, drawn: Drawn) -> Drawn:
+    recorded = of_verdict(task.source, task.saved, verdict, Wanted(task.saved.grasps[0].id))
+    found = replayed(recorded)
+    size = found.scene.layout.grasp_size_m
+    panels = motion_panels(found, recorded.setup.hold.hold_threshold * size)
+    drawn = replace(
+        drawn, motion=tuple(map(svg_of, panels)), trial=found.name, outcome=found.hold.outcome.value
+    )
+    if not task.clip:
+        return drawn
+    path = task.folder / CLIPS / f"{task.name}.webp"
+    name = f"{found.name}: {drawn.outcome}"
+    try:
+        write_trial_clip(found.scene, found.watched.joints, path, name)
+    except GraphicsError as error:
+        return replace(drawn, no_clip=str(error))
+    return replace(drawn, clip=f"{CLIPS}/{path.name}")
+
+
+def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
+    (found,) = executions.grasps
+    if found.execution is None:
+        return drawn
+    used = found.execution.physics
+    job = ExecutionJob(
+        task.saved.body, task.saved.grasps[0], executions.friction, executions.settings,
+        {} if used is None else asdict(used),
+    )  # fmt: skip
+    filmed = list[FilmedTrial]()
+    for place, trial in enumerate(worth_seeing(found.execution)):
+        path = task.folder / CLIPS / f"{task.name}-executed-{place}.webp"
+        try:
+            with about(f"{task.source.with_name(EXECUTIONS)}: {found.id}"):
+                film(job, trial.name, path)
+        except GraphicsError as error:
+            return replace(drawn, no_clip=str(error))
+        filmed.append(FilmedTrial(f"{CLIPS}/{path.name}", trial.name, trial.fate))
+    return replace(drawn, executed=tuple(filmed))
+
+
+def largest_push(verdict: Verdict | None) -> float:
+    """Look up the largest normal force that each finger may apply [N]."""
+    if verdict is None:
+        return FingerSettings().max_normal_force_n
+    return verdict.setup.fingers.max_normal_force_n

@@ -1,4 +1,0 @@
-"""How are the results of a run shown to people?
-
-Modules here turn the folder of a run into charts, and into pages that a browser opens from disk.
-"""

@@ -1,0 +1,262 @@
+from dataclasses import asdict
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from scenes.mujoco.layout import SQUEEZE, TOUCH, arrange, grasp_size
+from scenes.mujoco.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
+
+OBJECTS = ("wedge", "icosahedron", "screwdriver")
+
+
+@pytest.fixture(params=OBJECTS, scope="module")
+def held(request):
+    body = scenes.example_object(request.param)
+    grasp = gc.plan(body, 0.5, limit=1, cones="normal").grasps[0]
+    scene = scenes.build_scene(body, grasp, 0.5)
+    return body, grasp, scene, mujoco.MjModel.from_xml_string(scene.xml)
+
+
+def test_every_setting_reaches_the_compiled_model(held):
+    _, _, scene, model = held
+    names = {
+        "Newton": mujoco.mjtSolver.mjSOL_NEWTON,
+        "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC,
+        "dense": mujoco.mjtJacobian.mjJAC_DENSE,
+        "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
+    }
+    options = scene.physics.options()
+    mujocos = {
+        name for name in dir(model.opt) if not name.startswith(("_", "o_", "disable", "enable"))
+    }
+    assert set(options) == mujocos
+    for name, value in options.items():
+        expected = int(names[value]) if isinstance(value, str) else value
+        np.testing.assert_array_equal(getattr(model.opt, name), expected, err_msg=name)
+        assert f'{name}="' in scene.xml
+    touching = [i for i in range(model.ngeom) if model.geom_contype[i] or model.geom_conaffinity[i]]
+    assert len(touching) == 8
+    for geom in touching:
+        np.testing.assert_array_equal(model.geom_solref[geom], scene.physics.solref)
+        np.testing.assert_array_equal(model.geom_solimp[geom], scene.physics.solimp)
+        assert model.geom_condim[geom] == 3
+        assert model.geom_margin[geom] == model.geom_gap[geom] == 0.0
+        assert model.geom_friction[geom, 0] == 0.5
+
+
+def test_all_flags_are_written_and_only_three_are_off_that_are_on_elsewhere(held):
+    _, _, scene, model = held
+    for name in (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS):
+        assert f'{name}="' in scene.xml
+    off = mujoco.mjtDisableBit
+    assert model.opt.disableflags == off.mjDSBL_AUTORESET | off.mjDSBL_MIDPHASE | off.mjDSBL_ISLAND
+    assert model.opt.enableflags == 0
+
+
+def test_the_flags_are_all_that_mujoco_has():
+    bits = [
+        name for kind in (mujoco.mjtDisableBit, mujoco.mjtEnableBit) for name in kind.__members__
+    ]
+    ours = {name.upper() for name in (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS)}
+    theirs = {name.split("_")[1] for name in bits if not name.startswith("mjN")}
+    assert ours == theirs
+
+
+def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(held):
+    body, grasp, scene, model = held
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
+    mujoco.mj_kinematics(model, data)
+    for finger, contact in enumerate(grasp.contacts):
+        tip = data.geom(f"finger{finger}")
+        height = scene.layout.drive.radius_m - TOUCH * scene.layout.grasp_size_m
+        touch = tip.xpos + height * contact.normal
+        rounded = 1e-9 * body.radius
+        np.testing.assert_allclose(touch, contact.position - body.center_of_mass, atol=rounded)
+        pad = data.geom(f"pad{finger}")
+        outward = pad.xmat.reshape(3, 3)[:, 2]
+        np.testing.assert_allclose(outward, -contact.normal, atol=2e-9)
+        np.testing.assert_allclose(outward, -scene.layout.frames[finger, :, 0], atol=1e-14)
+        top = pad.xpos + outward * model.geom(f"pad{finger}").size[2]
+        tip_top = tip.xpos - height * outward
+        assert abs((tip_top - top) @ outward) < 1e-15
+
+
+def test_each_finger_meets_its_own_pad_only(held):
+    _, _, scene, model = held
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
+    data.qpos[7::3] += 1e-5 - TOUCH * scene.layout.grasp_size_m
+    mujoco.mj_forward(model, data)
+    pairs = {
+        tuple(sorted(model.geom(int(g)).name for g in (c.geom1, c.geom2))) for c in data.contact
+    }
+    assert pairs == {(f"finger{i}", f"pad{i}") for i in range(4)}
+    assert all(c.dist == pytest.approx(-1e-5, rel=1e-6) for c in data.contact)
+
+
+@pytest.mark.parametrize("scale", [0.01, 0.03, 1.0, 7.0, 20.0])
+@pytest.mark.parametrize("name", ["l-bracket", "octahedron", "wedge"])
+def test_all_fingertips_touch_from_the_first_step(name, scale):
+    """If they were put exactly onto their faces, rounding would decide which of them do."""
+    example = scenes.example_object(name)
+    body = gc.Polyhedron.from_mesh(scale * example.vertices, example.triangles, name=name)
+    scene = scenes.build_scene(body, gc.plan(body, 0.5, limit=1).grasps[0], 0.5)
+    model = mujoco.MjModel.from_xml_string(scene.xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 4
+    depth = TOUCH * scene.layout.grasp_size_m
+    assert all(c.dist == pytest.approx(-depth, rel=1e-3) for c in data.contact)
+
+
+def test_approach_starts_clear_and_ends_in_a_grasp(held):
+    _, _, scene, model = held
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("approach").id)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    mujoco.mj_step(model, data, nstep=1500)
+    assert data.ncon == 4
+    assert np.linalg.norm(data.qpos[:3]) < 0.02 * scene.layout.radius_m
+    assert np.abs(data.qvel).max() < 1e-3
+
+
+def after(model, key, steps):
+    """The state some steps after a keyframe, and the largest push of a fingertip [N]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
+    mujoco.mj_step(model, data, nstep=steps)
+    forces = np.zeros((data.ncon, 6))
+    for number, force in enumerate(forces):
+        mujoco.mj_contactForce(model, data, number, force)
+    return data, forces[:, 0].max(initial=0.0)
+
+
+def test_before_the_grasp_fingers_stay_where_they_come_from(held):
+    _, _, scene, model = held
+    (start, _), (later, _) = after(model, "pregrasp", 0), after(model, "pregrasp", 1500)
+    np.testing.assert_array_equal(start.qpos, model.key("approach").qpos)
+    assert start.ncon == later.ncon == 0
+    np.testing.assert_allclose(later.qpos, start.qpos, atol=1e-9 * scene.layout.radius_m)
+
+
+def test_fingers_push_as_hard_as_their_keyframe_says(held):
+    """A servo loses its stiffness times what its finger moves until the contact carries it; and as
+    the object turns, a share of the tangential force, at most `friction` of the push, is normal."""
+    _, _, scene, model = held
+    most = scene.layout.drive.max_normal_force_n
+    assert {model.key(i).name for i in range(model.nkey)} == {
+        "pregrasp", "approach", "grasp", "squeeze",
+    }  # fmt: skip
+    for key, share in (("grasp", SQUEEZE), ("squeeze", 1.0)):
+        data, push = after(model, key, 1500)
+        assert data.ncon == 4
+        moved = np.linalg.norm(data.qpos[7:].reshape(4, 3), axis=1).max()
+        turned = 2.0 * np.linalg.norm(data.qpos[4:7])
+        lost = scene.layout.drive.stiffness_n_per_m * moved + 0.5 * most * turned
+        assert lost < 0.05 * most
+        assert push == pytest.approx(share * most, abs=lost)
+        assert np.linalg.norm(data.qpos[:3]) < 1e-3 * scene.layout.radius_m
+
+
+def test_the_last_digits_of_contacts_do_not_change_the_text(held):
+    """Other machines plan the same contacts with other last digits."""
+    body, grasp, scene, _ = held
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        contacts = [
+            gc.Contact(
+                contact.position + 1e-15 * body.radius * rng.normal(size=3),
+                contact.normal + 1e-16 * rng.normal(size=3),
+            )
+            for contact in grasp.contacts
+        ]
+        assert (
+            scenes.build_scene(body, contacts, 0.5).xml.split("<keyframe>")[0]
+            == (scene.xml.split("<keyframe>")[0])
+        )
+
+
+def test_the_text_is_the_same_for_the_same_grasp_and_can_be_written(held, tmp_path):
+    body, grasp, scene, _ = held
+    assert scenes.build_scene(body, grasp, 0.5).xml == scene.xml
+    path = scenes.write_scene(scene, tmp_path / "scene.xml")
+    assert mujoco.MjModel.from_xml_path(str(path)).nv == 18
+
+
+def test_an_odd_object_name_still_makes_a_scene():
+    base = scenes.example_object("tetrahedron")
+    body = gc.Polyhedron.from_mesh(base.vertices, base.triangles, name='<b>"&\n\x1b[0m')
+    grasp = gc.plan(body).grasps[0]
+    mujoco.MjModel.from_xml_string(scenes.build_scene(body, grasp).xml)
+
+
+def test_similar_grasps_are_driven_alike():
+    """Lengths scale, forces stay: mass and stiffness scale inversely, damping inversely too."""
+    base = scenes.example_object("wedge")
+    large = gc.Polyhedron.from_mesh(3.0 * base.vertices, base.triangles)
+    drives = []
+    for body in (base, large):
+        layout = arrange(body, gc.plan(body, limit=1).grasps[0], 0.5)
+        drives.append((layout.grasp_size_m, layout.mass_kg, asdict(layout.drive)))
+    (size, mass, drive), (size3, mass3, drive3) = drives
+    assert size3 == pytest.approx(3 * size, rel=1e-6)
+    assert mass3 == pytest.approx(mass / 3, rel=1e-6)
+    assert drive3["stiffness_n_per_m"] == pytest.approx(drive["stiffness_n_per_m"] / 3, rel=1e-6)
+    assert drive3["max_normal_force_n"] == drive["max_normal_force_n"]
+
+
+def test_grasp_size_is_the_lever_about_the_nearest_axis():
+    bar = np.array([[-5.0, 1, 0], [-5, -1, 0], [5, 0, 1], [5, 0, -1]])
+    assert grasp_size(bar) == pytest.approx(1.0)
+    assert grasp_size(bar + 7.0) == pytest.approx(1.0)
+
+
+def test_the_mesh_of_a_convex_object_can_stand_in_for_the_pads(held):
+    """Each fingertip then touches the mesh where it would touch its pad, and along the normal."""
+    body, grasp, scene, _ = held
+    if body.name == "screwdriver":
+        with pytest.raises(gc.InputError, match="not convex"):
+            scenes.build_scene(body, grasp, 0.5, surface="mesh")
+        return
+    model = mujoco.MjModel.from_xml_string(scenes.build_scene(body, grasp, 0.5, surface="mesh").xml)
+    data = mujoco.MjData(model)
+    data.qpos[7::3] += 1e-5
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 4
+    normals = np.array([contact.normal for contact in grasp.contacts])
+    for contact in data.contact:
+        assert {model.geom(int(g)).name for g in contact.geom} & {"object"}
+        assert contact.dist == pytest.approx(-1e-5, abs=2e-8)
+        assert np.abs(normals @ contact.frame[:3]).max() == pytest.approx(1.0, abs=1e-9)
+    assert scene.surface == "pads"
+
+
+def test_rigid_fingertips_have_no_joints_and_stand_where_they_are_put(held):
+    body, grasp, scene, _ = held
+    fingers = scenes.FingerSettings(drive="rigid", indentation=1e-4)
+    rigid = scenes.build_scene(body, grasp, 0.5, fingers=fingers)
+    model = mujoco.MjModel.from_xml_string(rigid.xml)
+    assert (model.nv, model.nu, model.nkey) == (6, 0, 0)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    depth = 1e-4 * scene.layout.grasp_size_m
+    assert data.ncon == 4
+    assert all(c.dist == pytest.approx(-depth, rel=1e-6) for c in data.contact)
+
+
+def test_coplanar_and_symmetric_contacts_make_scenes_that_load():
+    """Moments of inertia of coplanar contacts are the limit of what a body can have."""
+    body = scenes.example_object("box")
+    for z in (0.0, 0.01):
+        contacts = [gc.Contact([s * 0.05, 0.0, z], [-s, 0.0, 0.0]) for s in (1.0, -1.0)] + [
+            gc.Contact([0.0, s * 0.035, -z], [0.0, -s, 0.0]) for s in (1.0, -1.0)
+        ]
+        scene = scenes.build_scene(body, contacts, 0.5)
+        model = mujoco.MjModel.from_xml_string(scene.xml)
+        assert model.body("object").inertia.min() > 0.0

@@ -1,0 +1,112 @@
+"""The scene of a hand is the hand: its places, limits and masses, and nothing touches but tips."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from grasp_core.errors import InputError
+from grasp_core.hands.kinematics import places
+from scenes.mujoco.hand_scene import squeezing
+from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+
+WRITTEN = 2e-8
+"""Scenes have nine digits of each number; a chain adds up their roundings."""
+HEAVY = 1e-7
+"""A hand's weight of some newtons, moved by as much."""
+DOWN = (0.0, 0.6, -0.8)
+
+
+def stood(hand, down=None):
+    """A scene, its compiled model, and the pose it was made from."""
+    body = scaled("dodecahedron", 0.035)
+    reach = next(each for each in reaches(hand, "dodecahedron", 0.035) if each.reached)
+    held = gc.load_hand(hand).with_torque_limits(0.35, "a test")
+    scene = scenes.build_hand_scene(held, body, reach, FRICTION, down=down)
+    model = mujoco.MjModel.from_xml_string(scene.xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return held, body, reach, scene, model, data
+
+
+@pytest.mark.parametrize("hand", ["allegro", "leap"])
+def test_links_and_tips_are_where_the_hand_has_them(hand):
+    held, body, reach, scene, _, data = stood(hand)
+    at = places(held, scene.layout.joints, reach.palm_pose)
+    for k, link in enumerate(held.links):
+        body_at = data.body(link.name)
+        expected = at.link_positions[0, k] - body.center_of_mass
+        assert body_at.xpos == pytest.approx(expected, abs=WRITTEN)
+        assert body_at.xmat.reshape(3, 3) == pytest.approx(at.link_rotations[0, k], abs=WRITTEN)
+    for contact, finger in enumerate(reach.fingers):
+        name = held.fingers[finger].name
+        tip = data.geom(f"tip_{name}").xpos
+        assert tip == pytest.approx(scene.layout.tip_centers[contact], abs=WRITTEN)
+        there = reach.contacts[contact]
+        touched = tip + held.fingers[finger].tip.radius * there.normal
+        assert touched == pytest.approx(there.position - body.center_of_mass, abs=2e-5)
+    # the pose is only moved as far as fingertips were off their faces
+    assert np.abs(scene.layout.joints - reach.joints).max() < 1e-3
+
+
+@pytest.mark.parametrize("hand", ["allegro", "leap"])
+def test_only_fingertips_touch_and_each_its_own_pad(hand):
+    *_, model, data = stood(hand)
+    touching = [frozenset(model.geom(int(g)).name for g in c.geom) for c in data.contact]
+    assert len(touching) == 4
+    tips = {name for pair in touching for name in pair if name.startswith("tip_")}
+    pads = {name for pair in touching for name in pair if name.startswith("pad")}
+    assert len(tips) == len(pads) == 4
+    depths = [-c.dist for c in data.contact]
+    assert min(depths) > 0.0
+    assert max(depths) < 1e-6
+
+
+@pytest.mark.parametrize("hand", ["allegro", "leap"])
+def test_commands_turn_into_joint_torques_and_limits_hold(hand):
+    *_, scene, model, data = stood(hand)
+    layout = scene.layout
+    forces = np.random.default_rng(0).normal(size=(1, 4, 3))
+    data.ctrl[:] = layout.commands(forces)[0]
+    mujoco.mj_forward(model, data)
+    torques = layout.motors.levers @ forces.ravel()
+    assert torques == pytest.approx(data.qfrc_actuator[6:], abs=1e-8)
+    data.ctrl[:] = layout.commands(1e3 * forces)[0]
+    mujoco.mj_forward(model, data)
+    large = np.abs(1e3 * torques) > 0.35
+    assert large.sum() > 8
+    assert np.abs(data.qfrc_actuator[6:])[large] == pytest.approx(0.35)
+
+
+def test_gravity_pulls_at_links_as_the_motors_say_and_not_at_the_object():
+    *_, scene, model, data = stood("leap", DOWN)
+    mujoco.mj_forward(model, data)
+    assert np.linalg.norm(model.opt.gravity) == pytest.approx(9.80665, abs=1e-6)
+    # what holds a body still is the bias force less what compensates gravity
+    held = data.qfrc_bias - data.qfrc_gravcomp
+    assert held[:6] == pytest.approx(np.zeros(6), abs=1e-12)
+    assert held[6:] == pytest.approx(scene.layout.motors.gravity, abs=HEAVY)
+    assert np.abs(held[6:]).max() > 1e-3
+
+
+def test_a_squeeze_goes_as_far_as_motors_do():
+    layout = stood("leap", DOWN)[3].layout
+    most = squeezing(layout.motors, layout.squeeze_forces)
+    shares = np.abs(layout.motors.torques(most)) / layout.motors.limits
+    assert shares.max() == pytest.approx(1.0)
+
+
+def test_what_makes_no_scene_is_refused():
+    _, body, reach, *_ = stood("allegro")
+    with pytest.raises(InputError, match="must have a torque limit"):
+        scenes.build_hand_scene(gc.load_hand("allegro"), body, reach, FRICTION)
+    other = gc.load_hand("leap").with_torque_limits(0.35, "a test")
+    with pytest.raises(InputError, match="hand must be the one of the pose"):
+        scenes.build_hand_scene(other, body, reach, FRICTION)
+
+
+def test_a_written_scene_is_its_text(tmp_path):
+    scene = stood("allegro")[3]
+    path = scenes.write_scene(scene, tmp_path / "hand.xml")
+    assert path.read_text() == scene.xml

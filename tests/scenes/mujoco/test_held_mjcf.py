@@ -1,0 +1,168 @@
+"""Scenes of execution as the simulator compiles them, against their layouts."""
+
+from dataclasses import replace
+from functools import cache
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from grasp_core.forces.contact_forces import even_forces
+from scenes.mujoco.held_mjcf import FINGERTIPS, PALM, TABLE, held_physics, palm_armature
+
+OBJECTS = ("dodecahedron", "l-bracket")
+MASS = 0.4
+FRICTION = (0.3, 0.5, 0.7, 0.9)
+
+
+@cache
+def held(name):
+    body = scenes.example_object(name)
+    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
+    squeeze = 8.0 * even_forces(grasp.positions, grasp.normals, 0.3)
+    stiffness = np.array([np.diag([1000.0, 2000.0, 4000.0])] * 3 + [3000.0 * np.eye(3)])
+    grip = gc.grip(body, grasp, FRICTION, squeeze, stiffness=stiffness, tip_radius_m=0.004)
+    scene = scenes.build_held_scene(
+        body, grip, MASS, settings=scenes.HeldSettings(tip_mass_kg=0.02, damping_ratio=0.7)
+    )
+    return body, grip, scene, mujoco.MjModel.from_xml_string(scene.xml)
+
+
+@pytest.fixture(params=OBJECTS, scope="module")
+def built(request):
+    return held(request.param)
+
+
+def rest_of(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def test_the_object_has_its_true_mass_and_inertia(built):
+    body, _, _, model = built
+    place = model.body("object").id
+    assert model.body_mass[place] == pytest.approx(MASS, rel=1e-12)
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.body_iquat[place])
+    R = turn.reshape(3, 3)
+    inertia = R @ np.diag(model.body_inertia[place]) @ R.T
+    expected = MASS / body.volume * body.inertia
+    assert inertia == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+    assert model.body_ipos[place] == pytest.approx(np.zeros(3))
+
+
+def test_what_touches_what(built):
+    """Fingertips touch the surface and the table the hull; nothing else touches."""
+    _, grip, _, model = built
+    pairs = set()
+    for one in range(model.ngeom):
+        for other in range(one + 1, model.ngeom):
+            if (model.geom_contype[one] & model.geom_conaffinity[other]) or (
+                model.geom_contype[other] & model.geom_conaffinity[one]
+            ):
+                kinds = (model.geom(one).name, model.geom(other).name)
+                pairs.add(tuple(sorted(kind.rstrip("0123456789") for kind in kinds)))
+    assert pairs == {("finger", "surface"), ("object", "table")}
+    assert FINGERTIPS & TABLE == 0
+    for finger, friction in enumerate(grip.friction):
+        assert model.geom(f"finger{finger}").friction[0] == friction
+    assert model.geom("object").friction[0] == 0.0
+
+
+def test_fingertips_start_on_their_contacts(built):
+    body, grip, _, model = built
+    data = rest_of(model)
+    for finger in range(4):
+        center = data.geom(f"finger{finger}").xpos
+        assert center + 0.004 * grip.normals[finger] == pytest.approx(
+            grip.arms[finger], abs=3e-6 * body.radius
+        )
+    touched = {c.geom1 for c in data.contact} | {c.geom2 for c in data.contact}
+    assert {model.geom(f"finger{finger}").id for finger in range(4)} <= touched
+
+
+def test_springs_are_those_of_the_grip(built):
+    """The force that moves a tip back, over its displacement along the world's axes."""
+    _, grip, _, model = built
+    for finger in range(4):
+        measured = np.zeros((3, 3))
+        data = rest_of(model)
+        data.ctrl[:] = 0.0
+        mujoco.mj_forward(model, data)
+        turn = data.body(f"finger{finger}").xmat.reshape(3, 3)
+        place = 13 + 3 * finger
+        for axis in range(3):
+            data.qpos[place : place + 3] = turn.T @ (1e-3 * np.eye(3)[axis])
+            mujoco.mj_forward(model, data)
+            force = data.qfrc_actuator[12 + 3 * finger : 15 + 3 * finger]
+            measured[:, axis] = -(turn @ force) / 1e-3
+        assert measured == pytest.approx(grip.stiffness[finger], abs=1e-5 * 4000.0)
+
+
+def test_the_keyframe_commands_the_squeeze(built):
+    _, grip, _, model = built
+    data = rest_of(model)
+    for finger in range(4):
+        turn = data.body(f"finger{finger}").xmat.reshape(3, 3)
+        force = turn @ data.qfrc_actuator[12 + 3 * finger : 15 + 3 * finger]
+        assert force == pytest.approx(grip.squeeze[finger], abs=1e-6 * 8.0)
+
+
+def test_dampers_have_the_stated_ratio(built):
+    """The damping ratio of a quarter of the object with a tip on each spring."""
+    _, _, scene, model = built
+    k = model.actuator_gainprm[:, 0]
+    c = -model.actuator_biasprm[:, 2]
+    assert c / (2.0 * np.sqrt(k * (MASS / 4 + 0.02))) == pytest.approx(0.7)
+    assert scene.layout.damping.ravel() == pytest.approx(c)
+
+
+def test_what_the_palm_carries_does_not_move_it(built):
+    _, _, scene, model = built
+    for joint, armature in zip(PALM, palm_armature(scene.layout), strict=True):
+        assert model.dof_armature[model.joint(f"palm_{joint}").dofadr[0]] == armature
+    carried = MASS + 4 * 0.02
+    assert palm_armature(scene.layout)[:3].min() > 1e6 * carried
+
+
+def test_gravity_pulls_the_object_alone(built):
+    """Fingers and palm are carried: their joints feel no weight at rest."""
+    _, _, scene, model = built
+    data = rest_of(model)
+    assert scene.layout.gravity == pytest.approx([0, 0, -9.80665])
+    weights = data.qfrc_bias - data.qfrc_gravcomp
+    assert weights[:3] == pytest.approx(-MASS * scene.layout.gravity)
+    assert weights[6:] == pytest.approx(np.zeros(len(weights) - 6), abs=1e-9)
+
+
+def test_gravity_has_its_size_in_any_direction():
+    hand = scenes.HeldSettings(down=(3.0, 0.0, 4.0))
+    assert hand.gravity == pytest.approx([0.6 * 9.80665, 0.0, 0.8 * 9.80665])
+    body, grip, _, _ = held("dodecahedron")
+    tilted = scenes.build_held_scene(body, grip, MASS, settings=hand)
+    assert tilted.physics.gravity == tuple(hand.gravity)
+    with pytest.raises(gc.InputError, match=r"physics\.gravity"):
+        scenes.build_held_scene(body, grip, MASS, physics=tilted.physics)
+    own = replace(held_physics(tilted.layout), timestep=0.001)
+    assert scenes.build_held_scene(body, grip, MASS, settings=hand, physics=own).physics is own
+
+
+def test_a_scene_is_written_as_it_is(tmp_path):
+    _, _, scene, _ = held("l-bracket")
+    path = scenes.write_scene(scene, tmp_path / "held.xml")
+    assert path.read_text() == scene.xml
+    assert mujoco.MjModel.from_xml_path(str(path)).nu == 12
+
+
+def test_the_surface_is_there_as_far_as_asked():
+    body, grip, whole, _ = held("mug")
+    near = scenes.build_held_scene(body, grip, MASS, reach_m=0.1 * body.radius)
+    assert 0 < len(near.layout.solids) < len(whole.layout.solids)
+    kept = {corners.tobytes() for corners in whole.layout.solids}
+    assert kept > {corners.tobytes() for corners in near.layout.solids}
+    with pytest.raises(gc.InputError, match="reach_m"):
+        scenes.build_held_scene(body, grip, MASS, reach_m=0.0)

@@ -1,0 +1,70 @@
+"""Numbers, names and rotations as MJCF text."""
+
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pytest
+
+from scenes.mujoco.mjcf_text import (
+    add_comment,
+    add_element,
+    as_text,
+    document,
+    element,
+    printable,
+    quaternion,
+)
+from tests.judges import random_rotation
+
+
+def half_turns():
+    """Turns by 180 degrees about axes, where the scalar part is zero."""
+    return [np.diag([1.0, -1, -1]), np.diag([-1.0, 1, -1]), np.diag([-1.0, -1, 1]), np.eye(3)]
+
+
+def test_quaternions_are_those_of_mujoco():
+    rng = np.random.default_rng(0)
+    for rotation in [*half_turns(), *(random_rotation(rng) for _ in range(100))]:
+        found = quaternion(rotation)
+        assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-15)
+        assert found[np.abs(found).argmax()] > 0.0
+        back = np.zeros(9)
+        mujoco.mju_quat2Mat(back, found)
+        assert back.reshape(3, 3) == pytest.approx(rotation, abs=1e-14)
+
+
+def test_numbers_are_written_in_full():
+    values = [0.1, 1.0 / 3.0, -1e-300, 2.0**60]
+    assert [float(part) for part in as_text(np.array(values)).split()] == values
+    assert as_text(3) == "3"
+    assert as_text("a b") == "a b"
+    assert as_text([[1, 2], [3, 4]]) == "1 2 3 4"
+
+
+def test_the_text_is_that_of_xml_etree():
+    root, judge = element("a", {"name": 'x&y<z>"'}), ElementTree.Element("a", name='x&y<z>"')
+    for parent, other in (
+        (root, judge),
+        (add_element(root, "b", {}), ElementTree.SubElement(judge, "b")),
+    ):
+        add_comment(parent, "for people")
+        other.append(ElementTree.Comment(" for people "))
+        add_element(parent, "c", {"size": 0.1, "axis": (1.0, 0.0, 0.0)})
+        ElementTree.SubElement(other, "c", size="0.1", axis="1.0 0.0 0.0")
+    ElementTree.indent(judge)
+    assert document(root) == ElementTree.tostring(judge, encoding="unicode") + "\n"
+
+
+def test_many_numbers_are_written_like_few():
+    numbers = np.random.default_rng(0).normal(size=(60, 3))
+    rows = [as_text(row) for row in numbers]
+    for _ in range(2):
+        assert as_text(numbers) == as_text(numbers.T.copy().T) == " ".join(rows)
+    assert as_text(np.arange(90)) == " ".join(map(str, range(90)))
+
+
+def test_names_can_be_printed():
+    assert printable("a\n\x00b") == "a__b"
+    assert printable("") == "object"
+    assert printable("Äpfel 3") == "Äpfel 3"

@@ -1,0 +1,146 @@
+"""What fingertips can touch, against the object's mesh itself.
+
+The judge is the winding number of the mesh around a point: one inside, zero outside.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import grasp_core as gc
+import scenes
+from grasp_core.compiled import compiled
+from scenes.mujoco.surface import touched_solids
+from tests.scenes.meshes import dented_ball
+
+NEAR = 1e-6
+"""How far beside the surface points are asked for, in object radii."""
+EVERYWHERE = 10.0
+
+
+def thin_bracket():
+    """an L of 100 mm, 0.5 mm thin, whose faces are much wider than it is thick."""
+    outline = np.array([[0, 0], [100, 0], [100, 40], [40, 40], [40, 100], [0, 100]]) / 1000.0
+    flat = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
+    low, high = (np.column_stack([outline, np.full(6, z)]) for z in (0.0, 0.0005))
+    i, j = np.arange(6), (np.arange(6) + 1) % 6
+    walls = np.vstack([np.column_stack([i, j, j + 6]), np.column_stack([i, j + 6, i + 6])])
+    triangles = np.vstack([flat[:, ::-1], flat + 6, walls])
+    return gc.Polyhedron.from_mesh(np.vstack([low, high]), triangles, name="thin bracket")
+
+
+MADE = {"thin bracket": thin_bracket, "dented ball": dented_ball}
+OBJECTS = ("l-bracket", "hex-nut", "mug", *MADE)
+
+
+@cache
+def body_of(name):
+    return MADE[name]() if name in MADE else scenes.example_object(name)
+
+
+@cache
+def solids_of(name):
+    body = body_of(name)
+    return touched_solids(body, np.zeros((1, 3)), EVERYWHERE * body.radius)
+
+
+@cache
+def sides_of(name):
+    """Planes of each solid: unit normals outwards and offsets, [(m, 4)]."""
+    return [ConvexHull(corners / body_of(name).radius).equations for corners in solids_of(name)]
+
+
+def winding_numbers(body, points):
+    """How often the surface winds around each point: the sum of its triangles' solid angles."""
+    corners = body.vertices[body.triangles] - body.center_of_mass
+    a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
+    x, y, z = (np.linalg.norm(side, axis=2) for side in (a, b, c))
+    volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
+    dot = [np.einsum("pti,pti->pt", *pair) for pair in ((a, b), (b, c), (c, a))]
+    along = x * y * z + dot[0] * z + dot[1] * x + dot[2] * y
+    return np.arctan2(volume, along).sum(axis=1) / (2.0 * np.pi)
+
+
+def points_on(body, count, rng):
+    """Points spread over the surface, and the outward normals there."""
+    corners = body.vertices[body.triangles] - body.center_of_mass
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    chosen = rng.choice(len(areas), count, p=areas / areas.sum())
+    weights = rng.dirichlet(np.ones(3), count)
+    points = np.einsum("pk,pki->pi", weights, corners[chosen])
+    return points, normals[chosen] / areas[chosen, None]
+
+
+def in_solids(name, points):
+    """How many solids hold each point."""
+    scaled = points / body_of(name).radius
+    inside = [(scaled @ sides[:, :3].T + sides[:, 3]).max(axis=1) < 0.0 for sides in sides_of(name)]
+    return np.sum(inside, axis=0)
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_the_judge_knows_inside_and_outside(name):
+    body = body_of(name)
+    points, normals = points_on(body, 200, np.random.default_rng(0))
+    aside = NEAR * body.radius * normals
+    np.testing.assert_allclose(winding_numbers(body, points - aside), 1.0, atol=1e-4)
+    np.testing.assert_allclose(winding_numbers(body, points + aside), 0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_no_solid_sticks_out_of_the_object(name):
+    """Every mixture of a solid's corners is in the object. Points come from near the base, from
+    its edges and from near the apex; all are drawn towards the solid's middle by 1 %."""
+    body, rng = body_of(name), np.random.default_rng(1)
+    found = 0
+    for corners in solids_of(name):
+        weights = np.vstack(
+            [rng.dirichlet(np.full(len(corners), 0.3), 20), np.eye(len(corners))[-1:]]
+        )
+        points = 0.99 * weights @ corners + 0.01 * corners.mean(axis=0)
+        assert winding_numbers(body, points) == pytest.approx(1.0, abs=1e-4)
+        found += len(points)
+    assert found > 20 * len(body.faces)
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_the_surface_is_the_outer_side_of_solids(name):
+    """Points just below the surface are in a solid, and points just above it in none."""
+    body = body_of(name)
+    points, normals = points_on(body, 500, np.random.default_rng(2))
+    aside = NEAR * body.radius * normals
+    assert not in_solids(name, points + aside).any()
+    # a pyramid is thinner than this only on a strip along its edges
+    assert np.mean(in_solids(name, points - aside) > 0) > 0.99
+
+
+def test_a_convex_object_is_its_own_solid():
+    body = scenes.example_object("dodecahedron")
+    (corners,) = touched_solids(body, np.zeros((1, 3)), 0.0)
+    np.testing.assert_array_equal(corners, body.vertices - body.center_of_mass)
+
+
+def test_only_what_is_within_reach_is_there():
+    """The points of left-out pieces are farther from the contact than the reach."""
+    body, name = body_of("mug"), "mug"
+    (contact,), _ = points_on(body, 1, np.random.default_rng(3))
+    reach = 0.3 * body.radius
+    near = touched_solids(body, contact[None], reach)
+    kept = {corners.tobytes() for corners in near}
+    left = [corners for corners in solids_of(name) if corners.tobytes() not in kept]
+    assert 0 < len(near) < len(solids_of(name)) == len(near) + len(left)
+    rng = np.random.default_rng(4)
+    for corners in left:
+        points = rng.dirichlet(np.ones(len(corners) - 1), 50) @ corners[:-1]
+        assert np.linalg.norm(points - contact, axis=1).min() > reach
+
+
+def test_a_pyramid_below_a_flat_sheet_is_as_deep_as_it_may_be():
+    """Nothing is near it but the triangles of its own plane."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    sheet, below = square[np.array([[0, 1, 2], [0, 2, 3]])], np.array([0.0, 0.0, -1.0])
+    kernel = compiled("scenes.mujoco.clearance_kernel")
+    assert kernel.clear_depth(square, below, 0.05, sheet, np.arange(2), 1e-9) == 0.05

@@ -1,0 +1,179 @@
+"""Scenes of other tools' tests have the mass that is asked for, and commands that squeeze."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.mujoco.fingertips import FingerSettings
+from scenes.mujoco.physics import PhysicsSettings
+from scenes.mujoco.tested import (
+    HandServos,
+    Postures,
+    Weld,
+    fingertip_scene,
+    hand_scene,
+    planned_postures,
+)
+from sim_validate.hands.dexgraspbench import hand_file
+from sim_validate.protocols.published import protocol
+from tests.grasp_core.hands.gripping import FRICTION, plain_hand, reaches, scaled
+
+BODY = scaled("dodecahedron", 0.05)
+GRASP = gc.plan(BODY, FRICTION, limit=1).grasps[0]
+PHYSICS = PhysicsSettings(torsion_m=0.02)
+
+
+def loaded(scene):
+    model = mujoco.MjModel.from_xml_string(scene.xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    return model, data
+
+
+def test_the_object_has_its_mass_and_inertia_and_the_friction_asked_for():
+    scene = fingertip_scene(BODY, GRASP, 0.7, 0.2, PHYSICS, FingerSettings())
+    model, _ = loaded(scene)
+    body = model.body("object")
+    assert body.mass[0] == pytest.approx(0.2)
+    moments = np.linalg.eigvalsh(BODY.inertia) * 0.2 / BODY.volume
+    assert np.sort(body.inertia) == pytest.approx(np.sort(moments))
+    touching = model.geom_contype + model.geom_conaffinity > 0
+    assert (model.geom_friction[touching, :2] == [0.7, 0.02]).all()
+    assert (model.geom_condim[touching] == 4).all()
+    assert not model.opt.gravity.any()
+
+
+@pytest.mark.parametrize("name", ["dodecahedron", "l-bracket"])
+def test_open_fingertips_touch_nothing_and_closed_ones_push_as_told(name):
+    """At rest the contact forces are the servos', and their normal parts add up to those told."""
+    body = scaled(name, 0.05)
+    grasp = gc.plan(body, FRICTION, limit=1).grasps[0]
+    scene = fingertip_scene(body, grasp, FRICTION, 0.2, PhysicsSettings(), FingerSettings())
+    model, data = loaded(scene)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    steps = 200
+    for share in np.linspace(0.0, 1.0, steps):
+        data.ctrl = (1.0 - share) * scene.opened
+        mujoco.mj_step(model, data)
+    for share in np.linspace(0.0, 1.0, steps):
+        data.ctrl = share * scene.squeezing
+        mujoco.mj_step(model, data)
+    mujoco.mj_step(model, data, nstep=steps)
+    pushes = -data.qfrc_constraint[6:].reshape(4, 3)[:, 0]
+    assert pushes.max() == pytest.approx(10.0, rel=0.03)
+    assert np.linalg.norm(data.qpos[:3]) < 1e-3
+
+
+def test_a_hand_starts_open_and_all_its_links_can_touch_the_object():
+    body = scaled("dodecahedron", 0.035)
+    reach = next(
+        each for each in reaches("allegro", "dodecahedron", 0.035) if each.pregrasp is not None
+    )
+    hand = gc.load_hand("allegro").with_torque_limits(0.7, "a test")
+    postures = planned_postures(hand, body, reach, 0.6, 5.0)
+    scene = hand_scene(hand, body, postures, 0.6, 0.1, PHYSICS, HandServos(5.0))
+    model, data = loaded(scene)
+    mujoco.mj_forward(model, data)
+    met = model.geom_bodyid[data.contact.geom]
+    assert not (met == model.body("object").id).any()
+    solid = model.geom("surface0").id
+    touchable = [
+        geom for geom in range(model.ngeom)
+        if geom != solid and model.geom_conaffinity[geom] & model.geom_contype[solid]
+    ]  # fmt: skip
+    assert len(touchable) >= len(hand.links)
+    assert (model.geom_condim[touchable] == 4).all()
+    assert (model.geom_friction[touchable, :2] == [0.6, 0.02]).all()
+    assert model.actuator_gainprm[:, 0] == pytest.approx(5.0)
+    assert scene.opened == pytest.approx(reach.pregrasp, abs=1e-8)
+    assert scene.shut == pytest.approx(reach.joints, abs=1e-3)
+
+
+def test_stiff_servos_get_inertia_so_that_steps_are_short_beside_their_ring():
+    soft, stiff = HandServos(5.0), HandServos(1000.0)
+    for servos in (soft, stiff):
+        ring = np.sqrt(servos.stiffness_n_m_per_rad / servos.armature(0.002))
+        assert ring * 0.002 <= 0.5 + 1e-12
+    assert soft.damping(0.002) == 0.1
+    assert stiff.damping(0.002) > 1.0
+
+
+def welded(weld):
+    """The Allegro hand on a weld at a dodecahedron, as its file has it."""
+    body, hand = scaled("dodecahedron", 0.035), gc.load_hand("allegro")
+    reach = next(each for each in reaches("allegro", "dodecahedron", 0.035) if each.reached)
+    file = hand_file(hand)
+    strong = hand.with_torque_limits(0.7, "a test")
+    postures = planned_postures(strong, body, reach, 0.6, 5.0)
+    servos = HandServos(5.0, 0.1, weld, file.root, file.inertials)
+    physics = replace(protocol("dexgraspbench").physics, timestep=5e-4)
+    return hand_scene(strong, body, postures, 0.6, 0.1, physics, servos)
+
+
+@pytest.mark.parametrize(("seconds", "impedance"), [(0.02, 0.95), (0.05, 0.9)])
+def test_a_weld_gives_way_by_its_closed_form(seconds, impedance):
+    """At rest MuJoCo's soft constraint carries a force F where it is displaced by r:
+    F w (1 - d) / d = k d r, with k = 1 / (d t)^2 and the inverse mass w of a free body."""
+    scene = welded(Weld((seconds, 1.0), (impedance, impedance, 0.001, 0.5, 2.0)))
+    model, data = loaded(scene)
+    root, force = model.body("root").id, 30.0
+    data.xfrc_applied[root, 2] = force
+    before = data.qpos[7:10].copy()
+    mujoco.mj_step(model, data, nstep=4000)
+    stiffness = 1.0 / (impedance * seconds) ** 2
+    share = (1.0 - impedance) / impedance**2
+    expected = force * model.body_invweight0[root, 0] * share / stiffness
+    assert data.qpos[7:10] - before == pytest.approx([0.0, 0.0, expected], abs=1e-3 * expected)
+    assert expected > 1e-3
+
+
+def test_a_hand_recoils_as_its_fingers_move_by_what_its_masses_say():
+    """On a weld that hardly holds, the middle of all masses stays where it is while fingers move;
+    on the usual one the root comes back."""
+    far = {}
+    for name, weld in (
+        ("loose", Weld((1000.0, 1.0), (1e-4, 1e-4, 0.001, 0.5, 2.0))),
+        ("usual", Weld()),
+    ):
+        scene = welded(weld)
+        model, data = loaded(scene)
+        root = model.body("root").id
+        assert model.body_subtreemass[root] == pytest.approx(0.6445, abs=2e-4)
+        assert not model.dof_armature.any()
+        mujoco.mj_forward(model, data)
+        before, middle = data.qpos[7:10].copy(), data.subtree_com[root].copy()
+        data.ctrl[1:12:4] -= 0.4  # three fingers open, and touch nothing
+        mujoco.mj_step(model, data, nstep=200)
+        far[name] = np.linalg.norm(data.qpos[7:10] - before)
+        if name == "loose":
+            assert not data.ncon
+            assert np.linalg.norm(data.subtree_com[root] - middle) < 0.01 * far[name]
+    assert far["loose"] > 1e-3
+    assert far["usual"] < 0.2 * far["loose"]
+
+
+def test_shapes_touch_at_one_point_where_the_test_has_it_so():
+    off = mujoco.mjtDisableBit.mjDSBL_MULTICCD.value
+    assert loaded(welded(Weld()))[0].opt.disableflags & off
+    usual = fingertip_scene(BODY, GRASP, 0.7, 0.2, PHYSICS, FingerSettings())
+    assert not loaded(usual)[0].opt.disableflags & off
+    assert "multiccd" not in PHYSICS.record()
+    assert replace(PHYSICS, multiccd=False).record()["multiccd"] is False
+
+
+def test_a_tip_under_a_shape_of_its_link_touches_once_and_another_by_its_ball():
+    covered, _ = loaded(welded(Weld()))
+    assert not covered.geom_conaffinity[covered.geom("tip_first").id]
+    hand = plain_hand(4).with_torque_limits(0.7, "a test")
+    joints, palm = np.zeros((3, 8)), np.tile(np.eye(4), (3, 1, 1))
+    palm[:, :3, 3] = [0.2, 0.0, 0.0]
+    postures = Postures(palm, joints, np.zeros(0))
+    servos = HandServos(5.0, weld=Weld())
+    scene = hand_scene(hand, scaled("dodecahedron", 0.035), postures, 0.6, 0.1, PHYSICS, servos)
+    model, _ = loaded(scene)
+    assert model.geom_conaffinity[model.geom("tip_f0").id]
+    assert model.jnt_limited[model.joint("f00").id]

@@ -1,0 +1,150 @@
+"""A baseline recorded and checked from the command line; every change is reported as what it is."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.files.text_files import write_text
+from grasp_core.records.grasps_json import plan_to_json
+from scenes.example_objects import example_object
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+from tests.sim_validate.changing import changed, first_grasp
+
+
+def planned(folder, body=None, friction=0.5, limit=2):
+    body = body or example_object("wedge")
+    plan = gc.plan(body, friction, families=("concurrent",), limit=limit)
+    return write_text(folder / "grasps.json", plan_to_json(body, plan))
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recorded")
+    grasps = planned(folder)
+    line = ["baseline", "record", str(grasps), "-o", str(folder / "base.json"), "--jobs", "1"]
+    assert main([*line, "-q"]) == Exit.GOOD
+    return folder
+
+
+@pytest.fixture
+def copy(recorded, tmp_path):
+    return shutil.copytree(recorded, tmp_path / "copy")
+
+
+def check(folder, *more):
+    return main(["baseline", "check", str(folder / "base.json"), "--jobs", "1", *more])
+
+
+def statuses(capsys):
+    record = json.loads(capsys.readouterr().out)
+    return {each["id"]: (each["status"], " ".join(each["reasons"])) for each in record["grasps"]}
+
+
+def test_an_unchanged_baseline_is_the_same(recorded, capsys):
+    assert check(recorded, "--json") == Exit.GOOD
+    assert {status for status, _ in statuses(capsys).values()} == {"same"}
+
+
+def test_a_face_that_moved_by_a_millimetre_is_not_comparable(copy, capsys):
+    body = example_object("wedge")
+    moved = body.vertices - 1e-3 * np.isclose(
+        body.vertices @ body.normals[0], body.faces[0].polygon[0] @ body.normals[0]
+    )[:, None] * body.normals[0]  # fmt: skip
+    planned(copy, gc.Polyhedron.from_mesh(moved, body.triangles))
+    assert check(copy, "--json") == Exit.INPUT
+    for status, why in statuses(capsys).values():
+        assert status == "not comparable"
+        assert "the object is another one" in why
+
+
+def altered(folder, **values):
+    """The baseline as if the first grasp's verdict had been another one."""
+    return changed(folder / "base.json", first_grasp(**values))["grasps"][0]["id"]
+
+
+def test_a_regression_fails_and_says_why(copy, capsys):
+    name = altered(copy, limit_n=1e3)
+    assert check(copy, "--json") == Exit.NEGATIVE
+    status, why = statuses(capsys)[name]
+    assert status == "regressed"
+    assert "limit_n: 1000 -> " in why
+
+
+def test_an_improvement_fails_only_where_it_is_asked_for(copy, capsys):
+    name = altered(copy, displacement_m=1.0)
+    assert check(copy, "--json") == Exit.GOOD
+    assert statuses(capsys)[name][0] == "improved"
+    assert check(copy, "--strict", "-q") == Exit.NEGATIVE
+
+
+def test_grasps_without_entry_and_entries_without_grasp_fail(copy, capsys):
+    planned(copy, limit=1)
+    assert check(copy, "--json") == Exit.NEGATIVE
+    assert "missing" in {status for status, _ in statuses(capsys).values()}
+    planned(copy, limit=3)
+    assert check(copy, "--json") == Exit.NEGATIVE
+    assert "new" in {status for status, _ in statuses(capsys).values()}
+
+
+def test_blessing_makes_what_was_measured_the_baseline(copy, recorded):
+    altered(copy, limit_n=1e3)
+    assert check(copy, "--bless", "-q") == Exit.GOOD
+    assert (copy / "base.json").read_text() == (recorded / "base.json").read_text()
+    assert check(copy, "-q") == Exit.GOOD
+
+
+def test_what_is_not_there_is_said(tmp_path, capsys):
+    assert check(tmp_path, "-q") == Exit.INPUT
+    assert "base.json" in capsys.readouterr().err
+    write_text(tmp_path / "empty.json", "{}")
+    line = ["baseline", "record", str(tmp_path / "empty.json"), "-o", str(tmp_path / "b.json")]
+    assert main(line) == Exit.INPUT
+    assert not (tmp_path / "b.json").exists()
+
+
+def test_other_fingertips_planned_for_are_not_comparable_until_blessed(copy, capsys):
+    path = copy / "grasps.json"
+    record = json.loads(path.read_text())
+    record["finger"] = {"radius_m": 0.003, "approach_m": 0.05}
+    for grasp in record["grasps"]:
+        grasp["approach_directions"] = [each["normal"] for each in grasp["contacts"]]
+    path.write_text(json.dumps(record))
+    assert check(copy, "--json") == Exit.INPUT
+    for status, why in statuses(capsys).values():
+        assert status == "not comparable"
+        assert "planned for: radius_m None -> 0.003" in why
+        assert "setup.fingers.radius_m: None -> 0.003" in why
+    assert check(copy, "--bless", "-q") == Exit.GOOD
+    assert check(copy, "-q") == Exit.GOOD
+    blessed = json.loads((copy / "base.json").read_text())
+    assert blessed["settings"]["setup"]["fingers"]["radius_m"] == 0.003
+
+
+def test_the_first_grasps_of_a_file_are_a_baseline_too(tmp_path):
+    grasps, base = planned(tmp_path), tmp_path / "base.json"
+    line = ["baseline", "record", str(grasps), "-o", str(base), "--limit", "1", "-q"]
+    assert main(line) == Exit.GOOD
+    assert check(tmp_path, "-q") == Exit.GOOD
+    assert len(json.loads(base.read_text())["grasps"]) == 1
+
+
+def test_grasps_elsewhere_are_found_again_after_blessing(copy, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    planned(other, limit=1)
+    asked = ("--grasps", str(other / "grasps.json"), "--bless", "-q")
+    assert check(copy, *asked) == Exit.GOOD
+    assert json.loads((copy / "base.json").read_text())["grasps_file"] == "../other/grasps.json"
+    assert check(copy, "-q") == Exit.GOOD
+
+
+def test_grasps_are_not_overwritten(copy, capsys):
+    grasps = copy / "grasps.json"
+    before = grasps.read_bytes()
+    assert main(["baseline", "record", str(grasps), "-o", str(grasps)]) == Exit.INPUT
+    assert "will not be overwritten" in capsys.readouterr().err
+    assert grasps.read_bytes() == before

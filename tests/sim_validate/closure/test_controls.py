@@ -1,0 +1,166 @@
+"""Negative controls: refuted by the analysis first, then let go by the simulator."""
+
+import math
+from collections import Counter
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+from grasp_core.families.regulus import LEAST_DEPTH
+from sim_validate.closure.controls import Control, negative_controls, try_control
+from sim_validate.engine import schedules
+from sim_validate.engine.schedules import HoldProtocol
+from sim_validate.engine.setup import Agenda, Setup
+from tests.grasp_core.families.printed_paper import printed_regulus
+from tests.grasp_core.quadruples import paired_quadruples
+from tests.marks import more
+from tests.sim_validate.rigs import grasps
+
+OBJECTS = ("tetrahedron", "wedge", "chamfered-box", "random-12-1", "l-bracket", "double-wedge-bar")
+FRICTION = 0.17
+"""Theta is 10 degrees."""
+FAMILIES = ("concurrent", "pencil", "regulus", "free")
+
+
+@cache
+def all_controls():
+    """With the object and the grasp that each was made from."""
+    found = []
+    for name in OBJECTS:
+        body, planned = grasps(name, FRICTION, 4, FAMILIES)
+        found += [
+            (body, grasp, control)
+            for grasp in planned
+            for control in negative_controls(body, grasp, FRICTION, seed=1)
+        ]
+    return found
+
+
+def test_every_control_is_refuted_by_a_certificate_that_verifies():
+    kinds = Counter()
+    for _, _, control in all_controls():
+        assert not control.certificate.closed
+        assert control.certificate.verify()
+        kinds[control.name] += 1
+    assert set(kinds) == {"low_friction", "fingers_removed", "normal_flipped", "contacts_moved"}
+
+
+def test_moved_contacts_stay_on_their_faces_and_leave_their_regions():
+    tested = 0
+    for body, grasp, control in all_controls():
+        if control.name != "contacts_moved":
+            continue
+        for face, contact in zip(grasp.faces, control.contacts, strict=True):
+            plane = body.faces[face]
+            assert abs((contact.position - plane.centroid) @ plane.normal) < 1e-9
+        if grasp.radius > 0.0:
+            moved = np.linalg.norm(
+                [c.position - p for c, p in zip(control.contacts, grasp.positions, strict=True)],
+                axis=1,
+            )
+            assert moved.max() > grasp.radius
+        tested += 1
+    assert tested >= 16
+
+
+def test_grasps_that_no_three_fingers_lose_have_a_control_of_three_all_the_same():
+    """With much friction any three fingers hold these; two, or none, would be a trivial control."""
+    tested = 0
+    for name in ("icosahedron", "octahedron", "dodecahedron"):
+        body = scenes.example_object(name)
+        for grasp in gc.plan(body, 0.8, limit=4, families=("concurrent", "regulus")).grasps:
+            threes = [np.delete(np.arange(4), finger) for finger in range(4)]
+            frictions = [
+                gc.critical_friction(grasp.positions[rest], grasp.normals[rest]) for rest in threes
+            ]
+            if max(frictions) >= 0.8:
+                continue
+            known = replace(grasp, critical_friction=gc.critical_friction(grasp))
+            (removed,) = [
+                control for control in negative_controls(body, known, 0.8, seed=0)
+                if control.name == "fingers_removed"
+            ]  # fmt: skip
+            assert len(removed.contacts) == 3
+            assert removed.friction < 0.8
+            assert removed.certificate.verify()
+            verdict = try_control(body, removed, Agenda(), Setup())
+            assert verdict.let_go
+            tested += 1
+    assert tested >= 6
+
+
+def test_a_flipped_normal_is_the_only_change():
+    tested = 0
+    for _, grasp, control in all_controls():
+        if control.name == "normal_flipped":
+            signs = np.einsum("ki,ki->k", [c.normal for c in control.contacts], grasp.normals)
+            assert sorted(np.round(signs, 12)) == [-1.0, 1.0, 1.0, 1.0]
+            tested += 1
+    assert tested >= 8
+
+
+def test_the_simulator_lets_go_of_what_the_printed_regulus_program_takes_for_grasps():
+    body, theta, tested = scenes.example_object("random-30-1"), math.radians(10.0), 0
+    for quad, cones in paired_quadruples(body.name, theta, 160):
+        lines = printed_regulus(quad, cones, LEAST_DEPTH)
+        if lines is None:
+            continue
+        places = body.center_of_mass + body.radius * lines.positions
+        contacts = tuple(map(gc.Contact, places, [piece.normal for piece in quad]))
+        proof = gc.force_closure(contacts, friction=math.tan(theta))
+        if not proof.closed:
+            control = Control("printed", math.tan(theta), proof)
+            assert try_control(body, control, Agenda(), Setup()).let_go
+            tested += 1
+    assert tested >= 3
+
+
+@pytest.mark.parametrize("every", [2, *more(1)])
+def test_the_simulator_lets_go_of_every_control(every):
+    kinds = Counter()
+    for body, _, control in all_controls()[::every]:
+        verdict = try_control(body, control, Agenda(), Setup())
+        assert verdict.let_go, (control.name, [t.hold.outcome for t in verdict.tried])
+        assert not verdict.held
+        kinds[control.name] += 1
+    assert sum(kinds.values()) >= 50 // every
+    assert len(kinds) == 4
+
+
+@pytest.mark.parametrize("factor", [1.5])
+def test_a_simulator_with_too_much_friction_is_caught(monkeypatch, factor):
+    """Half as much friction again in the simulation only: low-friction controls then hold."""
+    hold = schedules.hold
+
+    def with_more_friction(idle, load, frictions, clock, protocol):
+        return hold(idle, load, tuple(factor * mu for mu in frictions), clock, protocol)
+
+    monkeypatch.setattr(schedules, "hold", with_more_friction)
+    caught = tested = 0
+    for name in ("random-12-1", "random-30-2", "screwdriver", "double-wedge-bar", "random-8-3"):
+        body, found = grasps(name, 0.5, 6)
+        for grasp in found:
+            if grasp.critical_friction <= 0.03:
+                continue
+            controls = {c.name: c for c in negative_controls(body, grasp, 0.5, 0)}
+            verdict = try_control(body, controls["low_friction"], Agenda(), Setup())
+            caught += verdict.held
+            tested += 1
+    assert tested >= 5
+    assert caught == tested
+
+
+def test_a_threshold_of_millimetres_would_let_a_control_pass():
+    """Judged loosely, a grasp that slips 'holds'; the thresholds are what they are for a reason."""
+    loose = Setup(hold=HoldProtocol(hold_threshold=0.1, total_threshold=0.2, gap_threshold=0.1))
+    body = scenes.example_object("chamfered-box")
+    held = 0
+    for grasp in gc.plan(body, 0.5, limit=6).grasps:
+        for control in negative_controls(body, grasp, 0.5, 0):
+            assert try_control(body, control, Agenda(), Setup()).let_go
+            held += try_control(body, control, Agenda(), loose).held
+    assert held >= 1

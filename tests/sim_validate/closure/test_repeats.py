@@ -1,0 +1,148 @@
+"""Repeats with noise: analysis and simulation agree on each, and the share is a statistic."""
+
+import dataclasses
+import math
+
+import pytest
+
+import sim_validate as sv
+from sim_validate.closure.noise import disturbed, noisy_case, noisy_trial
+from sim_validate.closure.verdict import interval
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.setup import Agenda, NamedWrench, Noise, Setup
+from sim_validate.engine.traces import Outcome
+from tests.marks import more
+from tests.sim_validate.rigs import grasps
+
+STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
+ONLY_NOISE = Agenda(trials=12, controls=False, critical_friction=False)
+
+
+def repeated(body, grasp, friction, **changed):
+    agenda = dataclasses.replace(ONLY_NOISE, **changed)
+    return sv.validate(body, grasp, friction, agenda=agenda)
+
+
+@pytest.mark.parametrize("each", [1, *more(2)])
+def test_analysis_and_simulation_agree_on_every_repeat(each):
+    """With noise that opens contacts, makes loads too large, and lets fingers miss."""
+    held = let_go = missed = 0
+    much = Noise(shift=0.02, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
+    for name in ("wedge", "screwdriver", "mug"):
+        body, found = grasps(name, 0.5, each)
+        for grasp in found:
+            verdict = repeated(body, grasp, 0.5, noise=much)
+            assert verdict.held
+            assert not verdict.mismatches
+            for trial in verdict.robustness.trials:
+                if trial.outcome is Outcome.INVALID_START:
+                    continue
+                assert (trial.outcome is Outcome.HELD) == trial.predicted
+                held += trial.predicted
+                missed += trial.wrench == "" and not trial.predicted
+                let_go += trial.wrench != ""
+    assert min(held, let_go, missed) >= 1 + each
+
+
+def test_without_noise_every_repeat_holds():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    found = repeated(body, grasp, 0.5, noise=STILL, trials=2).robustness
+    assert (found.held, found.predicted) == (2, 2)
+    assert found.interval[1] == 1.0
+
+
+def test_a_load_beyond_the_limit_is_not_held_however_it_came_about():
+    """Loads are 80 % of what is resisted: a mass a third larger is too much, one a tenth is not."""
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    noise = dataclasses.replace(STILL, mass=0.3)
+    cases = [disturbed(body, grasp, 0.5, noise, 0, number) for number in range(24)]
+    found = repeated(body, grasp, 0.5, noise=noise, trials=24).robustness
+    assert {case.mass > 1.25 for case in cases} == {True, False}
+    for case, trial in zip(cases, found.trials, strict=True):
+        if abs(case.mass - 1.25) > 0.01:
+            assert (trial.outcome is Outcome.HELD) == (case.mass < 1.25)
+
+
+def test_contacts_that_noise_opens_must_let_go():
+    """Friction just above the critical one: half of the draws are below."""
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    friction = 1.02 * grasp.critical_friction
+    found = repeated(body, grasp, friction, noise=dataclasses.replace(STILL, friction=0.1))
+    opened = [trial for trial in found.robustness.trials if trial.wrench == "separating"]
+    assert len(opened) >= 3
+    assert all(trial.outcome is Outcome.SLIPPED for trial in opened)
+    assert not found.mismatches
+
+
+def test_a_simulator_that_holds_what_it_must_not_is_contradicted(monkeypatch):
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    noise = dataclasses.replace(STILL, friction=1.0)
+    friction = 1.02 * grasp.critical_friction
+    cases = [disturbed(body, grasp, friction, noise, 0, number) for number in range(30)]
+    slippery = next(case for case in cases if case.friction < 0.8 * grasp.critical_friction)
+    sticky = max(case.friction for case in cases)
+    loads = [NamedWrench("lift", [0.0, 0.0, 1e-3, 0.0, 0.0, 0.0])]
+    honest = noisy_trial(body, slippery, loads, 0, Setup())
+    assert honest.outcome is not Outcome.HELD
+    assert not honest.contradictions
+
+    def sticking(bench, setup, idle, _, high):
+        return squeezed(bench, setup, idle, sticky, max(high, sticky))
+
+    monkeypatch.setattr("sim_validate.closure.controls.squeezed", sticking)
+    wrong = noisy_trial(body, slippery, loads, 0, Setup())
+    assert wrong.outcome is Outcome.HELD
+    assert wrong.contradictions
+
+
+def test_fingers_that_miss_are_not_held():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    found = repeated(body, grasp, 0.5, noise=dataclasses.replace(STILL, shift=1.0)).robustness
+    missing = [trial for trial in found.trials if "misses its face" in trial.reason]
+    assert missing
+    assert all(trial.outcome is Outcome.LOST_CONTACT for trial in missing)
+    assert not any(trial.predicted for trial in missing)
+
+
+def test_the_same_seed_gives_the_same_repeats():
+    body, (grasp,) = grasps("screwdriver", 0.5, 1)
+    one, same = (repeated(body, grasp, 0.5, trials=6).robustness for _ in range(2))
+    assert one == same
+    other = repeated(body, grasp, 0.5, trials=6, seed=1).robustness
+    assert other.trials != one.trials
+    more = repeated(body, grasp, 0.5, trials=7).robustness
+    assert more.trials[:6] == one.trials
+
+
+def test_a_heavier_object_is_the_same_scene_with_more_mass():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    case = disturbed(body, grasp, 0.5, STILL, 0, 0)
+    scene, heavy = (
+        noisy_case(body, dataclasses.replace(case, mass=mass), [], Setup())[0].bench.scene
+        for mass in (1.0, 1.5)
+    )
+    assert heavy.layout.mass_kg == 1.5 * scene.layout.mass_kg
+    changed = [
+        pair
+        for pair in zip(scene.xml.split(), heavy.xml.split(), strict=True)
+        if pair[0] != pair[1]
+    ]
+    assert 1 < len(changed) <= 7  # the mass and six moments of inertia
+
+
+def test_intervals_are_those_of_the_tables():
+    """Clopper and Pearson at 95 %: 0 and 10 of 10 by the closed form, 5 of 10 as printed."""
+    assert interval(0, 10) == pytest.approx((0.0, 1.0 - 0.025**0.1))
+    assert interval(10, 10) == pytest.approx((0.025**0.1, 1.0))
+    assert interval(5, 10) == pytest.approx((0.187, 0.813), abs=5e-4)
+
+
+def test_intervals_cover_the_share_as_often_as_they_say():
+    """By summing the binomial distribution itself."""
+    for share in (0.05, 0.5, 0.9):
+        inside = 0.0
+        for count in range(31):
+            low, high = interval(count, 30)
+            chance = math.comb(30, count) * share**count * (1.0 - share) ** (30 - count)
+            inside += chance * (low <= share <= high)
+        assert 0.95 <= inside <= 0.999

@@ -1,0 +1,113 @@
+"""A trial by itself moves as it did among the others."""
+
+import dataclasses
+
+import pytest
+
+import grasp_core as gc
+import sim_validate as sv
+from sim_validate.closure.replaying import Recorded, replayed
+from sim_validate.engine.setup import Agenda, NamedWrench, Noise, Setup
+from sim_validate.engine.traces import Outcome
+from tests.sim_validate.rigs import grasps
+
+AGENDA = Agenda(
+    random_wrenches=2, wrenches=(NamedWrench("too much", [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]),),
+    critical_friction=False, trials=25, noise=Noise(0.04, 3.0, 3.0, 0.3, 0.3), seed=3,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def tried():
+    body, (grasp,) = grasps("screwdriver", 0.5, 1, cones="tilted")
+    verdict = sv.validate(body, grasp, 0.5, agenda=AGENDA)
+    known = Recorded(grasp.id, body, grasp.contacts, 0.5, Setup(), AGENDA, grasp=grasp)
+    return known, verdict
+
+
+def same(found, hold):
+    assert found.hold.outcome is hold.outcome
+    assert found.hold.reason == hold.reason
+    assert found.hold.displacement_m == hold.displacement_m
+    assert found.hold.rotation_rad == hold.rotation_rad
+    assert found.hold.slip_m.tolist() == hold.slip_m.tolist()
+
+
+def test_every_wrench_comes_out_bit_for_bit(tried):
+    known, verdict = tried
+    assert len(verdict.wrenches) == 16
+    for trial in verdict.wrenches:
+        found = replayed(known, trial.name)
+        same(found, trial.hold)
+        assert found.predicted_limit == trial.predicted_limit
+        assert found.required_friction == trial.required_friction
+    assert {trial.hold.outcome for trial in verdict.wrenches} == {Outcome.HELD, Outcome.SLIPPED}
+
+
+def test_so_do_negative_controls(tried):
+    known, verdict = tried
+    count = 0
+    for control in verdict.controls:
+        about = dataclasses.replace(
+            known, contacts=control.control.contacts, friction=control.control.friction,
+            control=control.control.name, grasp=None,
+        )  # fmt: skip
+        for trial in control.tried:
+            same(replayed(about, trial.name), trial.hold)
+            count += 1
+    assert count >= 3
+
+
+def test_so_do_repeats_with_noise(tried):
+    known, verdict = tried
+    loaded = missed = 0
+    for trial in verdict.robustness.trials:
+        about = dataclasses.replace(known, trial=trial.number)
+        if "misses its face" in trial.reason:
+            with pytest.raises(gc.InputError, match=r"no trial to simulate, .*finger . miss"):
+                replayed(about)
+            missed += 1
+            continue
+        found = replayed(about, trial.wrench or None)
+        assert found.hold.reason == trial.reason
+        assert found.hold.outcome is trial.outcome
+        loaded += found.predicted_limit is not None
+    assert min(missed, loaded) >= 3
+
+
+def test_so_do_repeats_that_lost_force_closure(tried):
+    known, _ = tried
+    noise = Noise(0.0, 0.0, 0.0, 0.1, 0.0)
+    agenda = Agenda(controls=False, critical_friction=False, trials=8, noise=noise)
+    friction = 1.02 * known.grasp.critical_friction
+    verdict = sv.validate(known.body, known.grasp, friction, agenda=agenda)
+    opened = [trial for trial in verdict.robustness.trials if trial.wrench == "separating"]
+    assert len(opened) >= 2
+    for trial in opened:
+        about = dataclasses.replace(known, friction=friction, agenda=agenda, trial=trial.number)
+        found = replayed(about)
+        assert (found.name, found.hold.reason) == (trial.wrench, trial.reason)
+        assert found.predicted_limit is None
+
+
+def test_the_first_wrench_that_was_not_held_is_replayed_unless_another_is_named(tried):
+    known, _ = tried
+    assert replayed(known).name == "weakest"
+    about = dataclasses.replace(known, outcomes={"-force_x": "held", "random_1": "slipped"})
+    assert replayed(about).name == "random_1"
+    with pytest.raises(gc.InputError, match=r"named 'lift'; choose from \+force_x, .*too much"):
+        replayed(known, "lift")
+
+
+def test_the_clip_begins_when_the_fingers_have_closed(tried):
+    known, _ = tried
+    found = replayed(known)
+    joints, trace = found.watched.joints, found.watched.trace
+    assert joints.shape[1] == 19
+    assert 1 + 26 + len(trace.times_s) == len(joints)
+
+
+def test_closed_contacts_are_no_control(tried):
+    known, _ = tried
+    with pytest.raises(gc.InputError, match="are force-closed"):
+        replayed(dataclasses.replace(known, control="made_up"))

@@ -1,0 +1,98 @@
+import re
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from sim_validate.closure.setup_toml import setup_from_file
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup
+from sim_validate.planning.wrenches_json import weights, wrenches_from_file
+
+
+def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
+    path = tmp_path / "setup.toml"
+    path.write_text(
+        "[physics]\ntimestep = 0.001\nsolref = [0.002, 1.0]\n[hold]\nload_share = 0.5\n"
+        "[fingers]\nradius_m = 0.003\n[limit]\nspans = [0.05]\n"
+    )
+    setup = setup_from_file(path, Setup(threads=2))
+    assert setup.physics.timestep == 0.001
+    assert setup.physics.solref == (0.002, 1.0)
+    assert setup.hold.load_share == 0.5
+    assert setup.fingers.radius_m == 0.003
+    assert setup.limit.spans == (0.05,)
+    assert setup.friction == Setup().friction
+    assert setup.physics.cone == "elliptic"
+    assert setup.threads == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[physics]\ntimestp = 0.001\n", r"physics: no setting is named .timestp.*timestep"),
+        ("timestep = 0.001\n", "no setting is named .timestep.; choose from fingers, physics"),
+        ("[hold]\nload_share = 2.0\n", "load_share must be a number from 0.1 up to 0.999"),
+        ("[physics]\ngravity = [0.0, 0.0, -9.81]\n", r"gravity must be zero.*--weight-n"),
+        ("[physics]\ncondim = 4\n", r"setup.toml: physics.condim must be 3"),
+        ("[physics\n", "not TOML"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said(tmp_path, text, words):
+    path = tmp_path / "setup.toml"
+    path.write_text(text)
+    with pytest.raises(gc.InputError, match=words):
+        setup_from_file(path, Setup())
+
+
+def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
+    path = tmp_path / "task.json"
+    path.write_text(
+        '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3]},'
+        ' {"name": "turn", "force_n": [0, 1.5, 0], "torque_n_m": [0.1, 0, 0]}]}'
+    )
+    lift, turn = wrenches_from_file(path)
+    assert (lift.name, turn.name) == ("lift", "turn")
+    np.testing.assert_array_equal(lift.wrench, [0, 0, -3, 0, 0, 0])
+    np.testing.assert_array_equal(turn.wrench, [0, 1.5, 0, 0.1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"wrenches": []}', "wrenches: "),
+        ('{"wrenches": [{"name": "a", "force_n": [0, 0]}]}', "wrenches\\[0\\].force_n"),
+        (
+            '{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}',
+            "wrench .a.: its largest component must be from 1e-09",
+        ),
+        (
+            '{"wrenches": [{"name": "a", "force_n": [1, 0, 1e999]}]}',
+            "force_n\\[2\\]: expected",
+        ),
+    ],
+)
+def test_what_is_wrong_with_wrenches_is_said(tmp_path, text, words):
+    path = tmp_path / "task.json"
+    path.write_text(text)
+    with pytest.raises(gc.InputError, match=words):
+        wrenches_from_file(path)
+
+
+def test_weight_acts_at_the_centre_of_mass_along_each_direction_of_gravity():
+    six = weights(2.0, ())
+    assert len({each.name for each in six}) == 6
+    forces = np.array([each.wrench[:3] for each in six])
+    np.testing.assert_allclose(np.linalg.norm(forces, axis=1), 2.0)
+    assert not forces.sum(axis=0).any()
+    (down,) = weights(3.0, ((0.0, 0.0, -10.0),))
+    np.testing.assert_array_equal(down.wrench, [0, 0, -3.0, 0, 0, 0])
+
+
+def test_wrenches_of_one_name_are_refused_ours_included():
+    push = np.array([1.0, 0, 0, 0, 0, 0])
+    for name in ("+force_x", "weakest", "random_1"):
+        with pytest.raises(gc.InputError, match=re.escape(f"two wrenches are named {name!r}")):
+            Agenda(random_wrenches=2, wrenches=(NamedWrench(name, push),))
+    with pytest.raises(gc.InputError, match="two wrenches are named 'a'"):
+        Agenda(wrenches=(NamedWrench("a", push), NamedWrench("a", -push)))
+    assert len(Agenda(wrenches=(NamedWrench("random_0", push),)).wrenches) == 1

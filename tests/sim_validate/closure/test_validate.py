@@ -1,0 +1,290 @@
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+import scenes
+import sim_validate as sv
+from scenes.mujoco.fingertips import FingerSettings, clashes
+from sim_validate.closure.controls import negative_controls
+from sim_validate.closure.verdict import trace_arrays, verdicts_to_json
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup
+from sim_validate.engine.traces import Outcome
+from tests.marks import MORE, more
+from tests.sim_validate.rigs import grasps
+
+OBJECTS = (
+    "tetrahedron", "octahedron", "wedge", "chamfered-box", "random-12-1", "screwdriver", "mug",
+)  # fmt: skip
+WITHOUT_CONTROLS = Agenda(controls=False)
+
+
+@pytest.mark.parametrize("name", ["tetrahedron", *more("chamfered-box", "double-wedge-bar")])
+@pytest.mark.parametrize("family", ["pencil", "regulus", "free"])
+def test_grasps_of_every_family_are_good(name, family):
+    """At theta = 10 degrees; reguli among them need friction."""
+    friction = math.tan(math.radians(10.0))
+    body, found = grasps(name, friction, 5, (family,))
+    assert found
+    for grasp in found:
+        verdict = sv.validate(body, grasp, friction)
+        assert verdict.good, (verdict.outcome, verdict.mismatches)
+        assert verdict.controls
+
+
+@pytest.mark.parametrize(
+    ("names", "friction", "each"),
+    [
+        (OBJECTS[::2], 0.5, 1),
+        *(pytest.param(OBJECTS, mu, 2, marks=MORE) for mu in (0.2, 0.5, 0.8)),
+    ],
+)
+def test_planned_grasps_hold_all_wrenches_and_no_control_does(names, friction, each):
+    tested = controls = 0
+    for name in names:
+        body, found = grasps(name, friction, each)
+        for grasp in found:
+            verdict = sv.validate(body, grasp, friction)
+            assert verdict.held, [(w.name, w.hold.outcome) for w in verdict.wrenches]
+            assert len(verdict.wrenches) == 13
+            assert verdict.controls_let_go
+            assert verdict.controls
+            assert not verdict.mismatches
+            controls += len(verdict.controls)
+            tested += 1
+    assert tested >= (len(names) - 1) * each
+    assert controls >= 2 * (len(names) - 1) * each
+
+
+def test_holding_leaves_a_wide_margin_to_the_threshold():
+    """Held displacements are a hundredth of the threshold, so it is not what decides."""
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    verdict = sv.validate(body, grasp, 0.5, agenda=WITHOUT_CONTROLS)
+    worst = max(trial.hold.displacement_m for trial in verdict.wrenches)
+    threshold = verdict.setup.hold.hold_threshold * verdict.scene.layout.grasp_size_m
+    assert worst < 0.03 * threshold
+
+
+def test_all_that_can_be_asked_for_repeats_to_the_last_digit_at_any_number_of_threads():
+    body, (grasp, *_) = grasps("random-12-1", 0.4, 1)
+    agenda = Agenda(random_wrenches=2, limits="ramp", keep_traces=True)
+    texts, traces = set(), []
+    for threads in (1, 2):
+        verdict = sv.validate(body, grasp, 0.4, agenda=agenda, setup=Setup(threads=threads))
+        texts.add(verdicts_to_json(body, 0.4, [verdict], verdict.gate, complete=True))
+        traces.append(trace_arrays(verdict))
+    assert len(texts) == 1
+    for name, array in traces[0].items():
+        np.testing.assert_array_equal(array, traces[1][name])
+    assert {"weakest.slips_m", "random_1.gaps_m", "fingers_removed.separating.times_s"} <= set(
+        traces[0]
+    )
+
+
+def test_random_wrenches_depend_on_the_seed_alone():
+    body, (grasp, *_) = grasps("random-12-1", 0.4, 1)
+    drawn = [
+        [t.wrench for t in sv.validate(body, grasp, 0.4, agenda=agenda).wrenches]
+        for agenda in (
+            replace(WITHOUT_CONTROLS, random_wrenches=3, seed=seed) for seed in (1, 1, 2)
+        )
+    ]
+    np.testing.assert_array_equal(drawn[0], drawn[1])
+    assert not np.allclose(drawn[0][13], drawn[2][13])
+
+
+def test_a_users_wrench_is_applied_as_it_is_and_need_not_hold():
+    """One that the analysis says is resisted, and one that is not: both as predicted."""
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    small, large = np.array([0, 0, -2.0, 0, 0.05, 0]), np.array([0, 0, -80.0, 0, 0, 0])
+    agenda = replace(
+        WITHOUT_CONTROLS, wrenches=(NamedWrench("lift", small), NamedWrench("tear", large))
+    )
+    verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
+    lift, tear = verdict.wrenches[-2:]
+    np.testing.assert_array_equal(lift.wrench, small)
+    assert lift.predicted_limit > 1.0 > tear.predicted_limit > 0.0
+    assert lift.hold.outcome is Outcome.HELD
+    assert tear.hold.outcome is not Outcome.HELD
+    assert tear.hold.reason
+    assert not verdict.held
+    assert not verdict.good
+    assert not verdict.mismatches
+
+
+def test_what_contradicts_the_analysis_is_said(monkeypatch):
+    """With half of the friction in the simulation only, much goes wrong, and all of it is named."""
+    from sim_validate.engine import schedules
+
+    hold, release = schedules.hold, schedules.release
+
+    def slippery_hold(idle, load, frictions, *rest):
+        return hold(idle, load, tuple(0.5 * mu for mu in frictions), *rest)
+
+    def slippery_release(still, frictions, *rest, **settled):
+        return release(still, (frictions[0], 0.3 * frictions[1]), *rest, **settled)
+
+    body, (grasp, *_) = grasps("random-12-1", 0.4, 1, ("regulus",))
+    sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)  # the gate is measured before
+    monkeypatch.setattr(schedules, "hold", slippery_hold)
+    monkeypatch.setattr(schedules, "release", slippery_release)
+    verdict = sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)
+    assert not verdict.good
+    assert any("though the predicted limit is 1.25" in line for line in verdict.mismatches)
+    assert "critical friction: not found near the predicted one" in verdict.mismatches
+
+
+def test_limits_are_multiples_of_the_applied_wrench():
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    for limits in ("ramp", "bisection"):
+        agenda = replace(WITHOUT_CONTROLS, limits=limits)
+        verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
+        for trial in verdict.wrenches:
+            assert trial.predicted_limit == pytest.approx(1.25, rel=1e-6)
+            assert trial.simulated_limit.share == pytest.approx(1.0, abs=0.005)
+
+
+def test_overlapping_fingertips_make_a_grasp_invalid():
+    body, found = grasps("l-bracket", 0.5, 8, ("free",))
+    radius = 0.5 * body.radius
+    grasp = next(g for g in found if clashes(body, g.positions, g.normals, radius))
+    setup = Setup(fingers=FingerSettings(radius_m=radius))
+    verdict = sv.validate(body, grasp, 0.5, agenda=WITHOUT_CONTROLS, setup=setup)
+    assert verdict.outcome is Outcome.INVALID_START
+    assert "of radius" in verdict.wrenches[0].hold.reason
+    assert not verdict.good
+
+
+@pytest.mark.parametrize(
+    "fingers",
+    [
+        FingerSettings(radius_m=0.002),
+        FingerSettings(max_normal_force_n=1.0),
+        FingerSettings(max_normal_force_n=80.0, approach=(0.0, 0.0, -1.0)),
+        FingerSettings(stiffness_n_per_m=600.0),
+    ],
+)
+def test_limits_do_not_depend_on_how_fingers_are_built(fingers):
+    body, (grasp, *_) = grasps("random-12-1", 0.5, 1)
+    verdict = sv.validate(
+        body, grasp, 0.5, agenda=replace(WITHOUT_CONTROLS, limits="ramp"),
+        setup=Setup(fingers=fingers),
+    )  # fmt: skip
+    assert verdict.good, verdict.mismatches
+    for trial in verdict.wrenches:
+        assert trial.simulated_limit.share == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [
+        ("wedge", "concurrent"),
+        pytest.param("random-12-1", "regulus", marks=MORE),
+        pytest.param("prism", "free", marks=MORE),
+    ],
+)
+def test_pads_are_where_the_surface_of_the_mesh_is(name, family):
+    """The same limits and critical friction when fingertips touch a convex object's own mesh."""
+    agenda = replace(WITHOUT_CONTROLS, limits="ramp")
+    tested = 0
+    body, (grasp, *_) = grasps(name, 0.5, 1, (family,))
+    pads, mesh = (
+        sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(surface=surface))
+        for surface in ("pads", "mesh")
+    )
+    assert pads.good
+    assert mesh.good
+    for one, other in zip(pads.wrenches, mesh.wrenches, strict=True):
+        assert one.simulated_limit.share == pytest.approx(other.simulated_limit.share, abs=2e-3)
+        tested += 1
+    assert tested == 13
+
+
+def test_contacts_that_are_not_closed_are_refused_whatever_they_claim():
+    """Contacts moved on their faces until closure is lost, with a critical friction of zero."""
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    controls = {control.name: control for control in negative_controls(body, grasp, 0.5, seed=0)}
+    moved = controls["contacts_moved"].contacts
+    with pytest.raises(gc.InputError, match="needs friction above"):
+        sv.validate(body, replace(grasp, contacts=moved, critical_friction=0.0), 0.5)
+
+
+def test_a_grasp_of_another_object_is_refused():
+    _, (grasp, *_) = grasps("wedge", 0.5, 1)
+    for name in ("octahedron", "box"):
+        with pytest.raises(gc.InputError, match=r"names face|does not lie on face"):
+            sv.validate(scenes.example_object(name), grasp, 0.5)
+
+
+def test_a_simulator_that_disagrees_makes_the_verdict_bad(monkeypatch):
+    """Friction that is really 0.7 of what it should be, in releases and then in ramps."""
+    body, found = grasps("random-12-1", 0.5, 20, ("free",))
+    grasp = next(g for g in found if 0.01 < g.critical_friction < 0.3)
+    agenda = replace(WITHOUT_CONTROLS, limits="ramp")
+    assert sv.validate(body, grasp, 0.5, agenda=agenda).good
+    for kind, says in (("release", "critical friction: "), ("ramp", "limit")):
+        with monkeypatch.context() as patched:
+            patched.setattr(f"sim_validate.engine.rig.schedules.{kind}", _weaker(kind))
+            verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
+        assert not verdict.good
+        assert any(says in mismatch for mismatch in verdict.mismatches)
+
+
+def _weaker(kind):
+    from sim_validate.engine import schedules
+
+    faithful = getattr(schedules, kind)
+
+    def weakened(*arguments, **settled):
+        made = faithful(*arguments, **settled)
+        plan, *rest = made if isinstance(made, tuple) else (made,)
+        friction = plan.friction.copy()
+        friction[plan.watched :] *= 0.7
+        weak = replace(plan, friction=friction)
+        return (weak, *rest) if rest else weak
+
+    return weakened
+
+
+def test_trials_that_say_nothing_neither_confirm_nor_contradict():
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    tear = NamedWrench("tear", np.array([0, 0, 1e4, 0, 0, 0]))
+    agenda = Agenda(wrenches=(tear,), limits="bisection", keep_traces=True)
+    verdict = sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(timeout_s=1e-9))
+    assert {trial.hold.outcome for trial in verdict.wrenches} == {Outcome.TIMEOUT}
+    assert not any(trial.contradiction for trial in verdict.wrenches)
+    assert not any(trial.simulated_limit for trial in verdict.wrenches)
+    assert not any(control.let_go or control.held for control in verdict.controls)
+    assert not verdict.controls_let_go
+    assert not verdict.good
+
+
+def test_a_load_that_blows_everything_up_is_recorded_without_numbers():
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    tear = NamedWrench("tear", np.array([0, 0, 1e9, 0, 1e9, 0]))
+    verdict = sv.validate(body, grasp, 0.5, agenda=replace(WITHOUT_CONTROLS, wrenches=(tear,)))
+    text = verdicts_to_json(body, 0.5, [verdict], verdict.gate, complete=True)
+    (trial,) = [t for t in json.loads(text)["verdicts"][0]["wrenches"] if t["name"] == "tear"]
+    assert trial["outcome"] == "diverged"
+    assert not verdict.good
+
+
+def test_contacts_rounded_to_six_digits_are_as_good():
+    """What a file with fewer digits does: contacts are a little above or below their faces."""
+    tested = 0
+    for name in ("wedge", "random-12-1"):
+        body, found = grasps(name, 0.5, 2)
+        for grasp in found:
+            rounded = tuple(
+                gc.values.Contact(np.round(c.position, 8), c.normal) for c in grasp.contacts
+            )
+            verdict = sv.validate(
+                body, replace(grasp, contacts=rounded), 0.5, agenda=WITHOUT_CONTROLS
+            )
+            assert verdict.good, verdict.wrenches[0].hold.reason
+            assert verdict.scene.layout.drive.radius_m > 0.01 * body.radius
+            tested += 1
+    assert tested >= 4

@@ -1,0 +1,77 @@
+"""Datasets from the command line."""
+
+import contextlib
+import json
+import re
+import shutil
+
+import pytest
+
+import sim_validate as sv
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+from tests.sim_validate.datasets.engines import contents
+
+pytest.importorskip("pyarrow")
+LIGHT = ("--friction", "0.5", "--family", "concurrent", "--limit", "1")
+OBJECTS = ("tetrahedron", "wedge")
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("made") / "ds"
+    assert main(["dataset", "build", *OBJECTS, *LIGHT, "--out", str(folder), "-q"]) == Exit.GOOD
+    return folder
+
+
+def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, capsys):
+    assert main(["dataset", "verify", str(dataset), "--json"]) == Exit.GOOD
+    assert json.loads(capsys.readouterr().out) == {"dataset": str(dataset), "faults": []}
+
+
+def test_a_build_says_how_many_objects_each_split_has(dataset, capsys):
+    """Two objects leave at least one of the three splits without any."""
+    assert main(["dataset", "build", *OBJECTS, *LIGHT, "--out", str(dataset)]) == Exit.GOOD
+    last = capsys.readouterr().out.splitlines()[-1]
+    found = re.fullmatch(r"train (\d), validation (\d), test (\d) objects", last)
+    counts = dict(zip(("train", "validation", "test"), map(int, found.groups()), strict=True))
+    assert sum(counts.values()) == 2
+    for split, count in counts.items():
+        warned = contextlib.nullcontext() if count else pytest.warns(UserWarning, match=last)
+        with warned:
+            grasps = sv.load_dataset(dataset, split)["grasps"]
+        assert len(set(grasps["object_id"])) == count
+        assert grasps["held"].dtype == bool
+    assert 0 in counts.values()
+
+
+def test_a_changed_file_is_named(dataset, tmp_path, capsys):
+    spoiled = shutil.copytree(dataset, tmp_path / "ds")
+    path = next(spoiled.glob("data/trials/*.parquet"))
+    path.write_bytes(path.read_bytes()[:-1] + b"!")
+    assert main(["dataset", "verify", str(spoiled)]) == Exit.NEGATIVE
+    assert path.name in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("built_here")
+def test_a_toml_file_says_the_same_as_flags(dataset, tmp_path):
+    """The flags were given to a command that begins processes."""
+    settings = tmp_path / "ds.toml"
+    settings.write_text((dataset / "config.toml").read_text())
+    folder = tmp_path / "ds"
+    assert main(["dataset", "build", str(settings), "--out", str(folder), "-q"]) == Exit.GOOD
+    assert contents(folder) == contents(dataset)
+    again = ["dataset", "build", str(settings), "--limit", "3", "--out", str(tmp_path / "x")]
+    assert main(again) == Exit.INPUT
+
+
+@pytest.mark.usefixtures("built_here")
+def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "bad.stl").write_text("solid nothing")
+    names = ["tetrahedron", str(tmp_path / "meshes"), "--friction", "0.4", *LIGHT]
+    code = main(["dataset", "build", *names, "--out", str(tmp_path / "ds")])
+    assert code == Exit.PARTIAL
+    assert "quarantine.jsonl" in capsys.readouterr().err
+    (first, second) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
+    assert json.loads(first)["object"] == json.loads(second)["object"]

@@ -1,0 +1,73 @@
+"""How the simulator is started, stepped and kept quiet."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from scenes.mujoco.silent_mujoco import unlogged
+from sim_validate.engine.bench import STATE, batch, compiled, state_parts, step
+
+FALLING = """<mujoco><option integrator="discrete"/><worldbody><body><freejoint/>
+<geom size=".1" mass="1"/></body></worldbody></mujoco>"""
+
+
+def test_text_that_is_no_scene_is_refused():
+    for text in ("", "<mujoco", "<mujoco><nonsense/></mujoco>"):
+        with pytest.raises(gc.InputError, match="MuJoCo cannot compile the scene"):
+            compiled(text)
+
+
+def test_parts_of_a_state_lie_where_a_batch_has_them():
+    model = compiled(FALLING)
+    trials, parts = batch.Batch(model, 2, 1), state_parts(model)
+    assert set(parts) == set(STATE)
+    for place, name in enumerate(STATE):
+        trials.state[:] = 0.0
+        trials.state[:, parts[name]] = 1.0 + place
+        bound = trials.bind(name)
+        assert bound.size == trials.state[:, parts[name]].size
+        assert (bound == 1.0 + place).all()
+        assert (trials.state != 0.0).sum() == bound.size
+
+
+def test_many_trials_are_each_what_a_plain_loop_gives():
+    model = compiled(FALLING)
+    trials, errors = batch.Batch(model, 3, 2), {}
+    speeds = trials.bind("qvel")
+    speeds[:, 0] = [0.0, 1.0, 2.0]
+    for _ in range(5):
+        step(trials, errors, 4)
+    assert errors == {}
+    for trial in range(3):
+        data = mujoco.MjData(model)
+        data.qvel[0] = float(trial)
+        for _ in range(20):
+            mujoco.mj_step(model, data)
+        np.testing.assert_array_equal(trials.bind("qpos")[trial], data.qpos)
+
+
+def test_only_trials_that_go_on_are_stepped():
+    trials, errors = batch.Batch(compiled(FALLING), 3, 1), {}
+    step(trials, errors, 10, np.array([0, 2]))
+    heights = trials.bind("qpos")[:, 2].copy()
+    assert heights[0] == heights[2] < heights[1] == 0.0
+    step(trials, {0: "ended"}, 10)
+    after = trials.bind("qpos")[:, 2]
+    assert after[0] == heights[0]
+    assert after[1] < 0.0
+    assert after[2] < heights[2]
+
+
+def test_warnings_leave_no_file_behind(tmp_path, monkeypatch):
+    """A state that is not a number makes the simulator warn."""
+    monkeypatch.chdir(tmp_path)
+    model = compiled(FALLING)
+    data = mujoco.MjData(model)
+    data.qpos[0] = np.nan
+    before = mujoco.MjLogConfig.get().logto_file
+    with unlogged():
+        mujoco.mj_step(model, data)
+    assert data.warning.number.sum() > 0
+    assert not list(tmp_path.iterdir())
+    assert mujoco.MjLogConfig.get().logto_file == before

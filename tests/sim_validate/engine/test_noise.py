@@ -1,0 +1,120 @@
+"""Fingers go where they were planned to go, and the object stands elsewhere."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from grasp_core.closure.contacts import contact_frames
+from grasp_core.objects.on_faces import face_under
+from sim_validate.closure.noise import disturbed
+from sim_validate.engine.setup import Noise
+from sim_validate.kit import flag_groups
+from tests.sim_validate.rigs import grasps
+
+STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
+POSE = dataclasses.replace(STILL, shift=0.01, turn_deg=2.0)
+
+
+def pose(body, noise, seed, number):
+    """Where the object stands, by another way: a rotation about its centre of mass, and a shift."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1, number)))
+    shift = noise.shift * body.radius * rng.normal(size=3)
+    return Rotation.from_rotvec(math.radians(noise.turn_deg) * rng.normal(size=3)), shift
+
+
+def test_without_noise_everything_is_as_planned():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    case = disturbed(body, grasp, 0.5, STILL, 0, 0)
+    for contact, planned in zip(case.contacts, grasp.contacts, strict=True):
+        np.testing.assert_allclose(contact.position, planned.position, atol=1e-15)
+        np.testing.assert_allclose(contact.normal, planned.normal, atol=1e-15)
+    assert (case.friction, case.mass, case.missed) == (0.5, 1.0, ())
+
+
+@pytest.mark.parametrize("name", ["wedge", "screwdriver"])
+def test_contacts_are_on_their_faces_and_on_the_lines_of_the_fingers(name):
+    """In the world the object has moved; a finger's line through it has not."""
+    body, found = grasps(name, 0.5, 3)
+    landed = missed = 0
+    for grasp in found:
+        for place in range(100):
+            case = disturbed(body, grasp, 0.5, POSE, 3, place)
+            missed += len(case.missed)
+            fingers = [finger for finger in range(4) if finger not in case.missed]
+            turned, shift = pose(body, POSE, 3, place)
+            for finger, contact in zip(fingers, case.contacts, strict=True):
+                face = body.faces[grasp.faces[finger]]
+                assert face_under(body, contact) is face
+                center = body.center_of_mass
+                at = turned.apply(contact.position - center) + center + shift
+                beside = np.cross(at - grasp.positions[finger], grasp.normals[finger])
+                assert np.linalg.norm(beside) < 1e-12 * body.radius
+                landed += 1
+    assert landed > 500
+    assert missed >= 5
+
+
+def test_a_finger_beside_its_face_misses_it():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    far = dataclasses.replace(STILL, shift=1.0)
+    cases = [disturbed(body, grasp, 0.5, far, 0, place) for place in range(50)]
+    assert any(len(case.missed) == 4 for case in cases)
+    for case in cases:
+        assert len(case.contacts) == 4 - len(case.missed)
+
+
+def test_noise_has_the_size_it_says():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    noise = dataclasses.replace(STILL, normal_deg=2.0, friction=0.1, mass=0.2)
+    cases = [disturbed(body, grasp, 0.5, noise, 0, place) for place in range(2000)]
+    normals = np.array([[contact.normal for contact in case.contacts] for case in cases])
+    leans = np.arccos(np.clip(np.einsum("nki,ki->nk", normals, grasp.normals), -1.0, 1.0))
+    assert math.degrees(math.sqrt((leans**2).mean() / 2.0)) == pytest.approx(2.0, rel=0.03)
+    frictions = np.log([case.friction / 0.5 for case in cases])
+    masses = np.log([case.mass for case in cases])
+    for found, wanted in ((frictions, 0.1), (masses, 0.2)):
+        assert found.std() == pytest.approx(wanted, rel=0.06)
+        assert abs(found.mean()) < 0.1 * wanted
+    shifted = dataclasses.replace(STILL, shift=0.001)
+    landed = [disturbed(body, grasp, 0.5, shifted, 0, place).landed for place in range(500)]
+    moved = np.array([[contact.position for contact in each] for each in landed])
+    along = np.einsum("nki,kij->nkj", moved - grasp.positions, contact_frames(grasp.normals))
+    np.testing.assert_allclose(along[..., 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(along[..., 1:].std(axis=0), 0.001 * body.radius, rtol=0.15)
+
+
+@pytest.mark.parametrize("size", [1.0, 20.0, 45.0])
+def test_normals_lean_as_far_as_is_drawn(size):
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    noise = dataclasses.replace(STILL, normal_deg=size)
+    leans, drawn = [], []
+    for number in range(50):
+        case = disturbed(body, grasp, 0.5, noise, 0, number)
+        rng = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(1, number)))
+        rng.normal(size=8)
+        drawn.append(np.radians(size) * np.linalg.norm(rng.normal(size=(4, 2)), axis=1))
+        normals = np.array([contact.normal for contact in case.contacts])
+        leans.append(np.arccos(np.clip(np.einsum("ki,ki->k", normals, grasp.normals), -1, 1)))
+    wrapped = np.arccos(np.cos(drawn))
+    np.testing.assert_allclose(leans, wrapped, atol=1e-7)
+
+
+def test_a_draw_depends_on_seed_and_number_only():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    one, same, other, seed = (
+        disturbed(body, grasp, 0.5, Noise(), *draw) for draw in [(0, 1), (0, 1), (0, 2), (1, 1)]
+    )
+    assert one.friction == same.friction
+    assert len({one.friction, other.friction, seed.friction}) == 3
+    twice = disturbed(body, grasp, 0.5, dataclasses.replace(Noise(), friction=0.1), 0, 1)
+    assert math.log(twice.friction / 0.5) == pytest.approx(2.0 * math.log(one.friction / 0.5))
+    assert twice.mass == one.mass
+
+
+def test_the_flags_are_the_same_noise():
+    given = flag_groups.Repeats()
+    for name, value in dataclasses.asdict(Noise()).items():
+        assert getattr(given, f"noise_{name}") == value

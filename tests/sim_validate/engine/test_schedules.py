@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from sim_validate.engine import schedules
+from sim_validate.engine.limits import OVERLOAD, part
+from sim_validate.engine.schedules import (
+    FrictionProtocol,
+    HoldProtocol,
+    LimitProtocol,
+    Load,
+)
+from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
+
+SAMPLE_S, STILL = 0.01, Load(np.zeros(6), np.full((4, 3), 5.0))
+IDLE = Load(np.zeros(6), np.full((4, 3), 2.0))
+LOAD = Load(np.arange(1.0, 7.0), np.full((4, 3), 5.0))
+
+
+def test_smooth_shares_rise_from_almost_nothing_to_one():
+    shares = schedules.smooth(20)
+    steps = np.diff(np.concatenate([[0.0], shares]))
+    assert shares[-1] == 1.0
+    assert (steps > 0).all()
+    assert steps[0] < 0.2 * steps.max() > steps[-1]
+
+
+def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
+    schedule = schedules.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol())
+    watched = schedule.watched
+    assert watched == 16 + 10
+    assert len(schedule.friction) == watched + 40
+    assert set(schedule.friction[:watched]) == {1.5}
+    assert set(schedule.friction[watched:]) == {0.5}
+    np.testing.assert_array_equal(schedule.wrenches[watched - 10 :], np.tile(LOAD.wrench, (50, 1)))
+    np.testing.assert_array_equal(schedule.forces[-1], LOAD.forces)
+
+
+def test_schedules_say_from_where_their_loads_are_constant():
+    made = (
+        schedules.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol()),
+        schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol()),
+        schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, (HoldProtocol(), LimitProtocol()))[0],
+    )
+    assert [each.resting for each in made] == [16, 0, len(made[2].friction)]
+    for each in made:
+        rest = each.forces[each.resting :]
+        np.testing.assert_array_equal(rest, np.broadcast_to(each.forces[-1], rest.shape))
+
+
+def test_settling_and_a_settled_release_are_a_release():
+    whole = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol())
+    rest = schedules.settle(STILL, 2.0, SAMPLE_S, FrictionProtocol())
+    left = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol(), settled=True)
+    assert (rest.watched, left.watched) == (10, 0)
+    for name in ("forces", "wrenches", "friction"):
+        parts = [getattr(each, name) for each in (rest, left)]
+        np.testing.assert_array_equal(np.concatenate(parts), getattr(whole, name))
+
+
+def test_a_ramp_watches_while_the_load_rises_between_the_shares():
+    protocols = HoldProtocol(), LimitProtocol()
+    schedule, shares = schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, protocols)
+    assert len(shares) == len(schedule.friction) - schedule.watched == 50
+    assert shares[-1] == pytest.approx(1.1)
+    applied = schedule.wrenches[schedule.watched :] / LOAD.wrench
+    np.testing.assert_allclose(applied, np.tile(shares[:, None], 6))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.3, OVERLOAD])
+def test_planned_forces_balance_every_share_of_a_limit(share):
+    """Below the limit, at it, and above it, where the fingers cannot apply them."""
+    tested = 0
+    for name in ("wedge", "random-12-1"):
+        body, found = grasps(name, 0.5, 2)
+        for grasp in found:
+            idle = rig_of(body, grasp, 0.5).idle
+            for limit in limiting_loads(body, grasp, 0.5, 4):
+                load = part(idle, limit, share)
+                assert imbalance(load, body, grasp) < 1e-6
+                np.testing.assert_allclose(load.wrench, share * limit.wrench)
+                tested += 1
+    assert tested >= 12

@@ -1,0 +1,137 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import scenes
+from scenes.mujoco.layout import TOUCH
+from scenes.mujoco.mjcf_text import quaternion
+from sim_validate.engine.bench import Health, Motion
+from sim_validate.engine.traces import (
+    displaced,
+    rotated,
+    rotation_angles,
+    strayed,
+    traces,
+)
+from tests.judges import random_rotation
+from tests.sim_validate.rigs import grasps
+
+
+@pytest.fixture(scope="module")
+def layout():
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    return scenes.build_scene(body, grasp, 0.5).layout
+
+
+def motion(rows, **changes):
+    still = {
+        "times_s": 0.01 * np.arange(1, len(rows) + 1), "joints": np.array(rows),
+        "state": np.zeros(1), "health": Health(),
+    }  # fmt: skip
+    return Motion(**still | changes)
+
+
+def pose(shift=(0.0, 0.0, 0.0), rotation=None, slides=None, scale=1.0):
+    """Joint positions of the object about its centre of mass, and of four fingers."""
+    turn = quaternion(np.eye(3) if rotation is None else rotation)
+    slid = np.zeros((4, 3)) if slides is None else slides
+    return np.concatenate([shift, scale * turn, np.ravel(slid)])
+
+
+def test_quaternions_turn_like_matrices_whatever_their_length():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        R, v = random_rotation(rng), rng.normal(size=(5, 3))
+        np.testing.assert_allclose(rotated(3.0 * quaternion(R)[None], v), v @ R.T, atol=1e-13)
+
+
+def test_small_angles_are_exact():
+    for angle in (1e-12, 1e-6, 0.1, 3.0):
+        turned = np.array([[np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0]])
+        for sign in (1.0, -1.0):
+            found = rotation_angles(sign * turned, np.array([[1.0, 0.0, 0.0, 0.0]]))
+            assert found[0] == pytest.approx(angle, rel=1e-10)
+
+
+def test_motion_is_measured_from_the_moment_watching_begins(layout):
+    rows = [pose((0.0, 0, 0)), pose((1e-3, 0, 0)), pose((1e-3, 2e-4, 0)), pose((1e-3, 2e-4, 3e-4))]
+    (found,) = traces([motion(rows)], layout, [2])
+    assert len(found.times_s) == 2
+    np.testing.assert_allclose(found.shifts_m, [2e-4, np.hypot(2e-4, 3e-4)])
+    assert found.start_m == pytest.approx(1e-3)
+
+
+def test_a_turn_about_the_middle_of_the_contacts_counts_as_turn_alone(layout):
+    """The object's frame is elsewhere, so it moves; the point between the contacts does not."""
+    angle = 1e-3
+    R = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    (found,) = traces([motion([pose(), pose(layout.center - R @ layout.center, R)])], layout, [1])
+    assert found.shifts_m[0] < 1e-15
+    assert found.rotations_rad[0] == pytest.approx(angle)
+    assert found.displacements_m[0] == pytest.approx(layout.grasp_size_m * angle)
+
+
+def test_slips_and_gaps_are_those_of_the_contact_frames(layout):
+    slides = np.zeros((4, 3))
+    slides[0, 0], slides[1, 1], slides[2, 2] = -2e-5, 3e-5, 4e-5
+    (found,) = traces([motion([pose(), pose(slides=slides)])], layout, [1])
+    touching = -TOUCH * layout.grasp_size_m
+    np.testing.assert_allclose(found.gaps_m[0] - touching, [2e-5, 0.0, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(found.slips_m[0], [0.0, 3e-5, 4e-5, 0.0], atol=1e-15)
+    touched = layout.contacts[3] - touching * layout.frames[3, :, 0]
+    np.testing.assert_allclose(found.touched_m[0, 3], touched, atol=1e-15)
+
+
+def test_fingers_that_move_with_the_object_do_not_slip(layout):
+    rng = np.random.default_rng(1)
+    R, shift = random_rotation(rng), rng.normal(size=3)
+    there = layout.tip_centers @ R.T + shift
+    slides = np.einsum("kij,ki->kj", layout.frames, there - layout.tip_centers)
+    (found,) = traces([motion([pose(), pose(shift, R, slides, scale=1.1)])], layout, [1])
+    assert found.slips_m.max() < 1e-14
+    assert np.abs(found.gaps_m + TOUCH * layout.grasp_size_m).max() < 1e-14
+
+
+def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):
+    (found,) = traces([motion([pose(), pose()], health=Health(timed_out=True))], layout, [5])
+    assert len(found.times_s) == len(found.displacements_m) == 0
+    assert found.health.timed_out
+
+
+def test_rigid_fingers_have_no_slides(layout):
+    """The scene has no joints for them: seven numbers a row."""
+    rigid = replace(layout, drive=replace(layout.drive, rigid=True))
+    away = 1e-4 * layout.frames[0, :, 0]
+    (found,) = traces([motion([pose()[:7], pose(away)[:7]])], rigid, [1])
+    assert found.gaps_m[0, 0] == pytest.approx(1e-4)
+
+
+def any_poses(count):
+    rng = np.random.default_rng(3)
+    rows = [
+        pose(1e-3 * rng.normal(size=3), random_rotation(rng), 1e-3 * rng.normal(size=(4, 3)))
+        for _ in range(count)
+    ]
+    return np.array(rows)
+
+
+def test_trials_are_measured_alike_alone_and_beside_others(layout):
+    motions = [motion(any_poses(count)) for count in (4, 1, 7, 2)]
+    watched = [2, 1, 0, 5]
+    for earlier in (None, motions[0]):
+        together = traces(motions, layout, watched, earlier)
+        for each, first, beside in zip(motions, watched, together, strict=True):
+            (alone,) = traces([each], layout, [first], earlier)
+            for name in ("times_s", "displacements_m", "rotations_rad", "slips_m", "gaps_m"):
+                np.testing.assert_array_equal(getattr(beside, name), getattr(alone, name))
+            assert beside.start_m == alone.start_m
+    assert [len(each.times_s) for each in together] == [2, 0, 7, 0]
+
+
+def test_the_way_from_the_planned_pose_is_the_way_from_any_pose(layout):
+    poses = any_poses(20)[:, :7]
+    planned = np.tile(pose()[:7], (20, 1))
+    np.testing.assert_allclose(
+        strayed(poses, layout), displaced(poses, planned, layout), rtol=1e-13
+    )

@@ -1,0 +1,70 @@
+"""Units in other processes: few and long ones too, and from any script and folder."""
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sim_validate.kit.processes import Shared, each
+from tests.grasp_core.tasks_to_do import meet
+from tests.patience import HANGING_S
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_results_come_in_the_order_of_the_units(jobs):
+    assert list(each(abs, range(-20, 0), jobs=jobs)) == list(range(20, 0, -1))
+
+
+def test_an_error_in_a_unit_reaches_the_caller():
+    with pytest.raises(TypeError):
+        list(each(abs, [None] * 20, jobs=2))
+
+
+@pytest.mark.timeout(HANGING_S)
+def test_two_long_units_are_done_at_the_same_time(tmp_path):
+    one, other = str(tmp_path / "one"), str(tmp_path / "other")
+    assert len(set(each(meet, [(one, other), (other, one)], jobs=2))) == 2
+
+
+SCRIPT = """
+import os, sys
+import sim_validate as sv
+from scenes import example_object
+import grasp_core as gc
+from sim_validate.kit import processes
+
+print("begun")
+processes.UNITS_PER_PROCESS, processes.START_S = 1, 0.0
+body = example_object("tetrahedron")
+plan = gc.plan(body, limit=3)
+os.rmdir(os.getcwd())
+print(len(sv.validate_all(body, plan, jobs=2, agenda=sv.Agenda(controls=False))))
+"""
+
+
+def test_a_script_needs_no_guard_and_no_working_folder(tmp_path):
+    (tmp_path / "gone").mkdir()
+    (tmp_path / "script.py").write_text(SCRIPT)
+    done = subprocess.run(
+        [sys.executable, tmp_path / "script.py"], cwd=tmp_path / "gone", check=False, text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("begun\n3\n", "")
+
+
+def test_what_was_sent_twice_arrives_as_one():
+    value = frozenset({"a", "b"})
+    first, second = (pickle.loads(pickle.dumps(Shared(value))) for _ in range(2))  # noqa: S301
+    assert first.value == value
+    assert first.value is second.value
+    assert first.value is not value
+
+
+def test_another_value_arrives_as_another():
+    first, second = (pickle.loads(pickle.dumps(Shared(value))) for value in ("a", "b"))  # noqa: S301
+    assert (first.value, second.value) == ("a", "b")

@@ -1,0 +1,219 @@
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from grasp_core.errors import UndecidedError
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.planning import contact_analysis as analysis
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
+from tests.sim_validate.planning.contacts_files import (
+    CROSS,
+    TETRAHEDRON,
+    arms_and_normals,
+    contacts,
+)
+
+
+def test_the_centers_of_a_tetrahedron(analyze):
+    """By hand: four equal forces n_i / 4 have the margin 0.5 / 4; equal weights balance the 32
+    edges; the torque part of G G' is (4/3 - 4/9) I, and smaller than the force part. The l1
+    quality is bracketed by repeated qhull with exact support points.
+    """
+    code, document = analyze(TETRAHEDRON)
+    (grasp,) = document["grasps"]
+    assert code == Exit.GOOD
+    assert (grasp["id"], grasp["closed"], grasp["outcome"]) == ("0", True, "closed")
+    assert grasp["closure_margin"] == pytest.approx(0.125, abs=1e-9)
+    assert grasp["critical_friction"] == 0.0
+    lower, upper = grasp["ferrari_canny_l1_n"]
+    assert lower <= 0.213202
+    assert upper >= 0.213195
+    assert upper - lower <= 1e-4 * upper
+    assert grasp["verified"] == dict.fromkeys(
+        ("closure", "ferrari_canny_l1_n", "ferrari_canny_linf_n"), True
+    )
+    assert grasp["min_weight"] == pytest.approx(1.0 / 32.0, abs=1e-9)
+    assert grasp["smallest_singular_value"] == pytest.approx(np.sqrt(8.0 / 9.0), rel=1e-12)
+    assert grasp["hull_volume"] > 0.0
+    assert grasp["undecided"] == {}
+    assert document["complete"] is True
+
+
+def test_what_is_resisted_in_every_direction_is_no_more_than_along_the_axes(analyze):
+    _, document = analyze(TETRAHEDRON, "--max-normal-force", "5")
+    (grasp,) = document["grasps"]
+    weakest = grasp["weakest_axis_wrench"]
+    everywhere = grasp["resisted_in_every_direction_n"]
+    assert everywhere == pytest.approx(5.0 * grasp["ferrari_canny_linf_n"][0], rel=1e-12)
+    assert 0.0 < everywhere <= weakest["limit"] <= weakest["upper"]
+    assert np.linalg.norm(weakest["wrench"]) == 1.0
+
+
+def test_forces_and_separating_wrench_prove_themselves_from_the_document(analyze):
+    """In plain sums, with only what the document says."""
+    _, document = analyze({"grasps": [
+        {"id": "closed", "contacts": contacts(TETRA_CENTERS + 2.0, TETRA_NORMALS)},
+        {"id": "open", "contacts": contacts(TETRA_CENTERS[:2] + 2.0, TETRA_NORMALS[:2])},
+    ], "friction": 0.5})  # fmt: skip
+    closed, left = document["grasps"]
+    arms, normals = arms_and_normals(closed)
+    forces = np.array(closed["forces"])
+    pushes = (forces * normals).sum(axis=1)
+    assert np.abs(forces.sum(axis=0)).max() < 1e-9
+    assert np.abs(np.cross(arms, forces).sum(axis=0)).max() < 1e-9
+    assert (np.linalg.norm(forces - pushes[:, None] * normals, axis=1) < 0.5 * pushes).all()
+    assert closed["separating_wrench"] is left["forces"] is None
+    arms, normals = arms_and_normals(left)
+    facing = np.array(left["separating_wrench"])
+    velocities = facing[:3] + np.cross(facing[3:], arms)
+    along = (velocities * normals).sum(axis=1)
+    across = np.linalg.norm(velocities - along[:, None] * normals, axis=1)
+    assert np.linalg.norm(facing) > 0.0
+    assert (along + 0.5 * across <= 1e-9).all()
+
+
+def test_two_contacts_are_never_closed(analyze):
+    code, document = analyze({"contacts": contacts(CROSS[:2], -CROSS[:2]), "friction": 2.0})
+    (grasp,) = document["grasps"]
+    assert code == Exit.NEGATIVE
+    assert (grasp["closed"], grasp["outcome"]) == (False, "open")
+    assert grasp["critical_friction"] is None
+    assert grasp["verified"]["closure"] is True
+    assert grasp["resisted_in_every_direction_n"] == 0.0
+    assert grasp["hull_volume"] == grasp["smallest_singular_value"] == 0.0
+
+
+def test_both_ends_of_the_critical_friction_are_shown(analyze, capsys):
+    """Contacts on the sides of a box, each 0.2 aside of the middle and by turns 0.3 up and down."""
+    turned = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, -1]])
+    turns = [np.linalg.matrix_power(turned, i) for i in range(4)]
+    sides = contacts([t @ [1.0, 0.2, 0.3] for t in turns], [t @ [-1.0, 0, 0] for t in turns])
+    code, document = analyze({"contacts": sides, "friction": 0.5})
+    (grasp,) = document["grasps"]
+    lower, upper = grasp["critical_friction_interval"]
+    assert code == Exit.GOOD
+    assert lower <= 0.2 <= upper == grasp["critical_friction"]
+    assert upper - lower <= 1e-7
+    main(["analyze", "contacts.json"])
+    words = " ".join(capsys.readouterr().out.split())
+    shown = re.search(r"proved between ([0-9.]+) and ([0-9.]+)", words)
+    assert lower - 1e-7 <= float(shown[1]) <= lower, "rounded down"
+    assert upper <= float(shown[2]) <= upper + 1e-7, "rounded up"
+
+
+def test_a_weight_that_no_weights_balance_is_null(analyze):
+    """Contacts that all push along z."""
+    code, document = analyze({"contacts": contacts(CROSS, [[0.0, 0, 1]] * 4), "friction": 0.0})
+    assert code == Exit.NEGATIVE
+    assert document["grasps"][0]["min_weight"] is None
+
+
+def test_several_grasps_are_judged_one_by_one(analyze, capsys):
+    file = {"grasps": [
+        {"id": "four", "contacts": contacts(CROSS, -CROSS)},
+        {"contacts": contacts(CROSS[:2], -CROSS[:2])},
+        {"contacts": contacts(TETRA_CENTERS, TETRA_NORMALS)},
+    ], "friction": 0.3}  # fmt: skip
+    code, document = analyze(file)
+    assert code == Exit.NEGATIVE
+    assert [g["id"] for g in document["grasps"]] == ["four", "1", "2"]
+    assert [g["closed"] for g in document["grasps"]] == [True, False, True]
+    assert document["summary"] == {"grasps": 3, "closed": 2, "open": 1, "undecided": 0}
+    assert main(["analyze", "contacts.json", "--wrench", "0", "0", "-1", "0", "0", "0"]) == code
+    shown = capsys.readouterr().out
+    assert "2 of 3 grasps are in" in shown
+
+
+def test_a_load_along_the_axis_of_a_cross(analyze):
+    """By hand: four contacts hold 0.5 x 10 N each, so -z is resisted up to 20 N; the forces of
+    least norm for 2 N share it, 0.5 N each, with 1 N of normal force."""
+    flags = "--wrench 0 0 -2 0 0 0 --wrench 0 0 -25 0 0 0"
+    code, document = analyze({"contacts": contacts(CROSS, -CROSS), "friction": 0.5}, *flags.split())
+    light, heavy = document["grasps"][0]["wrenches"]
+    assert code == Exit.GOOD
+    assert light["wrench"] == [0.0, 0.0, -2.0, 0.0, 0.0, 0.0]
+    assert light["limit"] == pytest.approx(10.0, rel=1e-7)
+    assert light["limit"] <= light["upper"] == pytest.approx(10.0, rel=1e-7)
+    expected = np.array([[-1.0, 0, 0.5], [1, 0, 0.5], [0, -1, 0.5], [0, 1, 0.5]])
+    assert np.array(light["least_norm_forces_n"]) == pytest.approx(expected, abs=1e-6)
+    assert heavy["upper"] == pytest.approx(0.8, rel=1e-7)
+    assert heavy["least_norm_forces_n"] is None
+
+
+def test_a_cross_needs_friction_at_both_pairs(analyze):
+    """The pair along y turns nothing about y; without friction the other pair does not either."""
+    file = {"contacts": contacts(CROSS, -CROSS), "friction": 0.5}
+    assert analyze(file)[0] == Exit.GOOD
+    for contact in file["contacts"][:2]:
+        contact["friction"] = 0.0
+    code, document = analyze(file)
+    assert code == Exit.NEGATIVE
+    facing = np.array(document["grasps"][0]["separating_wrench"])
+    assert np.flatnonzero(np.abs(facing) > 1e-9 * np.abs(facing).max()).tolist() == [4]
+
+
+def test_center_and_scale_are_the_contacts_own_unless_given(analyze):
+    """Measured so, moving and scaling the grasp changes nothing, to the gap of the bounds."""
+    given = {"contacts": contacts(TETRA_CENTERS, TETRA_NORMALS), "friction": 0.5}
+    moved = given | {"contacts": contacts(0.1 * TETRA_CENTERS + 3.0, TETRA_NORMALS)}
+    (here,) = analyze(given)[1]["grasps"]
+    (there,) = analyze(moved)[1]["grasps"]
+    assert there["center_m"] == pytest.approx([3.0, 3.0, 3.0], rel=1e-12)
+    assert there["torque_scale_m"] == pytest.approx(0.1 / np.sqrt(3.0), rel=1e-9)
+    assert (there["center_from"], there["torque_scale_from"]) == (
+        "mean contact", "farthest contact",
+    )  # fmt: skip
+    for name in ("ferrari_canny_l1_n", "ferrari_canny_linf_n"):
+        assert there[name] == pytest.approx(here[name], rel=1e-4)
+    (flagged,) = analyze(TETRAHEDRON, "--torque-scale-m", "2")[1]["grasps"]
+    assert (flagged["torque_scale_m"], flagged["torque_scale_from"]) == (2.0, "flag")
+    assert flagged["center_from"] == "file"
+
+
+def test_grasps_of_a_plan_are_measured_by_their_object(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plan", "wedge", "--limit", "3", "--out", "p", "-q"]) == Exit.GOOD
+    planned = json.loads(Path("p/grasps.json").read_text())
+    assert main(["analyze", "p/grasps.json", "--json"]) == Exit.GOOD
+    document = json.loads(capsys.readouterr().out)
+    assert len(document["grasps"]) == 3
+    center = planned["object"]["center_of_mass_m"]
+    vertices = np.array(planned["object"]["mesh"]["vertices_m"])
+    for grasp, source in zip(document["grasps"], planned["grasps"], strict=True):
+        assert grasp["id"] == source["id"]
+        assert grasp["closure_margin"] == pytest.approx(source["closure_margin"], abs=1e-9)
+        assert grasp["critical_friction"] == pytest.approx(source["critical_friction"], abs=1e-6)
+        assert grasp["center_m"] == pytest.approx(center, abs=1e-15)
+        radius = np.linalg.norm(vertices - center, axis=1).max()
+        assert grasp["torque_scale_m"] == pytest.approx(radius, rel=1e-9)
+        assert grasp["ferrari_canny_l1_n"] == pytest.approx(source["ferrari_canny"], rel=1e-4)
+        assert {contact["friction"] for contact in grasp["contacts"]} == {0.5}
+    assert max(g["critical_friction"] for g in planned["grasps"]) > 0.01
+    assert main(["analyze", "p/grasps.json", "--friction", "0.01", "-q"]) == Exit.NEGATIVE
+    assert main(["analyze", "p/grasps.json", "--outward"]) == Exit.INPUT
+    assert "--outward" in capsys.readouterr().err
+    Path("none.json").write_text(json.dumps(planned | {"grasps": []}))
+    assert main(["analyze", "none.json"]) == Exit.INPUT
+    assert "none.json: grasps: the list is empty" in capsys.readouterr().err
+
+
+def test_what_cannot_be_decided_is_named_and_the_rest_is_answered(analyze, monkeypatch, capsys):
+    def undecided(*_):
+        raise UndecidedError("too close to zero")
+
+    monkeypatch.setattr(analysis, "force_closure", undecided)
+    code, document = analyze(TETRAHEDRON)
+    (grasp,) = document["grasps"]
+    assert code == Exit.NEGATIVE
+    assert (grasp["closed"], grasp["outcome"]) == (None, "undecided")
+    assert grasp["undecided"] == {"closure": "too close to zero"}
+    assert grasp["verified"]["closure"] is False
+    assert grasp["critical_friction"] == 0.0
+    assert grasp["ferrari_canny_l1_n"][0] > 0.2
+    assert document["summary"]["undecided"] == 1
+    assert main(["analyze", "contacts.json"]) == Exit.NEGATIVE
+    assert "closure is undecided: too close to zero" in capsys.readouterr().out

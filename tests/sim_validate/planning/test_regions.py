@@ -1,0 +1,179 @@
+"""`graspproof regions`: regions and proofs that a stranger can re-check from the files alone."""
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+
+import sim_validate as sv
+from grasp_core.geometry.polygons import plane_frame
+from grasp_core.objects.on_faces import within
+from grasp_core.records.grasps_json import grasps_from_json
+from grasp_core.regions.proof import TwistCover
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+
+NAMES = ("axes", "codes", "forces")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("regions")
+    assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "1000"]
+    asked += ["--out", str(folder), "-q"]
+    assert main(asked) == Exit.GOOD
+    return folder
+
+
+def test_every_grasp_has_regions_of_its_own(folder):
+    planned = json.loads((folder / "grasps.json").read_text())
+    found = json.loads((folder / "regions.json").read_text())
+    assert found["object"]["content_sha256"] == planned["object"]["content_sha256"]
+    assert [each["id"] for each in found["grasps"]] == [each["id"] for each in planned["grasps"]]
+    for grasp in found["grasps"]:
+        assert grasp["disc_radius_m"] > 0.0
+        for region in grasp["regions"]:
+            assert region["kind"] == "certified"
+            assert region["area_m2"] >= np.pi * region["inscribed_radius_m"] ** 2
+            assert np.shape(region["polygon_m"])[1] == 3
+
+
+def test_the_proofs_can_be_checked_from_their_files(folder):
+    checked = 0
+    for path in sorted((folder / "proofs").iterdir()):
+        with np.load(path, allow_pickle=False) as kept:
+            proof = {name: kept[name] for name in kept.files}
+        cover = TwistCover(**{name: proof[name] for name in NAMES})
+        regions = [(proof[f"region{i}_m"] - proof["origin_m"]) / proof["scale_m"] for i in range(4)]
+        friction = proof["friction"]
+        assert not proof["depths_m"].any()
+        assert cover.verify(regions, proof["normals"], friction)
+        assert not cover.verify(regions, proof["normals"], 0.9 * friction)
+        assert not cover.verify([1.3 * region for region in regions], proof["normals"], friction)
+        checked += 1
+    assert checked == 3
+
+
+def test_one_grasp_with_a_reserve(folder, capsys):
+    name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
+    asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--json"]
+    asked += ["--max-cones", "1000"]
+    assert main([*asked, "--reserve", ".4"]) == Exit.GOOD
+    found = json.loads(capsys.readouterr().out)
+    (grasp,) = found["grasps"]
+    assert (grasp["id"], found["reserve"]) == (name, 0.4)
+    assert main(asked) == Exit.GOOD
+    (without,) = json.loads(capsys.readouterr().out)["grasps"]
+    assert grasp["disc_radius_m"] < without["disc_radius_m"]
+
+
+def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
+    planned = json.loads((folder / "grasps.json").read_text())["grasps"]
+    grasp = max(planned, key=lambda each: each["critical_friction"])
+    barely = str(grasp["critical_friction"] * (1.0 + 1e-7))
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "64"]
+    asked += ["--grasp", grasp["id"], "--friction", barely]
+    assert main(asked) == Exit.NEGATIVE
+    assert "no regions for 1 of 1 grasps: " in capsys.readouterr().out
+
+
+def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, capsys):
+    grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
+    frictions = sorted(grasp["critical_friction"] for grasp in grasps)
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "8000", "--out", str(tmp_path)]
+    between = str(0.99 * frictions[2])
+    assert main([*asked, "--friction", between]) == Exit.NEGATIVE
+    assert "no regions for 1 of 3 grasps: not in force closure" in capsys.readouterr().out
+    found = json.loads((tmp_path / "regions.json").read_text())["grasps"]
+    assert [grasp["regions"] is None for grasp in found].count(True) == 1
+    assert len(list((tmp_path / "proofs").iterdir())) == 2
+    for grasp in found:
+        kept = tmp_path / "proofs" / f"{grasp['id']}.npz"
+        assert kept.exists() == (grasp["regions"] is not None)
+        if grasp["regions"]:
+            assert grasp["proof"]["sha256"] == hashlib.sha256(kept.read_bytes()).hexdigest()
+
+
+def test_a_proof_of_before_does_not_stay(folder, tmp_path):
+    name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
+    asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--out", str(tmp_path), "-q"]
+    kept = tmp_path / "proofs" / f"{name}.npz"
+    assert main([*asked, "--max-cones", "300"]) == Exit.GOOD
+    assert kept.exists()
+    assert main([*asked, "--friction", "0.001"]) == Exit.NEGATIVE
+    assert not kept.exists()
+
+
+def test_files_give_back_the_regions_and_their_proof(folder):
+    document = json.loads((folder / "regions.json").read_text())
+    for grasp in document["grasps"]:
+        found = sv.load_regions(folder / grasp["proof"]["file"])
+        assert found.verify()
+        assert found.radius == grasp["disc_radius_m"]
+        for region, told in zip(found.regions, grasp["regions"], strict=True):
+            np.testing.assert_array_equal(region.polygon, told["polygon_m"])
+            assert region.inscribed_radius == pytest.approx(told["inscribed_radius_m"])
+
+
+def test_plans_may_come_with_certified_regions(tmp_path, folder):
+    asked = ["plan", "wedge", "--limit", "3", "--regions", "--out", str(tmp_path), "-q"]
+    assert main(asked) == Exit.GOOD
+    plain = json.loads((folder / "grasps.json").read_text())["grasps"]
+    found = grasps_from_json((tmp_path / "grasps.json").read_text()).grasps
+    widened = 0
+    for new, old in zip(found, plain, strict=True):
+        assert new.id == old["id"]
+        assert sv.load_regions(tmp_path / "proofs" / f"{new.id}.npz").verify()
+        if new.regions[0].kind != "certified":
+            assert new.radius == old["radius_m"]
+            continue
+        assert new.radius > old["radius_m"]
+        widened += 1
+        for region, contact in zip(new.regions, new.contacts, strict=True):
+            ring = ring_around(contact, 0.999 * new.radius)
+            assert all(within(point, region.polygon, contact.normal, 0.0) for point in ring)
+    assert widened >= 2
+
+
+def ring_around(contact, radius):
+    frame = plane_frame(contact.normal)
+    turns = np.linspace(0.0, 2.0 * np.pi, 60)
+    return contact.position + radius * np.column_stack([np.cos(turns), np.sin(turns)]) @ frame.T
+
+
+def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
+    asked = ["run", "tetrahedron", "--limit", "1", "--family", "concurrent", "--out", str(tmp_path)]
+    assert main([*asked, "--regions", "--no-report", "-q"]) == Exit.GOOD
+    (grasp,) = json.loads((tmp_path / "grasps.json").read_text())["grasps"]
+    assert grasp["regions"][0]["kind"] == "certified"
+    assert sv.load_regions(tmp_path / "proofs" / f"{grasp['id']}.npz").verify()
+    assert main([*asked, "--no-report", "-q"]) == Exit.GOOD
+    assert not (tmp_path / "regions.json").exists()
+    assert not list((tmp_path / "proofs").iterdir())
+
+
+def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path):
+    saved = grasps_from_json((folder / "grasps.json").read_text())
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "1000", "--out", str(tmp_path)]
+    assert main([*asked, "--edge-clearance-m", "0.006", "-q"]) == Exit.GOOD
+    near = 0
+    for grasp in saved.grasps:
+        found = sv.load_regions(tmp_path / "proofs" / f"{grasp.id}.npz")
+        assert clearance_of(saved.body, grasp, found.regions) > 0.006 - 1e-9
+        near += float(np.linalg.norm(found.centers - grasp.positions, axis=1).max()) > 1e-6
+    assert near > 0
+    assert main([*asked, "--edge-clearance-m", "0.05", "-q"]) == Exit.NEGATIVE
+
+
+def clearance_of(body, grasp, regions):
+    """How far regions are from the edges of their faces."""
+    least = np.inf
+    for region, index in zip(regions, grasp.faces, strict=True):
+        face = body.faces[index]
+        edges = np.roll(face.polygon, -1, axis=0) - face.polygon
+        inward = np.cross(face.normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
+        inside = np.einsum("ki,cki->ck", inward, region.polygon[:, None] - face.polygon)
+        least = min(least, inside.min())
+    return least

@@ -1,0 +1,25 @@
+"""A small run, and what its report is."""
+
+import pytest
+
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.report.report import write_report
+
+
+@pytest.fixture(scope="session")
+def small_run(tmp_path_factory):
+    """The folder of a run of three grasps with certified regions and simulated limits."""
+    folder = tmp_path_factory.mktemp("run")
+    asked = ["run", "wedge", "--limit", "3", "--family", "pencil", "--family", "concurrent"]
+    asked += ["--limits", "ramp", "--trials", "2", "--no-report", "-q"]
+    assert main([*asked, "--out", str(folder)]) == Exit.GOOD
+    certify = ["regions", str(folder / "grasps.json"), "--max-cones", "64", "-q"]
+    assert main([*certify, "--out", str(folder)]) == Exit.GOOD
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_report(small_run, tmp_path_factory):
+    """The folder of its report."""
+    return write_report(small_run, tmp_path_factory.mktemp("report"), jobs=1).index.parent

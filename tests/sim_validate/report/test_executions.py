@@ -1,0 +1,259 @@
+"""Reports show what executions found; the executions here are written by hand."""
+
+import math
+import re
+import shlex
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grasp_core.closure.contacts import contacts_sha256
+from grasp_core.errors import InputError
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from scenes.mujoco.held import HeldSettings
+from scenes.mujoco.physics import PhysicsSettings
+from sim_validate import main as commands
+from sim_validate.execution.asked_executions import execution_settings
+from sim_validate.execution.executions_json import Executions, executions_to_json, load_executions
+from sim_validate.execution.settings import ExecutionSettings
+from sim_validate.execution.trials import Skipped
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+)
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.planning.grasps_json import read_grasps
+from sim_validate.report import drawn_grasps
+from sim_validate.report import report as reports
+from sim_validate.report.drawn_grasps import Drawn
+from sim_validate.report.executed_grasps import execute_command, said_of_both
+from sim_validate.report.report import write_report
+from sim_validate.report.run_folder import runs_in
+from tests.sim_validate.changing import changed
+from tests.sim_validate.report.test_report import EVIL, Page
+
+SETTINGS = ExecutionSettings(0.3, shake_g=0.5, stop_m_per_s2=2.0 * GRAVITY_M_PER_S2,
+                             stop_from_m_per_s=1.0, knock_n_s=0.02)  # fmt: skip
+
+
+def trial(kind, name, *, predicted=2.0, simulated=2.0, survived=True, fate="stuck"):
+    return ExecutionTrial(kind, name, survived, fate, 1.25e-3, 2.5e-3, math.radians(3.5),
+                          predicted, 1.25 * predicted, simulated, 0.00125)  # fmt: skip
+
+
+TRIALS = (
+    trial("weight", "weight", predicted=math.inf, simulated=math.inf),
+    trial("shake", "shake along x", predicted=1.31, simulated=1.32),
+    trial("shake", "shake about x", predicted=0.72, simulated=0.73, fate="slipped"),
+    trial("stop", "stop +x", predicted=0.91, simulated=0.92, survived=False, fate="dropped"),
+)
+KEPT = tuple(replace(each, survived=True, fate="stuck") for each in TRIALS)
+SKIPPED = (Skipped("lift", "a fingertip is in the way"),)
+
+
+def execution(multiple, trials, *, let_go=True, skipped=()):
+    controls = (ExecutionControl("friction 0.9", let_go, 0.96 if let_go else math.inf),)
+    return Execution(0.3, np.full((4, 3), 2.0), multiple, trials, controls, skipped)
+
+
+def executed(saved, found):
+    return tuple(
+        ExecutedGrasp(grasp.id, grasp.family, contacts_sha256(grasp.contacts), each,
+                      None if each else "no squeeze survives the loads")
+        for grasp, each in zip(saved.grasps, found, strict=True)
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A folder with three grasps: one loses the object, one survives, one has no squeeze."""
+    folder = tmp_path_factory.mktemp("executed")
+    assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
+    saved = read_grasps(folder / "grasps.json")
+    found = executed(saved, [execution(2.5, TRIALS, skipped=SKIPPED), execution(3.5, KEPT), None])
+    text = executions_to_json(saved.body, 0.4, SETTINGS, found, complete=True)
+    (folder / "executions.json").write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def report(run):
+    return write_report(run, run.parent / "report of executions", jobs=1).index.parent
+
+
+@pytest.fixture
+def copy(run, tmp_path):
+    return shutil.copytree(run, tmp_path / "copy")
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """Pages without their pictures, which take a second."""
+    monkeypatch.setattr(reports, "draw", lambda task: Drawn(f"pictures/{task.name}", None, None))
+
+
+def cells_of(page, heading):
+    """The texts of a table's row that begins with a heading."""
+    row = page[page.index(heading) :]
+    return [text for text in Page(row[: row.index("</tr>")]).said if text.strip()][1:]
+
+
+def test_the_first_page_has_a_row_for_each_grasp(run, report):
+    text = (report / "index.html").read_text()
+    table = text[text.index('id="executions"') :]
+    names = [grasp.id for grasp in read_grasps(run / "grasps.json").grasps]
+    assert cells_of(table, f"{names[0]}</a></th>")[-7:] == [
+        "failed 1 of 4 trials", "3 of 4", "0.90", "0.75", "2.5", "0.72", "0.73",
+    ]  # fmt: skip
+    assert cells_of(table, f"{names[1]}</a></th>")[-7:-2] == [
+        "survived", "4 of 4", "0.90", "1.05", "3.5",
+    ]  # fmt: skip
+    assert cells_of(table, f"{names[2]}</a></th>")[-7:] == [
+        "no squeeze", "0 of 0", "-", "-", "-", "-", "-",
+    ]  # fmt: skip
+    assert re.findall(r'data-loss="([^"]*)"', text) == ["0.9", "0.9", "0"]
+    assert '<option value="-loss">' in text
+    said = " ".join(Page(text).said)
+    assert "with 0.3 kg at friction 0.4, 1 of 3 grasps survived every trial; 2 of 2" in said
+    assert "no squeeze holds the object in 1 of them" in said
+    assert f"Best for this is {names[1]}: predicted to be lost at 0.90 times" in said
+    assert "its squeeze carries 1.05 kg in any direction." in said
+    for name in names:
+        assert f"grasps/{name}.html#executed" in text
+
+
+@pytest.mark.parametrize(
+    ("closure", "place", "said", "tone"),
+    [
+        ("held", 0, "closure: held; execution: lost", "bad"),
+        ("held", 1, "closure: held; execution: survived", "good"),
+        ("slipped", 1, "closure: slipped; execution: survived", "bad"),
+        ("held", None, "closure: held; execution: not executed", "good"),
+    ],
+)
+def test_a_grasp_is_bad_if_its_closure_or_its_execution_is(run, closure, place, said, tone):
+    found = load_executions(run / "executions.json")
+    verdict = {"outcome": closure, "held": closure == "held", "mismatches": [], "controls": {}}
+    one = None if place is None else found.grasps[place]
+    assert said_of_both(verdict, found, one) == (said, tone)
+    assert said_of_both(verdict, None, None)[0] == closure
+
+
+def test_the_page_of_a_grasp_has_all_of_its_execution(run, report):
+    lost, kept, none = (
+        (report / "grasps" / f"{grasp.id}.html").read_text()
+        for grasp in read_grasps(run / "grasps.json").grasps
+    )
+    assert cells_of(lost, ">stop +x<")[-8:] == [
+        "failed", "dropped", "1.2", "2.5", "3.5", "0.91", "0.92", "1.14",
+    ]  # fmt: skip
+    assert cells_of(lost, ">weight<")[-3:] == ["never", "never", "never"]
+    assert cells_of(lost, ">friction 0.9<")[-2:] == ["let go", "0.96"]
+    said = " ".join(Page(lost).said)
+    for part in ("0.3 kg, at friction 0.4", "at most 10 N", "2000 N/m, fingertips of 50 g",
+                 "2.5 times the weight", "1.5 g in any direction",
+                 "No lift: a fingertip is in the way."):  # fmt: skip
+        assert part in said
+    assert "No lift" not in kept
+    assert "No squeeze: no squeeze survives the loads." in " ".join(Page(none).said)
+    assert all("magnified" not in page for page in (lost, kept, none))
+
+
+def test_grasps_that_were_lost_are_drawn_first(run):
+    """The second grasp is the only one that survives."""
+    (folder,) = runs_in(run)
+    ids = [grasp.id for grasp in folder.saved.grasps]
+    assert [folder.alarms(name) for name in ids] == [True, False, True]
+    assert [grasp.id for grasp in folder.first(2).saved.grasps] == [ids[0], ids[2]]
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_control_that_held_is_bad_news(copy, tmp_path):
+    saved = read_grasps(copy / "grasps.json")
+    found = executed(saved, [execution(2.5, KEPT, let_go=False), execution(3.5, KEPT), None])
+    text = executions_to_json(saved.body, 0.4, SETTINGS, found, complete=False)
+    (copy / "executions.json").write_text(text)
+    said = Page(write_report(copy, tmp_path / "out", jobs=1, limit=1).index.read_text()).said
+    assert said.count("a negative control held") == 2
+    assert "the executions were interrupted" in " ".join(said)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda each: each["object"].update(content_sha256="0"), "another object than grasps.json"),
+        (lambda each: each["executions"][0].update(contacts_sha256="0"), "contacts of .* differ"),
+        (lambda each: each["executions"][0].update(survived=True), r"executions\[0\].survived"),
+    ],
+)  # fmt: skip
+def test_files_of_other_runs_are_refused(copy, change, says):
+    changed(copy / "executions.json", change)
+    with pytest.raises(InputError, match=f"executions.json: .*{says}"):
+        write_report(copy, jobs=1)
+    assert not (copy / "report").exists()
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_names_and_reasons_are_escaped(copy, tmp_path):
+    def spoiled(document):
+        first = document["executions"][0]
+        first["trials"][0]["name"] = first["skipped"][0]["reason"] = EVIL
+        document["executions"][2]["reason"] = EVIL
+
+    changed(copy / "executions.json", spoiled)
+    report = write_report(copy, tmp_path / "out", jobs=1, limit=2).index.parent
+    pages = [path.read_text() for path in (report / "grasps").iterdir()]
+    assert len(pages) == 2
+    assert all("<script>document" not in page for page in pages)
+    assert all(EVIL.replace("\x1b", " ") in "".join(Page(page).said) for page in pages)
+
+
+def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
+    finer = PhysicsSettings(timestep=0.001)
+    changed(copy / "executions.json",
+            lambda each: each["executions"][0].update(physics=finer.record()))  # fmt: skip
+
+    def film(job, name, path):
+        assert (job.friction, job.settings, job.physics["timestep"]) == (0.4, SETTINGS, 0.001)
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(name)
+
+    monkeypatch.setattr(drawn_grasps, "film", film)
+    report = write_report(copy, tmp_path / "out", jobs=1, limit=1, clips=1).index.parent
+    clips = {path.name: path.read_text() for path in (report / "clips").iterdir()}
+    first = read_grasps(copy / "grasps.json").grasps[0].id
+    assert clips == {
+        f"{first}-executed-0.webp": "shake about x", f"{first}-executed-1.webp": "stop +x",
+    }  # fmt: skip
+    page = Page((report / "grasps" / f"{first}.html").read_text())
+    assert {f"../clips/{name}" for name in clips} <= set(page.links)
+    assert "it is not magnified" in " ".join(page.said)
+    assert "stop +x: dropped" in page.said
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        SETTINGS,
+        ExecutionSettings(
+            0.1, 7.5, 950.0, 0.004, HeldSettings(0.02, 0.7, (0.1, -0.25, -1e-3)),
+            ("weight", "misplaced"), 0.1, 0.4, 2.0, 7.0, 9.0, 0.4, 0.01, 1.5, 3.0, 4, 17, 6.0, 7.0,
+        ),
+    ],
+)  # fmt: skip
+def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monkeypatch):
+    asked = []
+    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    executions = Executions("", 0.35, settings, True, ())
+    line = execute_command(executions, str(run / "grasps.json"), "c-0-1-2-7")
+    assert main(shlex.split(line)[1:]) == Exit.GOOD
+    (flags,) = asked
+    assert (flags.friction, flags.grasp) == (0.35, "c-0-1-2-7")
+    of = read_grasps(flags.grasps)
+    asked = of.body, flags.seed, of.finger, flags.executing, flags.trials, flags.down
+    assert execution_settings(*asked) == settings

@@ -1,0 +1,170 @@
+"""Reports show the hand in the grasps that it reaches, and say why it is missing elsewhere."""
+
+import json
+import shlex
+
+import numpy as np
+import pytest
+
+from grasp_core.errors import InputError
+from scenes.drawing.colours import FINGERS, HAND
+from scenes.drawing.turntable import UNITS
+from sim_validate import main as commands
+from sim_validate.hands.reaches_json import read_reaches
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+from sim_validate.report.report import write_report
+from tests.scenes.drawing.standing import (
+    FRICTION,
+    GRASP,
+    POSITIONS,
+    run_with_hand,
+    small_plan,
+    standing,
+)
+from tests.sim_validate.changing import changed
+from tests.sim_validate.report.test_report import Page
+
+(OTHER,) = (each.id for each in small_plan() if each.id != GRASP)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return run_with_hand(tmp_path_factory.mktemp("run"))
+
+
+@pytest.fixture(scope="module")
+def report(run, tmp_path_factory):
+    return write_report(run, tmp_path_factory.mktemp("report"), jobs=1).index.parent
+
+
+def changed_run(folder, change):
+    run_with_hand(folder)
+    changed(folder / "reaches.json", change)
+    return folder
+
+
+def test_the_file_holds_the_hand_and_what_was_found(run):
+    _, grasp, hand, reach = standing()
+    saved, _ = read_reaches(run / "reaches.json")
+    assert saved.hand == hand
+    assert saved.missing == ""
+    found = saved.found[grasp.id]
+    for name in ("joints", "palm_pose", "fingers"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(reach, name))
+    assert found.contacts == reach.contacts
+    assert found.within_regions == reach.within_regions
+    assert not saved.found[OTHER].reached
+    assert (saved.reached, len(saved.found)) == (1, 2)
+    assert saved.finger_names(found) == ("thumb", "ring", "first", "middle")
+
+
+def test_cards_show_the_hand_where_it_stands(report):
+    index = Page((report / "index.html").read_text())
+    pictures = [known["src"] for tag, known in index.tags if tag == "img"]
+    assert pictures == [
+        f"pictures/{name}-hand.svg" if name == GRASP else f"pictures/{name}.svg"
+        for name in (each.id for each in small_plan())
+    ]
+    said = " ".join(index.said)
+    assert "The hand allegro reaches 1 of 2 grasps." in said
+    assert "allegro: reached, within regions" in said
+    assert "allegro: not reached, a collision" in said
+    text = (report / "pictures" / f"{GRASP}-hand.svg").read_text()
+    assert "with the hand allegro" in text
+    for finger in FINGERS:
+        assert finger.lower() in text.lower()
+
+
+def test_the_page_turns_the_hand_and_has_its_figures(report):
+    page = Page((report / "grasps" / f"{GRASP}.html").read_text())
+    drawing = json.loads(page.data["drawing"])
+    shapes = drawing["shapes"]
+    roles = [shape["role"] for shape in shapes]
+    assert roles.count("fingertip") == 4
+    assert roles.count("hand") > 20
+    assert {shape["colour"] for shape in shapes if shape["role"] == "hand"} == {HAND}
+    assert all(shape["solid"] for shape in shapes if shape["role"] in {"hand", "fingertip"})
+    body = standing()[0]
+    (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
+    points = body.center_of_mass + np.array(contacts) * body.radius / UNITS
+    np.testing.assert_allclose(points, POSITIONS, atol=body.radius / UNITS)
+    assert {"finger", "force cone"} <= set(drawing["hidden"])
+    assert not {"hand", "fingertip", "contact"} & set(drawing["hidden"])
+    said = " ".join(" ".join(page.said).split())
+    for part in ("In the hand allegro", "reached, within regions", "0.5 mm", "4 of 4",
+                 "0: thumb, 1: ring, 2: first, 3: middle"):  # fmt: skip
+        assert part in said
+
+
+def test_a_grasp_that_is_not_reached_says_why(report):
+    page = Page((report / "grasps" / f"{OTHER}.html").read_text())
+    assert "hand" not in {shape["role"] for shape in json.loads(page.data["drawing"])["shapes"]}
+    said = " ".join(page.said)
+    assert "not reached, a collision" in said
+    assert "From 3 starts no pose was found: fingertips did not get to their contacts." in said
+    assert not (report / "pictures" / f"{OTHER}-hand.svg").exists()
+
+
+def test_the_command_of_the_page_seeks_the_pose_again(report, monkeypatch):
+    asked = []
+    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or 0)
+    page = (report / "grasps" / f"{GRASP}.html").read_text()
+    line = next(line for line in page.splitlines() if "graspproof reach" in line)
+    words = shlex.split(line.partition("graspproof ")[2])
+    assert words[:4] == ["reach", "grasps.json", "--hand", "allegro"]
+    assert main(words) == Exit.GOOD
+    (command,) = asked
+    assert (command.grasp, command.friction, command.starts) == (GRASP, FRICTION, 100)
+
+
+def moved(record):
+    record["hand"]["model"]["fingers"][0]["tip_center_m"][2] += 0.001
+
+
+def renamed(record):
+    record["hand"]["joints"][0] = "other"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (moved, "its fingertips do not touch at the contacts there"),
+        (renamed, "The hand allegro cannot be drawn"),
+    ],
+)
+def test_a_hand_that_cannot_be_drawn_is_said_plainly(change, said, tmp_path, capsys):
+    folder = changed_run(tmp_path / "run", change)
+    report = write_report(folder, jobs=1).index.parent
+    for page in (report / "index.html", report / "grasps" / f"{GRASP}.html"):
+        assert said in " ".join(" ".join(Page(page.read_text()).said).split())
+    assert not list(report.glob("pictures/*-hand.svg"))
+    asked = ["view", str(folder / "grasps.json"), "--grasp", GRASP, "--page"]
+    assert main([*asked, str(tmp_path / "a.html")]) == Exit.GOOD
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda each: each.update(reaches=2 * each["reaches"]), "two records of one grasp"),
+        (lambda each: each["reaches"][0].update(contacts_sha256="0" * 64), "contacts of .* differ"),
+        (lambda each: each["reaches"][0].update(reached=False), "exactly where `reached` is true"),
+        (lambda each: each["object"].update(content_sha256="0" * 64), "another object"),
+    ],
+)
+def test_a_file_that_contradicts_itself_or_its_grasps_is_refused(change, said, tmp_path):
+    folder = changed_run(tmp_path, change)
+    with pytest.raises(InputError, match=rf"reaches\.json: .*{said}"):
+        write_report(folder, jobs=1)
+
+
+def test_the_command_view_shows_the_hand_unless_it_is_left_out(run, tmp_path, capsys):
+    asked = ["view", str(run), "--grasp", GRASP, "--page"]
+    for name, more, shown in (("a", [], True), ("b", ["--no-hand"], False)):
+        path = tmp_path / f"{name}.html"
+        assert main([*asked, str(path), *more]) == Exit.GOOD
+        assert ('"role":"hand"' in path.read_text()) == shown
+        assert ("Fingers of allegro" in path.read_text()) == shown
+    assert main(["view", str(run), "--grasp", OTHER, "--page", str(tmp_path / "c.html")]) == 0
+    assert "the hand is not shown" in capsys.readouterr().err

@@ -1,0 +1,178 @@
+"""Trials of verdicts and of rows of datasets, replayed from the command line."""
+
+import json
+
+import pytest
+
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
+
+NOISE = ("--noise-shift", ".02", "--noise-turn-deg", "3", "--noise-friction", ".3")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A run with a task that is too much."""
+    folder = tmp_path_factory.mktemp("run")
+    task = {"wrenches": [{"name": "too much", "force_n": [0, 0, 90]}]}
+    (folder / "task.json").write_text(json.dumps(task))
+    planned = ["plan", "screwdriver", "--limit", "2", "--out", str(folder), "-q"]
+    assert main(planned) == Exit.GOOD
+    trials = ("--wrenches", str(folder / "task.json"), "--seed", "3")
+    grasps = str(folder / "grasps.json")
+    assert main(["validate", grasps, *trials, "--out", str(folder), "-q"]) == Exit.NEGATIVE
+    return folder
+
+
+@pytest.fixture
+def replay(capsys):
+    def replay(*flags, code=Exit.GOOD):
+        assert main(["replay", *map(str, flags), "--json"]) == code
+        return json.loads(capsys.readouterr().out)
+
+    return replay
+
+
+def verdicts_in(folder):
+    return json.loads((folder / "verdicts.json").read_text())["verdicts"]
+
+
+def test_verdicts(folder, replay):
+    verdict = verdicts_in(folder)[0]
+    found = replay(folder, "--grasp", verdict["id"])
+    assert (found["wrench"], found["recorded_outcome"]) == ("too much", "slipped")
+    for trial in verdict["wrenches"][:3]:
+        found = replay(
+            folder / "verdicts.json", "--grasp", verdict["id"], "--wrench", trial["name"]
+        )
+        for key in ("outcome", "displacement_m", "predicted_limit", "required_friction"):
+            assert found[key] == trial[key]
+        assert found["recorded_outcome"] == trial["outcome"]
+
+
+def test_controls(folder, replay):
+    verdict = verdicts_in(folder)[0]
+    assert len(verdict["controls"]) >= 3
+    for name, control in verdict["controls"].items():
+        found = replay(folder, "--grasp", verdict["id"], "--control", name)
+        first = control["wrenches"][0]
+        assert found["name"] == f"{verdict['id']}:{name}"
+        assert found["displacement_m"] == first["displacement_m"]
+        assert found["recorded_outcome"] == first["outcome"]
+        assert found["predicted_limit"] is None
+
+
+def test_repeats_with_noise(folder, replay, tmp_path):
+    grasps = (folder / "grasps.json", "--limit", "1")
+    repeats = ("--trials", "12", *NOISE, "--out", tmp_path, "-q")
+    assert main(["validate", *map(str, (*grasps, *repeats))]) == Exit.GOOD
+    verdict = verdicts_in(tmp_path)[0]
+    about = (tmp_path, "--grasps", folder / "grasps.json", "--grasp", verdict["id"])
+    failed = [each for each in verdict["robustness"]["not_held"] if each["wrench"]]
+    assert failed
+    for each in failed[:2]:
+        found = replay(*about, "--trial", each["trial"])
+        assert found["reason"] == each["reason"]
+        assert found["recorded_outcome"] == each["outcome"]
+    numbers = {each["trial"] for each in verdict["robustness"]["not_held"]}
+    held = next(number for number in range(12) if number not in numbers)
+    found = replay(*about, "--trial", held, "--wrench", "+force_x")
+    assert found["recorded_outcome"] == "held"
+
+
+def test_files_are_written(folder, replay, tmp_path, monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "no-such-library")
+    name = verdicts_in(folder)[0]["id"]
+    found = replay(folder, "--grasp", name, "--out", tmp_path / "new")
+    files = {path.name for path in (tmp_path / "new").iterdir()}
+    assert files == {"scene.xml", "trace.csv"}
+    assert len(found["files"]) == 2
+    rows = (tmp_path / "new" / "trace.csv").read_text().splitlines()
+    head = rows[0].split(",")
+    assert head[:4] == ["time_s", "displacement_m", "shift_m", "rotation_rad"]
+    assert len(head) == 12
+    largest = max(float(row.split(",")[1]) for row in rows[1:])
+    # the file has the whole trial, the verdict is known before
+    assert len(rows) == 1 + 40
+    assert largest >= found["displacement_m"] > 0.0
+
+
+def test_a_trial_that_ends_otherwise_than_recorded_is_negative(folder, tmp_path, replay):
+    record = json.loads((folder / "verdicts.json").read_text())
+    record["verdicts"][0]["wrenches"][0]["outcome"] = "slipped"
+    (tmp_path / "verdicts.json").write_text(json.dumps(record))
+    name = record["verdicts"][0]["id"]
+    flags = ("--grasp", name, "--wrench", "+force_x")
+    found = replay(tmp_path, *flags, "--grasps", folder / "grasps.json", code=Exit.NEGATIVE)
+    assert (found["outcome"], found["recorded_outcome"]) == ("held", "slipped")
+
+
+@pytest.mark.usefixtures("built_here")
+def test_dataset_rows(tmp_path, replay, capsys):
+    out = tmp_path / "ds"
+    assert main(["dataset", "build", "wedge", "--limit", "1", "--out", str(out), "-q"]) == Exit.GOOD
+    capsys.readouterr()
+    import sim_validate as sv
+
+    tables = sv.load_dataset(out)
+    rows = tables["grasps"]
+    assert len(rows["grasp_id"]) >= 6
+    for name, outcome in zip(rows["grasp_id"], rows["outcome"], strict=True):
+        found = replay(out, "--grasp", name)
+        trials = [row for row, of in enumerate(tables["trials"]["grasp_id"]) if of == name]
+        by_name = {tables["trials"]["name"][row]: row for row in trials}
+        row = by_name[found["wrench"]]
+        assert found["outcome"] == tables["trials"]["outcome"][row]
+        assert found["displacement_m"] == tables["trials"]["displacement_m"][row]
+        assert found["recorded_outcome"] == outcome
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (("--grasp", "no"), "no grasp is named no; the file has "),
+        (("--grasp", "FIRST", "--control", "no"), "has no negative control 'no'; choose from "),
+        (("--grasp", "FIRST", "--trial", "0", "--control", "x"), "give only one of them"),
+    ],
+)
+def test_what_is_not_there_is_named(folder, capsys, flags, message):
+    first = verdicts_in(folder)[0]["id"]
+    flags = [first if flag == "FIRST" else flag for flag in flags]
+    assert main(["replay", str(folder), *flags]) == Exit.INPUT
+    assert message in capsys.readouterr().err
+
+
+def test_grasps_of_another_object_are_refused(folder, tmp_path, capsys):
+    assert main(["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"]) == Exit.GOOD
+    other = str(tmp_path / "grasps.json")
+    assert main(["replay", str(folder), "--grasp", "x", "--grasps", other]) == Exit.INPUT
+    assert "are on another object" in capsys.readouterr().err
+
+
+def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):
+    text, first = (folder / "verdicts.json").read_text(), verdicts_in(folder)[0]
+    path = tmp_path / "verdicts.json"
+    path.write_text(text.replace(first["contacts_sha256"], "0" * 64))
+    grasps = str(folder / "grasps.json")
+    assert main(["replay", str(path), "--grasp", first["id"], "--grasps", grasps]) == Exit.INPUT
+    assert "have changed since these results" in capsys.readouterr().err
+
+
+def test_a_wrench_with_a_minus_sign_is_named_with_an_equals_sign(folder, replay):
+    name = verdicts_in(folder)[0]["id"]
+    assert replay(folder, "--grasp", name, "--wrench=-force_x")["wrench"] == "-force_x"
+
+
+def test_a_trial_that_diverges_is_replayed_as_far_as_it_goes(folder, tmp_path, replay):
+    """A gigantic wrench: no clip of what is no number, and no crash."""
+    task = tmp_path / "task.json"
+    huge = {"name": "huge", "force_n": [0, 0, 1e9]}
+    task.write_text(json.dumps({"wrenches": [huge]}))
+    grasps = str(folder / "grasps.json")
+    asked = ("--wrenches", str(task), "--limit", "1", "--out", str(tmp_path), "-q")
+    assert main(["validate", grasps, *asked]) == Exit.NEGATIVE
+    (verdict,) = verdicts_in(tmp_path)
+    about = ("--grasps", grasps, "--grasp", verdict["id"], "--wrench", "huge")
+    found = replay(tmp_path, *about, "--out", tmp_path / "out")
+    assert found["outcome"] == "diverged"
+    assert (tmp_path / "out" / "trace.csv").is_file()
