@@ -192,7 +192,7 @@ class Plan(Declared, ById[Grasp], InNotebooks):
     def to_dataframe(self) -> Any:
         """Return a `pandas.DataFrame` with a row for each grasp, indexed by id.
 
-        Columns have the names and units of `grasps.json`, see `grasp_core.grasp_tables.data_frame`.
+        Columns are named as in `grasps.json`, see `grasp_core.grasp_tables.data_frame`.
 
         Raises:
             InputError: The library pandas is not installed.
