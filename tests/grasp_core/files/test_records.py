@@ -17,11 +17,10 @@ from grasp_core.files.records import (
     FLAT,
     UNRECORDED,
     Key,
+    RecordFile,
     from_record,
-    record_in,
     record_of,
     recorded,
-    text_of_record,
 )
 from grasp_core.kinds import (
     Count,
@@ -114,15 +113,21 @@ def test_a_value_is_read_as_it_was_written(change):
     assert record_of(found) == record_of(value)
 
 
-def test_a_record_is_a_file_with_a_schema():
-    text = text_of_record(PART, 3)
+@dataclass(frozen=True, slots=True, eq=False)
+class PartFile(RecordFile):
+    FILE, SCHEMA = "part", 3
+    part: Annotated[Part, FLAT]
+
+
+def test_a_record_can_have_a_file_with_a_schema():
+    text = PartFile(PART).text()
     assert json.loads(text) == {
         "schema": 3, "point_m": [0, 1, 2], "way": [0, 0, 1], "size_m": 0.1, "double_m": 0.2,
         "turned": [0, 0, -1],
     }  # fmt: skip
-    assert record_in(Part, text, "part", 3) == PART
+    assert PartFile.of_text(text).part == PART
     with pytest.raises(gc.InputError, match="newer"):
-        record_in(Part, text, "part", 2)
+        PartFile.of_text(text.replace("3", "4", 1))
 
 
 def test_fields_have_their_keys_and_flat_ones_stand_among_them():
