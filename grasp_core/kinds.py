@@ -8,7 +8,7 @@ command-line help waits for it.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
 from enum import Enum
 from numbers import Integral, Real
@@ -91,13 +91,18 @@ class Many:
     least: int = 1
     most: int = MOST_COUNT
 
-    def holds(self, value: tuple[Any, ...]) -> bool:
+    def holds(self, value: Sized) -> bool:
         """Return whether a sequence has neither fewer nor more items."""
         return self.least <= len(value) <= self.most
 
     def __str__(self) -> str:
         """Return the range in words."""
         return f"(at least {self.least}, at most {self.most})"
+
+    def fault(self, value: Sized) -> str:
+        """Return in words why a sequence has too few or too many items."""
+        most = f" and at most {self.most}" if self.most < MOST_COUNT else ""
+        return f"must have a length of at least {self.least}{most}, got {len(value)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +122,8 @@ class Null:
 
 Quantity = Annotated[float, Range(least=SMALLEST, most=LARGEST)]
 """A length, force or similar quantity in SI units of a plausible size."""
+Signed = Annotated[float, Range(least=-LARGEST, most=LARGEST)]
+"""A number of a plausible size, of either sign."""
 NotNegative = Annotated[float, Range(least=0.0, most=LARGEST)]
 Friction = Annotated[float, Range(least=SMALLEST, most=LARGEST_FRICTION)]
 FrictionOrZero = Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)]
@@ -141,7 +148,7 @@ def takes(kind: Any, *, exact: bool = False) -> Take:
     if origin in COMPOUND:
         return COMPOUND[origin](parts, exact)
     if origin is not None and issubclass(origin, Mapping):
-        return _mapping(parts[1], exact)
+        return _mapping(parts, exact)
     if isinstance(kind, type) and issubclass(kind, Enum):
         return _member(kind)
     return (EXACT if exact else PLAIN).get(kind) or _instance(origin or kind, exact)
@@ -187,7 +194,7 @@ def _narrowed(parts: tuple[Any, ...], exact: bool) -> Take:
         plain = inner(value)
         for rule in rules:
             if not rule.holds(plain):
-                raise UnfitError
+                raise UnfitError(rule.fault(plain) if isinstance(rule, Many) else "")
         return plain
 
     return take if rules else inner
@@ -292,13 +299,13 @@ def _tuple(parts: tuple[Any, ...], exact: bool) -> Take:
     return take
 
 
-def _mapping(kind: Any, exact: bool) -> Take:
-    one = takes(kind, exact=exact)
+def _mapping(parts: tuple[Any, ...], exact: bool) -> Take:
+    key, one = (takes(part, exact=exact) for part in parts)
 
     def take(value: Any) -> dict[Any, Any]:
         if not isinstance(value, Mapping):
             raise UnfitError
-        return {name: one(each) for name, each in cast("Mapping[Any, Any]", value).items()}
+        return {key(name): one(each) for name, each in cast("Mapping[Any, Any]", value).items()}
 
     return take
 
@@ -319,8 +326,8 @@ def words(kind: Any) -> str:
         return " ".join([own, *filter(None, narrower)])
     if origin in (Union, UnionType):
         return " or ".join(words(part) for part in parts if part is not type(None))
-    if origin is tuple:
-        return _words_of_items(parts)
+    if origin is tuple or (isinstance(origin, type) and issubclass(origin, Mapping)):
+        return _words_of_items(cast("type", origin), parts)
     if origin is Literal:
         return f"one of {', '.join(map(str, parts))}"
     if isinstance(kind, type) and issubclass(kind, Enum):
@@ -331,9 +338,13 @@ def words(kind: Any) -> str:
     return plain.get(cast("Any", kind)) or f"a {getattr(named, '__name__', 'value')}"
 
 
-def _words_of_items(parts: tuple[Any, ...]) -> str:
+def _words_of_items(origin: type, parts: tuple[Any, ...]) -> str:
+    if origin is not tuple:
+        return f"a table, each key {words(parts[0])}, each value {words(parts[1])}"
     if parts[-1] is Ellipsis:
         return f"a sequence, each item {words(parts[0])}"
+    if any(part != parts[0] for part in parts):
+        return f"{len(parts)} items: {', '.join(map(words, parts))}"
     each = "" if parts[0] is float else f", each {words(parts[0])}"
     return f"{len(parts)} {'numbers' if _is_number(parts[0]) else 'items'}{each}"
 

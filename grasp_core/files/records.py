@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from types import UnionType
 from typing import (
@@ -33,7 +34,7 @@ from grasp_core.declared import Declared, FieldError, default_of, rules, types
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of, shown, text_of
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import Null, inside
+from grasp_core.kinds import Many, Null, inside
 from grasp_core.settings import at, named, placed
 
 UNRECORDED = "unrecorded"
@@ -192,8 +193,10 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def from_record(kind: type[Record], found: object, where: str = "") -> Record:
+def from_record(kind: type[Record], found: object, where: str = "", **beside: Any) -> Record:
     """Make a value of an object of JSON; `where` leads to it, such as 'verdicts[0]'.
+
+    `beside` holds fields that are in no file.
 
     A key that is unknown or missing, a value that the class refuses, and a recorded property that
     the other fields contradict are errors that name the field.
@@ -214,7 +217,7 @@ def from_record(kind: type[Record], found: object, where: str = "") -> Record:
             taken[each.name] = value if read is None else read(value, at(where, each.key))
     said = {each.name: taken.pop(each.name) for each in properties}
     try:
-        made = kind(**taken)
+        made = kind(**taken, **beside)
     except FieldError as error:
         key = next((each.key for each in own if each.name == error.name), error.name)
         raise FieldError(at(where, key), error.fault) from None
@@ -234,10 +237,7 @@ def reads(kind: Any) -> Read | None:
     """Return the function that makes values of a kind of JSON; None if nothing is to be made."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        null = next((rule for rule in parts[1:] if isinstance(rule, Null)), None)
-        if null is None:
-            return reads(parts[0])
-        return lambda value, _where: null.value if value is None else value
+        return _narrowed_read(*parts)
     if origin in (Union, UnionType):
         inner = reads(next(part for part in parts if part is not type(None)))
         return inner and (lambda value, where: None if value is None else inner(value, where))
@@ -249,8 +249,41 @@ def reads(kind: Any) -> Read | None:
     return None if own is None else partial(_record_read, own)
 
 
+def _narrowed_read(kind: Any, *given: Any) -> Read | None:
+    null = next((rule for rule in given if isinstance(rule, Null)), None)
+    if null is not None:
+        return lambda value, _where: null.value if value is None else value
+    array = next((rule for rule in given if hasattr(rule, "take")), None)
+    if array is not None:
+        return partial(_array_read, array.shape)
+    inner, many = reads(kind), next((rule for rule in given if isinstance(rule, Many)), None)
+    if inner is None or many is None:
+        return inner
+
+    def read(value: Any, where: str) -> Any:
+        if isinstance(value, list) and not many.holds(cast("list[Any]", value)):
+            raise InputError(f"{where} {many.fault(cast('list[Any]', value))}")
+        return inner(value, where)
+
+    return read
+
+
 def _record_read(kind: type, value: Any, where: str) -> Any:
     return from_record(cast("type[Any]", kind), value, where)
+
+
+def _array_read(shape: tuple[int | str | None, ...], value: Any, where: str) -> Any:
+    """Refuse true and false, which arrays would take for 1 and 0; an empty list has no rows."""
+    if value == [] and not isinstance(shape[0], int):
+        import numpy as np
+
+        return np.empty((0, *(size for size in shape[1:] if isinstance(size, int))))
+    items: list[Any] = [value]
+    while (found := set(map(type, items))) == {list}:
+        items = [*chain.from_iterable(items)]
+    if bool in found:
+        raise InputError(f"{where}: expected numbers, got true or false among them")
+    return value
 
 
 def _items_read(parts: tuple[Any, ...]) -> Read | None:

@@ -234,6 +234,6 @@ def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> 
 
 
 def _kept_cone(cone: ForceCone) -> ForceCone:
-    """Return a force cone with the half-angle that files keep."""
+    """Return a force cone with the half-angle that degrees keep."""
     half_angle = kept_angle(cone.half_angle)
     return cone if half_angle == cone.half_angle else ForceCone(cone.axis, half_angle)

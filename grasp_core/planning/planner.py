@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import cast
 
-from grasp_core.checked import function, several, text, whole
+from grasp_core.checked import function, whole
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
@@ -134,10 +134,8 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
-    if isinstance(families, str):
-        return (families,)
-    names = several(families, partial(text, name="families"), "families", "names")
-    return cast("tuple[Method, ...]", names)  # those that there are, see `check_request`
+    """Return methods as a tuple, also a single one; `PlanRequest` checks them."""
+    return (families,) if isinstance(families, str) else cast("tuple[Method, ...]", families)
 
 
 def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Searches) -> Plan:

@@ -2,21 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Annotated, Literal, TypeAlias, get_args
 
 from grasp_core.arrays import UNIT_SLACK
-from grasp_core.checked import (
-    SMALLEST,
-    coefficient,
-    instance,
-    number,
-    one_of,
-    seed_of,
-    shown,
-    switch,
-    whole,
-)
+from grasp_core.checked import SMALLEST, number
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.kinds import Count, Friction, Many, NotNegative, Quantity, Seed
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
@@ -40,22 +32,33 @@ MOST_FACES = 1000
 take some hundred megabytes."""
 
 
-@dataclass(frozen=True, slots=True)
-class PlanRequest:
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanRequest(Declared):
     """What is to be planned: the friction and the other keywords of `plan`."""
 
-    friction: float
-    families: tuple[Method, ...]
-    theta_deg: float | None = None
+    friction: Friction
+    families: Annotated[tuple[Method, ...], Many()]
+    theta_deg: Quantity | None = None
     cones: ConeKind = "tilted"
-    limit: int | None = None
+    limit: Count | None = None
     rank_by: RankBy = "radius"
-    seed: int = 0
-    max_face_parts: int = 1
+    seed: Seed = 0
+    max_face_parts: Count = 1
     complete: bool = False
     finger: Finger | None = None
-    clearance: float = 0.0
-    share_faces: float | None = None
+    clearance: NotNegative = 0.0
+    share_faces: NotNegative | None = None
+
+    def _check_together(self) -> None:
+        if self.complete and "free" not in self.families:
+            raise InputError(
+                "complete needs the free method, which decides all faces; add free to families"
+            )
+        if self.theta_deg is not None:
+            widest = math.degrees(math.atan(self.friction))
+            where = f", the angle of friction {self.friction}, or None"
+            most = widest * (1.0 + UNIT_SLACK)
+            number(self.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)
 
     @property
     def theta(self) -> float:
@@ -77,26 +80,6 @@ def methods_for(body: Polyhedron) -> tuple[Method, ...]:
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
     """Refuse keywords out of range, and objects with too many faces for the request."""
     check_body(body)
-    coefficient(request.friction)
-    if request.theta_deg is not None:
-        widest = math.degrees(math.atan(request.friction))
-        where = f", the angle of friction {request.friction}, or None"
-        most = widest * (1.0 + UNIT_SLACK)
-        number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)
-    families: tuple[Any, ...] = request.families
-    if not families or any(family not in METHODS for family in families):
-        raise InputError(f"families must be among {', '.join(METHODS)}; got {shown(families)}")
-    if request.complete and "free" not in request.families:
-        raise InputError(
-            "complete needs the free method, which decides all faces; add free to families"
-        )
-    one_of(request.cones, get_args(ConeKind), "cones")
-    one_of(request.rank_by, get_args(RankBy), "rank_by")
-    if request.limit is not None:
-        whole(request.limit, "limit", least=1)
-    whole(request.max_face_parts, "max_face_parts", least=1)
-    seed_of(request.seed)
-    switch(request.complete, "complete")
     _check_lengths(body, request)
     _check_size(body, request)
 
@@ -107,7 +90,6 @@ def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
         size, where = 2.0 * body.radius, ", the object's size, or None"
         number(request.share_faces, "share_faces", least=0.0, below=size, where=where)
     if request.finger is not None:
-        instance(request.finger, Finger, "finger", "gc.Finger(radius_m, approach_m)")
         radius, approach = request.finger.radius_m, request.finger.approach_m
         number(radius, "finger.radius_m", most=body.radius, where=ITS_RADIUS)
         farthest = FARTHEST_APPROACH * body.radius

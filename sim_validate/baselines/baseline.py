@@ -7,7 +7,7 @@ a changed part, it holds that shape, so that moves of faces are measured from wh
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, field, fields
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
@@ -19,11 +19,12 @@ from pydantic_core import to_jsonable_python
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import check_schema, complaint, object_of, shown
+from grasp_core.files.records import from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.records.grasps_json import RECORDED, surface_of_record, surface_record
-from grasp_core.records.grasps_schema import SurfaceRecord
+from grasp_core.objects.surface import Surface
+from grasp_core.records.grasps_json import RECORDED
 from grasp_core.values import Grasp
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import WEAKEST
@@ -117,17 +118,22 @@ class RecordedPart:
     planned_sha256: str
     vertices_m: tuple[tuple[Finite, Finite, Finite], ...]
     triangles: tuple[tuple[Index, Index, Index], ...]
-    surface: SurfaceRecord = SurfaceRecord()
+    surface: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """What is known of its triangles, as `Surface` is recorded."""
+
+    def __post_init__(self) -> None:
+        from_record(Surface, self.surface, "part.surface")
 
     def body(self, name: str, content_sha256: str) -> Polyhedron:
         """Build the part, with planar faces."""
+        known = from_record(Surface, self.surface, "part.surface")
         try:
             found = polyhedron_from_mesh(
                 self.vertices_m,
                 self.triangles,
                 MeshChoices(faces="planar", limits=RECORDED),
                 name=name,
-                known=surface_of_record(self.surface),
+                known=known,
             )
         except (ValueError, InputError) as error:
             raise InputError(f"part: expected the mesh of a solid: {error}") from error
@@ -148,7 +154,7 @@ def recorded_part(planned: Polyhedron, tested: Polyhedron) -> RecordedPart | Non
         planned_sha256=planned.content_sha256,
         vertices_m=tuple((x, y, z) for x, y, z in rows),
         triangles=tuple((a, b, c) for a, b, c in tested.triangles.tolist()),
-        surface=SurfaceRecord.model_validate(surface_record(tested.surface)),
+        surface=record_of(tested.surface),
     )
 
 
@@ -303,7 +309,7 @@ def baseline_to_json(baseline: Baseline) -> str:
     )
     part = ""
     if (now := baseline.part) is not None:
-        record = asdict(now) | {"surface": now.surface.model_dump()}
+        record = asdict(now)
         part = f' "part": {json.dumps(record)},\n'
     return f'{head},\n{part} "grasps": [\n  {lines}\n ]\n}}\n'
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.declared import vector
+from grasp_core.files.records import record_of
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
-from grasp_core.records.grasps_json import surface_record
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.kit import command_flags
@@ -47,7 +47,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         "largest_spread_deg": math.degrees(max((face.spread for face in body.faces), default=0.0)),
         "largest_depth_m": max((face.depth for face in body.faces), default=0.0),
         "volume_m3": body.volume,
-        "surface": surface_record(body.surface) | {"volume_source": body.surface.volume_source},
+        "surface": record_of(body.surface) | {"volume_source": body.surface.volume_source},
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
         "spanning_quadruples": spanning,
