@@ -11,11 +11,15 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from grasp_core.arrays import Array, frozen, frozen_units
-from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST, positive
+from grasp_core.arrays import Array, Shape
+from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST
 from grasp_core.closure.contacts import contact_frictions
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.figures import Shown
 from grasp_core.files.json_text import record_of, value_of
+from grasp_core.files.records import Key
+from grasp_core.kinds import Quantity
 from grasp_core.records.grasps_json import grasps_from_json
 
 FEWEST_CONTACTS = 2
@@ -77,30 +81,22 @@ class _ContactsFile(_Strict):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ContactSet:
+class ContactSet(Declared):
     """The contacts of one grasp, with the centre and the length by which torques are measured."""
 
-    id: str
-    positions: Array
+    id: Annotated[str, Shown("grasp")]
+    positions: Annotated[Array, Shape("k", 3), Key("positions_m")]
     """Contact points, (k, 3) [m], k >= 2."""
-    normals: Array
+    normals: Annotated[Array, Shape("k", 3, units=True)]
     """Unit vectors into the object, (k, 3)."""
-    friction: Array
+    friction: Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
     """Coulomb coefficients, (k,)."""
-    center: Array
+    center: Annotated[Array, Shape(3), Key("center_m")]
     """Point about which torques are taken, (3,) [m]."""
-    torque_scale: float
+    torque_scale: Annotated[Quantity, Key("torque_scale_m")]
     """Length that makes a torque comparable with a force [m]."""
     center_from: CenterSource
     torque_scale_from: ScaleSource
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "positions", frozen(self.positions, (None, 3), "positions"))
-        count = len(self.positions)
-        object.__setattr__(self, "normals", frozen_units(self.normals, (count, 3), "normals"))
-        object.__setattr__(self, "friction", contact_frictions(self.friction, count))
-        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
-        object.__setattr__(self, "torque_scale", positive(self.torque_scale, "torque_scale"))
 
 
 @dataclass(frozen=True, slots=True)
