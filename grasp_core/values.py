@@ -7,15 +7,17 @@ vectors that point into the object. Arrays are copied, checked and made read-onl
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar, get_args
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen, frozen_units
+from grasp_core.arrays import Array, Shape, frozen, frozen_units
 from grasp_core.checked import LARGEST, instance, number, one_of, several, shown, text, whole
 from grasp_core.declared import ByValue, counted, summary, vector
 from grasp_core.errors import InputError
+from grasp_core.files.records import Key
 from grasp_core.frames import poses_along
+from grasp_core.kinds import NotNegative
 
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
@@ -53,7 +55,7 @@ class ForceCone(ByValue):
 class Contact(ByValue):
     """A point where one fingertip touches the object, with the direction in which it can push."""
 
-    position: Array
+    position: Annotated[Array, Shape(3), Key("position_m")]
     """Point on the surface, (3,) [m]."""
     normal: Array
     """Unit vector into the object, (3,)."""
@@ -71,9 +73,9 @@ class ContactRegion(ByValue):
     """Which proof certifies the region: `cone` is the inverted force cone of a focus point cut with
     the face, `disc` a disc around the contact of a pencil, `certified` a region with a proof of its
     own (see `certify_regions`); `point` claims nothing but the contact."""
-    polygon: Array
+    polygon: Annotated[Array, Shape(None, 3), Key("polygon_m")]
     """Convex polygon on the face, (k, 3) [m]; for a disc, points of its border."""
-    inscribed_radius: float
+    inscribed_radius: Annotated[NotNegative, Key("inscribed_radius_m")]
     """Radius of the largest disc inside the region [m]."""
 
     def __post_init__(self) -> None:

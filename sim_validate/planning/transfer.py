@@ -25,7 +25,7 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps, load_object
 from sim_validate.planning.grasps_json import GRASPS
-from sim_validate.planning.transfer_json import TRANSFER, carried_to_json, transfer_to_json
+from sim_validate.planning.transfer_json import TransferFile, carried_to_json
 
 MM = 1e3
 ABSENT = "-"
@@ -59,11 +59,11 @@ def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
             saved.body, new, saved.grasps, saved.friction, distance=command.carrying.distance_m,
             angle_deg=command.carrying.angle_deg, finger=saved.finger,
         )  # fmt: skip
-        text = transfer_to_json(found)
+        text = TransferFile.of(found).text()
         if command.out is not None:
             remove_results(command.out)
             grasps = write_text(command.out / GRASPS, carried_to_json(found, saved))
-            path = write_text(command.out / TRANSFER, text)
+            path = write_text(command.out / TransferFile.FILE, text)
             reporter.say(f"wrote {grasps} and {path}")
     reporter.text(text)
     _show(found, reporter)
