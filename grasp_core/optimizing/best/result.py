@@ -7,7 +7,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, is_a, is_number
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.declared import ByValue
+from grasp_core.declared import ByValue, Declared
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.search import EXACT_GAP
 from grasp_core.optimizing.best.support_cuts import CutTree
@@ -58,7 +58,7 @@ def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class GapAt:
+class GapAt(Declared):
     """How far a search had come at one moment."""
 
     seconds: float

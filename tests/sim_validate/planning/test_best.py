@@ -73,8 +73,8 @@ def test_the_weight_and_a_task_can_be_held_best(tmp_path, capsys):
         assert all(each["quality"][0] <= each["quality"][1] for each in best["planned"])
         assert best["planned"]
         assert gc.load_grasps(out / "grasps.json")[0].id == best["grasp"]["id"]
-    assert [each["force_n"] for each in best["wrenches"]] == [[0, 0, -3], [0, 0, -3]]
-    assert np.allclose(best["wrenches"][1]["torque_n_m"], [0.02, 0, 0], rtol=0.0, atol=1e-12)
+    loads = [[0, 0, -3, 0, 0, 0], [0, 0, -3, 0.02, 0, 0]]
+    assert np.allclose(best["wrenches"], loads, rtol=0.0, atol=1e-12)
     assert "multiple" in capsys.readouterr().out
 
 

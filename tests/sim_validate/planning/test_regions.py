@@ -32,11 +32,13 @@ def test_every_grasp_has_regions_of_its_own(folder):
     found = json.loads((folder / "regions.json").read_text())
     assert found["object"]["content_sha256"] == planned["object"]["content_sha256"]
     assert [each["id"] for each in found["grasps"]] == [each["id"] for each in planned["grasps"]]
+    assert found["summary"] == {"grasps": 3, "proved": 3}
     for grasp in found["grasps"]:
         assert grasp["disc_radius_m"] > 0.0
+        assert grasp["area_m2"] >= 4.0 * np.pi * grasp["inscribed_radius_m"] ** 2
         for region in grasp["regions"]:
             assert region["kind"] == "certified"
-            assert region["area_m2"] >= np.pi * region["inscribed_radius_m"] ** 2
+            assert region["inscribed_radius_m"] >= grasp["inscribed_radius_m"]
             assert np.shape(region["polygon_m"])[1] == 3
 
 
