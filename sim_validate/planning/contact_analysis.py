@@ -251,7 +251,7 @@ def _weakest_axis(contacts: ContactSet, question: Question) -> Resisted:
 
 
 def _resisted(contacts: ContactSet, wrench: ArrayLike, question: Question) -> Resisted:
-    (limit,) = _limits(contacts, [wrench], question)
+    (limit,) = _limits(contacts, np.array([wrench]), question)
     if limit.upper < 1.0:
         return limit
     try:
