@@ -20,6 +20,7 @@ from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import Friction, Many, Measured, OrInfinity
 from grasp_core.notebooks import InNotebooks
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import Scene
@@ -191,9 +192,13 @@ class Verdict(Declared, InNotebooks):
 
     @recorded
     def displacement_m(self) -> Annotated[Measured, Shown("um moved", ".2g", MICRO)]:
-        """Largest displacement of the object in the trials that hold a wrench [m]."""
-        moved = [trial.hold.displacement_m for trial in self.wrenches]
-        return math.nan if any(map(math.isnan, moved)) else max(moved, default=0.0)
+        """Largest displacement of the object under any wrench, after friction was lowered [m]."""
+        return _largest([trial.hold.displacement_m for trial in self.wrenches])
+
+    @recorded
+    def start_displacement_m(self) -> Annotated[Measured, Shown("um when loaded", ".2g", MICRO)]:
+        """Largest one before that, at high friction: the fingers give way a little [m]."""
+        return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
 
     @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
@@ -243,6 +248,10 @@ class Verdict(Declared, InNotebooks):
         return card(placed(self.scene.layout), title, _rows(self))
 
 
+def _largest(values: Sequence[float]) -> float:
+    return math.nan if any(map(math.isnan, values)) else max(values, default=0.0)
+
+
 def _disagreement(friction: CriticalFriction) -> str:
     simulated, predicted = friction.simulated, friction.predicted
     if simulated is None:
@@ -285,6 +294,14 @@ class Verdicts(RecordFile, ById[Verdict]):
     """How the simulator did on cases with known answers."""
     verdicts: tuple[Verdict, ...]
     versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @classmethod
+    def of(
+        cls, body: Polyhedron, friction: float, gate: Gate, verdicts: tuple[Verdict, ...], *,
+        complete: bool = True,
+    ) -> Self:  # fmt: skip
+        """Collect verdicts on the grasps of an object for a file."""
+        return cls(AboutObject.of(body), friction, complete, gate, verdicts)
 
     @property
     def object_sha256(self) -> str:
