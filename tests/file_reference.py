@@ -10,9 +10,11 @@ from pathlib import Path
 from grasp_core.figures import described
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
+from sim_validate.planning.transfer_json import TransferFile
+from sim_validate.protocols.verdict import Judgements
 
 PAGE = Path(__file__).parent.parent / "docs" / "files.md"
-FILES = {kind.FILE: kind for kind in (Verdicts,)}
+FILES = {kind.FILE: kind for kind in (Verdicts, Judgements, TransferFile)}
 IN_FILES = re.compile(r"\b(None|NaN)\b")
 """What JSON lacks: files have null there."""
 MARKED = re.compile(r"(<!-- fields: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)

@@ -78,7 +78,7 @@ class GraspFigures(Declared):
     """Proved margin of force closure; zero or negative where the contacts are not closed."""
     critical_friction: OrInfinity
     """Smallest Coulomb coefficient above which the contacts are in force closure; at most the
-    friction where they are closed, and infinite where none suffices."""
+    friction where they are closed, and infinite (null in files) where none suffices."""
     ferrari_canny: tuple[float, float]
     """Proved lower and upper bound of the quality [N]; zeros where the contacts are not closed."""
 
@@ -88,6 +88,7 @@ class CarriedContact(Declared):
     """What became of one contact of a grasp on the changed part."""
 
     finger: int
+    """Index of the finger."""
     old_face: int
     """Number of the face of the old part on which the contact was."""
     new_face: int | None
@@ -96,7 +97,7 @@ class CarriedContact(Declared):
     """The contact on the changed part, with the normal of its face; None if it has no place."""
     distance: Annotated[OrInfinity, Key("moved_m")]
     """How far it moved [m]; without a place, the distance of the nearest like face, which is
-    infinite if there is none."""
+    infinite (null in files) if there is none."""
     turn: Annotated[float, Key("turned_rad")]
     """Angle between its old normal and that of the nearest like face [rad]; 0.0 if there is none.
     """
@@ -130,12 +131,12 @@ class CarriedGrasp(Declared):
 
     @recorded
     def id(self) -> str:
-        """Return the id of the grasp of the old part."""
+        """The id of the grasp of the old part."""
         return self.old.id
 
     @recorded
     def new_id(self) -> str | None:
-        """Return the id of the grasp of the changed part; None if it is gone."""
+        """The id of the grasp of the changed part; None if it is gone."""
         return None if self.grasp is None else self.grasp.id
 
     def __repr__(self) -> str:
@@ -172,7 +173,7 @@ class Transfer(Declared):
 
     @recorded
     def bands(self) -> Mapping[str, float]:
-        """Return the differences of figures that do not count."""
+        """Differences that do not count: of critical frictions, and of qualities as a share."""
         return {
             "critical_friction": FRICTION_BAND * self.friction,
             "ferrari_canny_share": QUALITY_BAND,
@@ -180,7 +181,7 @@ class Transfer(Declared):
 
     @recorded
     def summary(self) -> Mapping[str, int]:
-        """Return how many grasps there are of each status, and how many contacts moved."""
+        """Numbers of grasps of each status, and of contacts that moved or were lost."""
         contacts = [each for grasp in self.grasps for each in grasp.contacts]
         rounding = self.old.radius * SAME  # a contact on a face that stayed is put on its plane
         placed = [each for each in contacts if each.contact is not None]

@@ -25,7 +25,7 @@ class OurVerdict(Declared):
     """Whether the object stayed within our thresholds under every load; False without closure."""
     margin: Annotated[OrInfinity, Shown("margin", ".3g")]
     """Least multiple of the loads that is resisted according to the analysis; 0 without closure,
-    and infinite without a load."""
+    and infinite (null in files) without a load."""
     reason: str
 
 
@@ -88,9 +88,13 @@ class Totals(Declared):
     protocol: Annotated[str, Shown("test")]
     grasps: Annotated[Number, Shown("grasps")]
     theirs_passed: Annotated[Number, Shown("passed theirs")]
+    """Grasps that passed the published test."""
     ours_held: Annotated[Number, Shown("held ours")]
+    """Grasps that held in our trials of the same loads."""
     predicted: Annotated[Number, Shown("predicted to resist")]
+    """Grasps that resist the loads according to the analysis."""
     agree: Annotated[Number, Shown("theirs as ours")]
+    """Grasps for which the published test and our trials say the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
