@@ -134,6 +134,10 @@ class GraspRegions(Declared):
                 f"{self.id}: expected either regions with all of their figures, or a reason why "
                 "there are none"
             )
+        if any(len(each.polygon) < FEWEST_CORNERS for each in self.regions or ()):
+            raise InputError(
+                f"{self.id}: expected regions with at least {FEWEST_CORNERS} corners each"
+            )
 
     @recorded
     def inscribed_radius_m(self) -> Annotated[float | None, Shown("inner mm", ".3g", MILLI)]:
