@@ -10,7 +10,7 @@ from pathlib import Path
 from grasp_core.figures import described
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.planning.transfer_json import TransferFile
+from sim_validate.planning.transfer import TransferFile
 from sim_validate.protocols.verdict import Judgements
 
 PAGE = Path(__file__).parent.parent / "docs" / "files.md"

@@ -34,12 +34,17 @@ PROOFS = "proofs"
 MILLI = 1e3
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
 BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
+FIELDS: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
+    "normals": ("normals", (FINGERS, 3)), "friction": ("friction", (FINGERS,)),
+    "origin": ("origin_m", (3,)), "depths": ("depths_m", (FINGERS,)), "scale": ("scale_m", ()),
+    "centers": ("centers_m", (FINGERS, 3)), "radius": ("disc_radius_m", ()),
+    "limit": ("open_radius_m", ()), "open_choice": ("open_choice_m", (None, 3)),
+    "open_wrench": ("open_wrench", (None,)),
+}  # fmt: skip
+"""Name and shape of the array in a proof file for fields of `CertifiedRegions`."""
 SHAPES: Mapping[str, tuple[int | None, ...]] = {
-    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3), "normals": (FINGERS, 3),
-    "friction": (FINGERS,), "origin_m": (3,), "depths_m": (FINGERS,), "centers_m": (FINGERS, 3),
-    "open_choice_m": (None, 3), "open_wrench": (None,), "scale_m": (), "disc_radius_m": (),
-    "open_radius_m": (),
-    **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
+    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3),
+    **dict(FIELDS.values()), **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
 }  # fmt: skip
 """Shape of each array in a proof file; None stands for any length."""
 MOST_CORNERS = 1000
@@ -197,26 +202,20 @@ def proof_arrays(
     proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
 ) -> dict[str, NDArray[Any]]:
     """Return the regions of a grasp and their proof, as arrays by name."""
-    cover, choice, wrench = proved.cover, proved.open_choice, proved.open_wrench
+    empty = {"open_choice": np.zeros((0, 3)), "open_wrench": np.zeros(0)}
+    known = {field: getattr(proved, field) for field in FIELDS}
     polygons = [region.polygon for region in proved.regions]
     return {
         "grasp": np.array(grasp.id),
         "object_sha256": np.array(body.content_sha256),
-        "axes": cover.axes,
-        "codes": cover.codes.astype(np.uint8),
-        "forces": cover.forces,
-        "normals": proved.normals,
-        "friction": proved.friction,
-        "origin_m": proved.origin,
-        "depths_m": proved.depths,
-        "scale_m": np.array(proved.scale),
-        "centers_m": proved.centers,
-        "disc_radius_m": np.array(proved.radius),
-        "open_radius_m": np.array(proved.limit),
-        "open_choice_m": np.zeros((0, 3)) if choice is None else choice,
-        "open_wrench": np.zeros(0) if wrench is None else wrench,
-        **dict(zip(POLYGONS, polygons, strict=True)),
-        **dict(zip(BORDERS, proved.borders, strict=True)),
+        "axes": proved.cover.axes,
+        "codes": proved.cover.codes.astype(np.uint8),
+        "forces": proved.cover.forces,
+        **{
+            name: np.asarray(empty[field] if known[field] is None else known[field])
+            for field, (name, _) in FIELDS.items()
+        },
+        **dict(zip((*POLYGONS, *BORDERS), (*polygons, *proved.borders), strict=True)),
     }
 
 
@@ -247,26 +246,23 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
             f"scale_m: expected a length from {SMALLEST_SCALE:g} to {LARGEST:g} m, got {scale:g}"
         )
     normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
-    choice, wrench = numbers["open_choice_m"], numbers["open_wrench"]
+    fields: dict[str, Any] = {
+        field: numbers[name] if shape else numbers[name].item()
+        for field, (name, shape) in FIELDS.items()
+    }
+    opened = {field: fields[field] for field in ("open_choice", "open_wrench")}
+    fields |= {field: value if len(value) else None for field, value in opened.items()}
     return CertifiedRegions(
         regions=four(
             _region(name, numbers[name], normal, scale)
             for name, normal in zip(POLYGONS, normals, strict=True)
         ),
         borders=four(numbers[name] for name in BORDERS),
-        radius=numbers["disc_radius_m"].item(),
-        centers=numbers["centers_m"],
-        limit=limit.item(),
-        open_choice=choice if len(choice) else None,
-        open_wrench=wrench if len(wrench) else None,
-        friction=numbers["friction"],
-        origin=numbers["origin_m"],
-        normals=normals,
-        depths=numbers["depths_m"],
-        cover=TwistCover(numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"),
-                         numbers["forces"]),
-        scale=scale,
-    )  # fmt: skip
+        cover=TwistCover(
+            numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"), numbers["forces"]
+        ),
+        **fields | {"limit": limit.item(), "normals": normals},
+    )
 
 
 def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:

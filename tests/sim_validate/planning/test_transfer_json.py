@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from sim_validate.planning.transfer_json import TransferFile
+from sim_validate.planning.transfer import TransferFile
 from tests.changed_parts import with_face_moved, with_hole
 
 
