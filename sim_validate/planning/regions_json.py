@@ -252,6 +252,7 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     }
     opened = {field: fields[field] for field in ("open_choice", "open_wrench")}
     fields |= {field: value if len(value) else None for field, value in opened.items()}
+    fields |= {"limit": limit.item(), "normals": normals}
     return CertifiedRegions(
         regions=four(
             _region(name, numbers[name], normal, scale)
@@ -261,7 +262,7 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
         cover=TwistCover(
             numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"), numbers["forces"]
         ),
-        **fields | {"limit": limit.item(), "normals": normals},
+        **fields,
     )
 
 
