@@ -217,3 +217,11 @@ def test_what_cannot_be_decided_is_named_and_the_rest_is_answered(analyze, monke
     assert document["summary"]["undecided"] == 1
     assert main(["analyze", "contacts.json"]) == Exit.NEGATIVE
     assert "closure is undecided: too close to zero" in capsys.readouterr().out
+
+
+def test_a_document_is_read_as_it_was_made(analyze):
+    flags = ["--wrench", "0", "0", "-25", "0", "0", "0"]
+    _, document = analyze({"contacts": contacts(CROSS, -CROSS), "friction": 0.5}, *flags)
+    found = analysis.Analyses.of_text(json.dumps(document))
+    assert json.loads(found.text()) == document
+    assert found.grasps[0].wrenches[0].least_norm_forces_n is None

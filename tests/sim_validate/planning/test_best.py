@@ -11,6 +11,7 @@ from grasp_core.optimizing.best.proof_file import read_proof
 from grasp_core.quality.measures import MeasureName
 from sim_validate.kit.command_flags import Plan
 from sim_validate.main import main
+from sim_validate.planning.best_json import Best
 
 ASKED = ["plan", "tetrahedron", "--limit", "2", "--family", "concurrent", "--best"]
 
@@ -23,7 +24,9 @@ def folder(tmp_path_factory):
 
 
 def test_the_best_grasp_comes_first_and_its_proof_holds(folder):
-    best = json.loads((folder / "best.json").read_text())
+    text = (folder / "best.json").read_text()
+    assert Best.of_text(text).text() == text
+    best = json.loads(text)
     grasps = gc.load_grasps(folder / "grasps.json")
     proof = read_proof(folder / best["proof"])
     assert proof.verify()

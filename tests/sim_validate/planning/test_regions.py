@@ -13,6 +13,7 @@ from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.regions.proof import TwistCover
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.planning.regions_json import Regions
 
 NAMES = ("axes", "codes", "forces")
 
@@ -29,7 +30,9 @@ def folder(tmp_path_factory):
 
 def test_every_grasp_has_regions_of_its_own(folder):
     planned = json.loads((folder / "grasps.json").read_text())
-    found = json.loads((folder / "regions.json").read_text())
+    text = (folder / "regions.json").read_text()
+    assert Regions.of_text(text).text() == text
+    found = json.loads(text)
     assert found["object"]["content_sha256"] == planned["object"]["content_sha256"]
     assert [each["id"] for each in found["grasps"]] == [each["id"] for each in planned["grasps"]]
     assert found["summary"] == {"grasps": 3, "proved": 3}
