@@ -185,7 +185,7 @@ def _narrowed(parts: tuple[Any, ...], exact: bool) -> Take:
         inner: Take = own.exact if exact else own.take
     elif kind is float and rules:
         nothing = [rule.value for rule in rules if isinstance(rule, Null)]
-        endless = any(isinstance(rule, Range) for rule in rules) or math.inf in nothing
+        endless = any(isinstance(rule, Range) for rule in rules) or any(map(math.isinf, nothing))
         inner = _numbers(endless=endless, nan=any(map(math.isnan, nothing)), exact=exact)
     else:
         inner = takes(kind, exact=exact)

@@ -12,9 +12,11 @@ from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
+from sim_validate.planning.transfer import TransferFile
+from sim_validate.protocols.verdict import Judgements
 
 PAGE = Path(__file__).parent.parent / "docs" / "files.md"
-FILES = {kind.FILE: kind for kind in (Verdicts, Executions, Reaches)}
+FILES = {kind.FILE: kind for kind in (Verdicts, Executions, Reaches, Judgements, TransferFile)}
 IN_FILES = re.compile(r"\b(None|NaN)\b")
 """What JSON lacks: files have null there."""
 MARKED = re.compile(r"(<!-- fields: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)

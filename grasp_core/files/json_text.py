@@ -32,6 +32,7 @@ KINDS: Mapping[str, Collection[str]] = {
     "manifest.json": {"units_sha256", "files"},
     "grasps.json": {"object", "grasps"},
     "best.json": {"clearance_m", "ended"},
+    "document of analyses": {"source", "edges"},
     "wrench file": {"wrenches"},
     "contacts file": {"contacts"},
 }

@@ -10,13 +10,14 @@ from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, Point, Shape
+from grasp_core.arrays import Array, Shape
 from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.figures import Shown
 from grasp_core.files.json_text import object_of, value_of
-from grasp_core.files.records import from_record
+from grasp_core.files.records import Key, from_record
 from grasp_core.kinds import FrictionOrZero, Many, Quantity, Range
 from grasp_core.records.grasps_json import grasps_from_json
 
@@ -86,16 +87,16 @@ class ContactsFile(Declared):
 class ContactSet(Declared):
     """The contacts of one grasp, with the centre and the length by which torques are measured."""
 
-    id: str
-    positions: Annotated[Array, Shape("k", 3)]
+    id: Annotated[str, Shown("grasp")]
+    positions: Annotated[Array, Shape("k", 3), Key("positions_m")]
     """Contact points, (k, 3) [m], k >= 2."""
     normals: Annotated[Array, Shape("k", 3, units=True)]
     """Unit vectors into the object, (k, 3)."""
     friction: Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
     """Coulomb coefficients, (k,)."""
-    center: Point
+    center: Annotated[Array, Shape(3), Key("center_m")]
     """Point about which torques are taken, (3,) [m]."""
-    torque_scale: Quantity
+    torque_scale: Annotated[Quantity, Key("torque_scale_m")]
     """Length that makes a torque comparable with a force [m]."""
     center_from: CenterSource
     torque_scale_from: ScaleSource

@@ -8,11 +8,15 @@ protocol's full length, to be looked at.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
+from grasp_core.arrays import Wrench
 from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
+from grasp_core.kinds import OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Contact, Grasp
@@ -75,20 +79,25 @@ class Recorded:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Replayed:
+class Replayed(Declared):
     """The motion and outcome of one trial that was simulated again."""
 
-    name: str
-    load: Load
-    predicted_limit: float | None
+    name: Annotated[str, Key("wrench")]
+    load: Annotated[Load, UNRECORDED]
+    predicted_limit: OrInfinity | None
     """Largest multiple of the wrench that is resisted by analysis; None for contacts without force
     closure."""
-    required_friction: float | None
+    required_friction: OrInfinity | None
     """Friction that the planned forces need; None if no forces balance the wrench."""
     friction: float
-    hold: HoldVerdict
-    watched: Watched
-    scene: Scene
+    hold: Annotated[HoldVerdict, FLAT]
+    watched: Annotated[Watched, UNRECORDED]
+    scene: Annotated[Scene, UNRECORDED]
+
+    @recorded
+    def wrench_n_nm(self) -> Wrench:
+        """Force, then torque about the centre of mass [N, N m]."""
+        return self.load.wrench
 
 
 def recorded_in(source: Path, wanted: Wanted) -> Recorded:

@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import about
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
-from grasp_core.values import ContactRegion, Grasp, four
+from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
@@ -26,7 +24,7 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
 from sim_validate.kit.result_folders import CLIPS, PICTURES
-from sim_validate.report.agreement import Record
+from sim_validate.planning.regions_json import GraspRegions
 from sim_validate.report.charts.margin_charts import margin_panels
 from sim_validate.report.charts.motion_charts import motion_panels
 from sim_validate.report.charts.wrench_charts import wrench_panels
@@ -41,7 +39,7 @@ class Task:
     saved: Plan
     friction: float
     verdict: Verdict | None
-    regions: Record | None
+    regions: GraspRegions | None
     executions: Executions | None
     held: PosedHand | None
     """The hand in the grasp; None if there is none, or it does not reach the grasp."""
@@ -111,15 +109,11 @@ def tasks_of(
     ]
 
 
-def certified(grasp: Grasp, record: Record | None) -> Grasp:
-    """Replace the regions of a grasp by those of a record, if the record has regions."""
-    if record is None or record["regions"] is None:
+def certified(grasp: Grasp, found: GraspRegions | None) -> Grasp:
+    """Replace the regions of a grasp by certified ones, if it has any."""
+    if found is None or found.regions is None:
         return grasp
-    regions = [
-        ContactRegion("certified", np.array(each["polygon_m"]), each["inscribed_radius_m"])
-        for each in record["regions"]
-    ]
-    return replace(grasp, regions=four(regions))
+    return replace(grasp, regions=found.regions)
 
 
 def draw(task: Task) -> Drawn:

@@ -15,7 +15,7 @@ from scenes.drawing.pages import NOTHING, number
 from scenes.drawing.turntable import Fact, as_text, grasp_data, grasp_facts
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
-from sim_validate.planning.best_json import BestFile, shares_of_bound
+from sim_validate.planning.best_json import MEASURES, Best
 from sim_validate.planning.grasps_json import GRASPS
 from sim_validate.report.agreement import BAD, GOOD, Record, as_predicted, wrench_size
 from sim_validate.report.drawn_grasps import Drawn, certified, largest_push
@@ -38,12 +38,6 @@ SPAN = (
 )
 SAID_ABOVE = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
 """Figures of a verdict that the page says in other places."""
-MEASURES = {
-    "ferrari-canny": ("Ferrari-Canny quality", " N"),
-    "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
-    "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
-}
-"""What each measure of the best grasp says of a grasp, and its unit."""
 FOCUS = "where lines of force meet, in the object's frame"
 
 
@@ -129,16 +123,16 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable[Fa
             yield "With noise", said, f"95 % interval of the share held: {low:.2f} to {high:.2f}"
 
 
-def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
+def possible_facts(best: Best | None, grasp: str) -> Iterable[Fact]:
     """Yield the share that a grasp reaches of what a search has bounded."""
-    share = None if best is None else shares_of_bound(best).get(grasp)
+    share = None if best is None else best.shares.get(grasp)
     if best is None or share is None:
         return
-    what, unit = MEASURES[best["measure"]]
+    what, unit = MEASURES[best.measure]
     yield (
         "Share of the possible", f"{PERCENT * share:.1f} %",
-        f"{what}, over the bound {number(best['bound'])}{unit} for all contacts "
-        f"at least {number(MILLI * best['clearance_m'])} mm from edges; grasps nearer to edges "
+        f"{what}, over the bound {number(best.bound)}{unit} for all contacts "
+        f"at least {number(MILLI * best.clearance_m)} mm from edges; grasps nearer to edges "
         "may exceed it",
     )  # fmt: skip
 
@@ -160,19 +154,17 @@ def _contacts(grasp: Grasp) -> Iterable[Record]:
 
 
 def _certified(run: RunFolder, grasp: Grasp) -> str:
-    record = run.regions.get(grasp.id)
-    if record is None:
+    found = run.regions.get(grasp.id)
+    if run.certified is None or found is None:
         return ""
+    friction = f"{run.certified.friction:g}"
     if not run.shaded:
-        return f"Certified regions are for friction {run.regions_friction:g}: not shown."
-    if record["regions"] is None:
-        return f"No certified regions: {record['reason']}."
-    proof = record.get("proof")
-    where = f" Proof: {proof['file']}." if proof else ""
-    discs = number(MILLI * record["disc_radius_m"])
-    return (
-        f"Regions are certified for friction {run.regions_friction:g}: discs of {discs} mm.{where}"
-    )
+        return f"Certified regions are for friction {friction}: not shown."
+    if found.regions is None:
+        return f"No certified regions: {found.reason}."
+    where = f" Proof: {found.proof.file}." if found.proof else ""
+    discs = number(MILLI * found.disc_radius_m) if found.disc_radius_m is not None else NOTHING
+    return f"Regions are certified for friction {friction}: discs of {discs} mm.{where}"
 
 
 def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:

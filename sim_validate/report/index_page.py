@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, cast
 
+from grasp_core.figures import table
 from grasp_core.files.records import record_of
 from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
@@ -13,7 +14,8 @@ from grasp_core.values import Grasp
 from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
 from sim_validate.closure.verdict import Verdict
-from sim_validate.planning.best_json import BestFile, shares_of_bound
+from sim_validate.planning.best_json import MEASURES, Best, Rated
+from sim_validate.protocols.verdict import Totals
 from sim_validate.report.agreement import (
     Record,
     frictions_in,
@@ -28,7 +30,7 @@ from sim_validate.report.executed_grasps import (
     execution_row,
     said_of_both,
 )
-from sim_validate.report.grasp_page import MEASURES, MILLI, MIRRORED, PERCENT, Copy
+from sim_validate.report.grasp_page import MILLI, MIRRORED, PERCENT, Copy
 from sim_validate.report.pages import page
 from sim_validate.report.reached_grasps import (
     described_reaches,
@@ -106,37 +108,39 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         controls=_controls(verdicts),
         executions=[described_executions(each) for each in executed],
         executed_columns=[(each.shown.heading, each.meaning) for each in execution_figures()],
-        judged=[
-            {"name": name, "object": run.saved.body.name, **counts}
-            for run in runs if run.judgements is not None
-            for name, counts in run.judgements["summary"].items()
-        ],
+        judged=_judged(runs),
         possible=[
-            {"object": run.saved.body.name, **found}
+            {"object": run.saved.body.name, **_described_possible(run.possible)}
             for run in runs
-            if (found := _described_possible(run.possible)) is not None
+            if run.possible is not None
         ],
     )  # fmt: skip
 
 
-def _described_possible(best: BestFile | None) -> Record | None:
-    if best is None:
-        return None
-    (what, unit), bound, name = MEASURES[best["measure"]], best["bound"], best["grasp"]["id"]
-    proved = f"by the proof in {best['proof']}" if best["proof"] else "whose proof was not kept"
-    reached = {each["id"]: each["quality"][0] for each in best["planned"]}
-    ranked = sorted({**reached, name: best["quality"][0]}.items(), key=lambda e: (-e[1], e[0]))
+def _judged(runs: Sequence[RunFolder]) -> Record | None:
+    """Return a table of how many grasps each published test accepts, for each object."""
+    judged = [(run.saved.body.name, run.judgements) for run in runs if run.judgements is not None]
+    totals = [(name, each) for name, found in judged for each in found.summary.values()]
+    columns, rows = table([each for _, each in totals], Totals)
+    named = [(*row[:1], name, *row[1:]) for (name, _), row in zip(totals, rows, strict=True)]
+    return {"columns": (*columns[:1], "object", *columns[1:]), "rows": named} if totals else None
+
+
+def _described_possible(best: Best) -> Record:
+    (what, unit), name = MEASURES[best.measure], best.grasp.id
+    proved = f"by the proof in {best.proof}" if best.proof else "whose proof was not kept"
+    distinct = {each.id: each for each in reversed(best.rated)}
+    ranked = sorted(distinct.values(), key=lambda each: (-each.quality[0], each.id))
+    columns, rows = table(ranked[:ROWS], Rated)
     return {
         "said": (
-            f"Best is {name}: {number(best['quality'][0])}{unit} of {what}. No four contacts at "
-            f"least {number(MILLI * best['clearance_m'])} mm from edges exceed "
-            f"{number(bound)}{unit} at friction {number(best['friction'])}, {proved}; "
-            f"{PERCENT * best['gap']:.1f} % are between the two."
+            f"Best is {name}: {number(best.quality[0])}{unit} of {what}. No four contacts at "
+            f"least {number(MILLI * best.clearance_m)} mm from edges exceed "
+            f"{number(best.bound)}{unit} at friction {number(best.friction)}, {proved}; "
+            f"{PERCENT * best.gap:.1f} % are between the two."
         ),
-        "what": f"{what}{f' [{unit.strip()}]' if unit else ''}",
-        "rows": [
-            (each, number(value), f"{PERCENT * value / bound:.1f}") for each, value in ranked[:ROWS]
-        ],
+        "columns": columns,
+        "rows": rows,
         "more": max(0, len(ranked) - ROWS),
     }
 
@@ -157,7 +161,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
-        "share": shares_of_bound(shown.run.possible).get(grasp.id) if shown.run.possible else None,
+        "share": shown.run.possible.shares.get(grasp.id) if shown.run.possible else None,
         "critical_friction": grasp.critical_friction,
         "executed": execution_row(executed) if shown.run.executions else None,
         "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,

@@ -37,7 +37,7 @@ from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.config_file import flags_from
 from sim_validate.kit.toml_tables import tables_of_toml
-from sim_validate.planning.regions_json import RegionsFile
+from sim_validate.planning.regions_json import Regions
 from sim_validate.planning.wrenches_json import wrenches_from_json
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text
@@ -116,14 +116,20 @@ def _same_executions(data: bytes, found: Any) -> None:
 
 
 POLYGON = [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
+NAMED = {"contacts_sha256": HASH, "planned_radius_m": 0.01}
+FOUR_POINTS = [[0.0, 0, 0.1]] * 4
 REGIONS = {
-    "schema": 1, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
-    "edge_clearance_m": 0.0,
-    "grasps": [{"id": "c-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": 0.1,
-                "regions": [{"polygon_m": POLYGON, "inscribed_radius_m": 0.01}] * 4,
-                "proof": {"file": "proofs/c-0-1-2-3.npz", "sha256": HASH}},
-               {"id": "p-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": None,
-                "regions": None, "reason": "open"}],
+    "schema": 2, "object": {"name": "box", "source_sha256": "", "content_sha256": HASH},
+    "friction": 0.5, "reserve": 0.0, "recenter": False, "edge_clearance_m": 0.0, "max_cones": 64,
+    "grasps": [
+        {"id": "c-0-1-2-3", "family": "concurrent", **NAMED, "disc_radius_m": 0.1,
+         "regions": [{"kind": "certified", "polygon_m": POLYGON, "inscribed_radius_m": 0.01}] * 4,
+         "centers_m": FOUR_POINTS, "normals": [[0.0, 0, 1]] * 4, "friction": [0.5] * 4, "cones": 3,
+         "proof": {"file": "proofs/c-0-1-2-3.npz", "sha256": HASH},
+         "inscribed_radius_m": 0.01, "area_m2": 0.02},
+        {"id": "p-0-1-2-3", "family": "pencil", **NAMED, "reason": "open",
+         "inscribed_radius_m": None, "area_m2": None}],
+    "complete": True, "summary": {"grasps": 2, "proved": 1},
 }  # fmt: skip
 
 
@@ -309,8 +315,9 @@ TARGETS = (
            lambda data, found: _same_record(data, json.loads(found.text())), "json"),
     Target("executions", lambda data: Executions.of_text(text_of(data)),
            lambda: [executions().text().encode()], _same_executions, "json"),
-    Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=1),
-           lambda: [_json(REGIONS)], _same_record, "json"),
+    Target("regions", lambda data: Regions.of_text(text_of(data)),
+           lambda: [Regions.of_text(json.dumps(REGIONS)).text().encode()],
+           lambda data, found: _same_record(data, json.loads(found.text())), "json"),
     Target("reaches", lambda data: Reaches.of_text(text_of(data)),
            lambda: [reaches_text().encode()],
            lambda data, found: _same_record(data, json.loads(found.text())), "json"),

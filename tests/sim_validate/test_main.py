@@ -282,7 +282,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     assert saved["finger"] == {"radius_m": 0.004, "approach_m": 0.03}
     assert main(["validate", "r/grasps.json", "--limit", "1", "--out", "again"]) == Exit.GOOD
     again = json.loads((here / "again" / "verdicts.json").read_text())["verdicts"][0]
-    assert again["settings"]["drive"]["radius_m"] == 0.004
+    assert again["scale"]["fingers"]["radius_m"] == 0.004
     capsys.readouterr()
     assert main(["inspect", "scan.ply", "--unit", "mm", "--json"]) == Exit.GOOD
     facts = json.loads(capsys.readouterr().out)

@@ -58,7 +58,7 @@ def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class GapAt:
+class GapAt(Declared):
     """How far a search had come at one moment."""
 
     seconds: float

@@ -38,8 +38,7 @@ def test_friction_is_that_of_the_contact_then_the_flag_then_the_file(analyze):
     file["contacts"][0]["friction"] = 0.9
 
     def used(*flags):
-        listed = analyze(file, *flags)[1]["grasps"][0]["contacts"]
-        return [contact["friction"] for contact in listed]
+        return analyze(file, *flags)[1]["grasps"][0]["friction"]
 
     assert used() == [0.9, 0.5, 0.5, 0.5]
     assert used("--friction", "0.3") == [0.9, 0.3, 0.3, 0.3]
@@ -125,5 +124,5 @@ def test_the_page_of_files_shows_one_that_is_read(analyze):
     shown = json.loads(re.search(r"```json\n(.*?)```", page, re.DOTALL)[1])
     code, document = analyze(shown)
     assert code == Exit.GOOD
-    assert len(document["grasps"][0]["contacts"]) == 4
+    assert len(document["grasps"][0]["positions_m"]) == 4
     assert document["grasps"][0]["verified"]["closure"] is True

@@ -152,7 +152,10 @@ def copy(small_run, tmp_path):
 
 
 def without_proofs(document):
-    document["grasps"][0].update(regions=None, reason=EVIL)
+    known = ("id", "contacts_sha256", "family", "planned_radius_m")
+    named = {name: document["grasps"][0][name] for name in known}
+    document["grasps"][0] = dict.fromkeys(document["grasps"][0]) | named | {"reason": EVIL}
+    document["summary"]["proved"] -= 1
 
 
 def spoiled(found):
