@@ -3,11 +3,14 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from grasp_core.arrays import Array
 from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
+from grasp_core.figures import Compared, figure, less, more
+from grasp_core.files.records import FLAT
+from grasp_core.kinds import OrInfinity
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
@@ -89,9 +92,9 @@ class Execution(ByValue):
     mass_kg: float
     squeeze: Array
     """Contact forces at rest, on the object, (k, 3) [N]."""
-    load_multiple: float
+    load_multiple: Annotated[float, Compared(less, analysed=True)]
     """Multiple of the object's weight, in any direction, that the squeeze is certified for."""
-    trials: tuple[ExecutionTrial, ...]
+    trials: Annotated[tuple[ExecutionTrial, ...], Compared(less)]
     controls: tuple[ExecutionControl, ...]
     skipped: tuple[Skipped, ...]
     """Kinds of trials that were asked for and left out, with the reasons."""
@@ -106,12 +109,56 @@ class Execution(ByValue):
     @property
     def survived(self) -> bool:
         """Whether the object survived every trial, of at least one."""
-        return bool(self.trials) and all(trial.survived for trial in self.trials)
+        return bool(self.trials) and not self.lost
+
+    @figure
+    def lost(
+        self,
+    ) -> Annotated[tuple[str, ...], Compared(items=("no longer survived", "survived now"))]:
+        """Names of the trials that the object did not survive."""
+        return tuple(trial.name for trial in self.trials if not trial.survived)
 
     @property
     def controls_let_go(self) -> bool:
         """Whether every control slipped, as it must."""
-        return all(control.let_go for control in self.controls)
+        return not self.controls_held
+
+    @figure
+    def controls_held(
+        self,
+    ) -> Annotated[tuple[str, ...], Compared(more, "controls that did not slip")]:
+        """Names of the negative controls that did not slip, as they must."""
+        return tuple(control.name for control in self.controls if not control.let_go)
+
+    @figure
+    def predicted_first_slip(self) -> Annotated[OrInfinity, Compared(less, analysed=True)]:
+        """Least multiple of a trial's load at which a contact slips, predicted."""
+        return min((trial.predicted_first_slip for trial in self.trials), default=math.inf)
+
+    @figure
+    def slips(self) -> Annotated[bool, Compared(None)]:
+        """Whether a contact may slip by prediction: how far it then slides depends on rounding."""
+        return self.predicted_first_slip < CLEAR_OF_SLIP
+
+    @figure
+    def simulated_first_slip(self) -> Annotated[OrInfinity, Compared(less, close="slips")]:
+        """Least multiple of a trial's load at which a contact slips, simulated."""
+        return min((trial.simulated_first_slip for trial in self.trials), default=math.inf)
+
+    @figure
+    def slip_m(self) -> Annotated[OrInfinity, Compared(more, close="slips")]:
+        """Farthest that a point of contact slid on the object in any trial [m]."""
+        return max((trial.slip_m for trial in self.trials), default=0.0)
+
+    @figure
+    def displacement_m(self) -> Annotated[OrInfinity, Compared(more, close="slips")]:
+        """Largest displacement of the object against the palm in any trial [m]."""
+        return max((trial.displacement_m for trial in self.trials), default=0.0)
+
+    @figure
+    def turn_rad(self) -> Annotated[OrInfinity, Compared(more, close="slips")]:
+        """Largest turn of the object against the palm in any trial [rad]."""
+        return max((trial.turn_rad for trial in self.trials), default=0.0)
 
     @property
     def least_predicted_loss(self) -> float:
@@ -137,6 +184,10 @@ class Execution(ByValue):
         return sum(trial.survived for trial in own), len(own)
 
 
+def _failed(_before: str | None, after: str | None) -> bool:
+    return after is not None
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ExecutedGrasp(ByValue):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
@@ -146,15 +197,15 @@ class ExecutedGrasp(ByValue):
     """Construction of the contacts; empty where a hand executed them."""
     contacts_sha256: str
     """Hash of the contacts, which tells grasps of one id apart."""
-    execution: Execution | None
+    execution: Annotated[Execution | None, FLAT]
     """Trials and negative controls; None where no squeeze carries the weight."""
-    reason: str | None = None
+    reason: Annotated[str | None, Compared(_failed)] = None
     """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
     enough: Enough | None = None
     """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
 
-    @property
-    def survived(self) -> bool:
+    @figure
+    def survived(self) -> Annotated[bool, Compared(less)]:
         """Whether the object survived every trial, of at least one."""
         return self.execution is not None and self.execution.survived
 
