@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.settings import for_users
 from grasp_core.files.records import keys
+from grasp_core.settings import for_users
 from sim_validate.baselines.baseline import Entry, ExecutedFigures
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import Suite, suite_from_toml

@@ -157,6 +157,22 @@ def _not_held(_before: Outcome, after: Outcome) -> bool:
     return after is not Outcome.HELD
 
 
+PREDICTED = Compared(more, analysed=True, friction=True)
+PREDICTED_FRICTION = Shown("mu*", ".4f", compared=PREDICTED)
+SIMULATED_FRICTION = Shown("in sim", ".4f", compared=Compared(more, friction=True))
+SHARES = Shown("limits", ".3f", compared=None)
+MOVED = Compared(more, follows=True)
+ENDED = Compared(_not_held, follows=True)
+LOST = Compared(items=("no longer held", "held now"), follows=True)
+LOST_WITH_NOISE = Compared(
+    items=("repeats with noise no longer held", "repeats with noise held now"), close="noisy_close"
+)
+CONTROLS = Compared(less, "negative controls", of_part=True)
+CONTROLS_HELD = Compared(more, "negative controls that were not let go")
+CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
+"""How the figures of a verdict are shown, and compared with those of an earlier one."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Verdict(Declared, InNotebooks):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
@@ -166,9 +182,7 @@ class Verdict(Declared, InNotebooks):
     friction: Friction
     critical_friction: CriticalFriction
     wrenches: Annotated[tuple[WrenchVerdict, ...], Compared(less)]
-    controls: Annotated[
-        tuple[ControlVerdict, ...], Compared(less, "negative controls", of_part=True)
-    ]
+    controls: Annotated[tuple[ControlVerdict, ...], CONTROLS]
     robustness: Robustness | None
     """How often the grasp holds with noise, if asked for."""
     setup: Setup
@@ -185,26 +199,17 @@ class Verdict(Declared, InNotebooks):
         return contacts_sha256(self.contacts)
 
     @recorded
-    def predicted_critical_friction(
-        self,
-    ) -> Annotated[
-        OrInfinity,
-        Shown("mu*", ".4f", compared=Compared(more, analysed=True, friction=True)),
-    ]:
+    def predicted_critical_friction(self) -> Annotated[OrInfinity, PREDICTED_FRICTION]:
         """The critical friction by analysis."""
         return self.critical_friction.predicted
 
     @recorded
-    def simulated_critical_friction(
-        self,
-    ) -> Annotated[float | None, Shown("in sim", ".4f", compared=Compared(more, friction=True))]:
+    def simulated_critical_friction(self) -> Annotated[float | None, SIMULATED_FRICTION]:
         """The one found in simulation; None if it was not measured or not found."""
         return self.critical_friction.simulated
 
     @recorded
-    def shares_found(
-        self,
-    ) -> Annotated[tuple[float, float] | None, Shown("limits", ".3f", compared=None)]:
+    def shares_found(self) -> Annotated[tuple[float, float] | None, SHARES]:
         """Least and largest share of predicted limits at which the object let go; None if none."""
         found = [each.let_go_at.share for each in self.wrenches if each.let_go_at]
         return (min(found), max(found)) if found else None
@@ -212,14 +217,12 @@ class Verdict(Declared, InNotebooks):
     @recorded
     def displacement_m(
         self,
-    ) -> Annotated[
-        Measured, Shown("um moved", ".2g", MICRO, compared=Compared(more, follows=True))
-    ]:
+    ) -> Annotated[Measured, Shown("um moved", ".2g", MICRO, compared=MOVED)]:
         """Largest displacement of the object in the trials that hold a wrench [m]."""
         return _largest(trial.hold.displacement_m for trial in self.wrenches)
 
     @figure
-    def rotation_rad(self) -> Annotated[Measured, Compared(more, follows=True)]:
+    def rotation_rad(self) -> Annotated[Measured, MOVED]:
         """Largest rotation of the object in the trials that hold a wrench [rad]."""
         return _largest(trial.hold.rotation_rad for trial in self.wrenches)
 
@@ -249,9 +252,7 @@ class Verdict(Declared, InNotebooks):
         return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
 
     @recorded
-    def outcome(
-        self,
-    ) -> Annotated[Outcome, Shown("outcome", compared=Compared(_not_held, follows=True))]:
+    def outcome(self) -> Annotated[Outcome, Shown("outcome", compared=ENDED)]:
         """`held`, or how the first wrench that was not held ended."""
         return self.failures[0].hold.outcome if self.failures else Outcome.HELD
 
@@ -261,9 +262,7 @@ class Verdict(Declared, InNotebooks):
         return self.outcome is Outcome.HELD
 
     @figure
-    def not_held(
-        self,
-    ) -> Annotated[tuple[str, ...], Compared(items=("no longer held", "held now"), follows=True)]:
+    def not_held(self) -> Annotated[tuple[str, ...], LOST]:
         """Names of the wrenches that were not held, in order."""
         return tuple(trial.name for trial in self.failures)
 
@@ -273,16 +272,12 @@ class Verdict(Declared, InNotebooks):
         return not self.controls_held
 
     @figure
-    def controls_held(
-        self,
-    ) -> Annotated[tuple[str, ...], Compared(more, "negative controls that were not let go")]:
+    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
         """Names of the negative controls that did not let go of the object."""
         return tuple(each.control.name for each in self.controls if not each.let_go)
 
     @recorded
-    def mismatches(
-        self,
-    ) -> Annotated[tuple[str, ...], Compared(more, "contradictions of the analysis", follows=True)]:
+    def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
         """Where simulation contradicts the analysis, one sentence each."""
         found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
         if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
@@ -300,15 +295,7 @@ class Verdict(Declared, InNotebooks):
         return len(self._repeats)
 
     @figure
-    def noisy_not_held(
-        self,
-    ) -> Annotated[
-        tuple[int, ...],
-        Compared(
-            items=("repeats with noise no longer held", "repeats with noise held now"),
-            close="noisy_close",
-        ),
-    ]:
+    def noisy_not_held(self) -> Annotated[tuple[int, ...], LOST_WITH_NOISE]:
         """Numbers of the repeats with noise in which a load was not held."""
         return tuple(trial.number for trial in self._repeats if trial.outcome is not Outcome.HELD)
 

@@ -24,6 +24,8 @@ LOST = ("dropped", "diverged")
 """Fates that no trial survives."""
 CLEAR_OF_SLIP = 1.05
 """Predicted first slip from which on no contact slips, however processors round."""
+LOSSES = Compared(items=("no longer survived", "survived now"))
+CONTROLS_HELD = Compared(more, "controls that did not slip")
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +114,7 @@ class Execution(ByValue):
         return bool(self.trials) and not self.lost
 
     @figure
-    def lost(
-        self,
-    ) -> Annotated[tuple[str, ...], Compared(items=("no longer survived", "survived now"))]:
+    def lost(self) -> Annotated[tuple[str, ...], LOSSES]:
         """Names of the trials that the object did not survive."""
         return tuple(trial.name for trial in self.trials if not trial.survived)
 
@@ -124,9 +124,7 @@ class Execution(ByValue):
         return not self.controls_held
 
     @figure
-    def controls_held(
-        self,
-    ) -> Annotated[tuple[str, ...], Compared(more, "controls that did not slip")]:
+    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
         """Names of the negative controls that did not slip, as they must."""
         return tuple(control.name for control in self.controls if not control.let_go)
 

@@ -2,15 +2,20 @@
 
 import dataclasses
 import math
+from typing import Annotated
 
 import pytest
 
-from sim_validate.baselines.baseline import Baseline, Entry, How, VerdictFigures
+from grasp_core.declared import Declared
+from grasp_core.figures import Compared, Shown, figure, less
+from sim_validate.baselines.baseline import Baseline, Entry, How, Kept, VerdictFigures, keeps
 from sim_validate.baselines.compare import (
+    OTHER_PROCESSOR,
     OTHER_VERSIONS,
     Carried,
     Status,
     compare,
+    differing_figures,
     failing,
 )
 from sim_validate.engine.schedules import HoldProtocol
@@ -102,7 +107,8 @@ def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
 @pytest.mark.parametrize(
     "changed",
     [
-        {"predicted_critical_friction": 0.205}, {"simulated_critical_friction": 0.205}, {"limit_n": 2.95},
+        {"predicted_critical_friction": 0.205}, {"simulated_critical_friction": 0.205},
+        {"limit_n": 2.95},
         {"displacement_m": 1.5e-4}, {"rotation_rad": 2e-3},
         {"noisy_not_held": (3,)}, {"noisy_not_held": (3, 7, 50)},
     ],
@@ -282,3 +288,64 @@ def test_a_grasp_that_was_gone_already_when_the_baseline_was_written_is_the_same
     assert (other.id, other.status) == ("c-9-9-9-9", Status.SAME)
     (_, other) = compare(BEFORE, now(OTHER_PART), carried=gone)
     assert other.status is Status.GONE
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Trial(Declared):
+    """What a class that nobody here knows declares of its figures."""
+
+    id: Annotated[str, Shown("trial", compared=None)]
+    grip: Annotated[float, Shown("grip")]
+    way_m: Annotated[float, Compared(less)]
+    load: Annotated[float | None, Compared(less, analysed=True)] = None
+    tips: Annotated[tuple[Declared, ...], Compared(less, "fingertips")] = ()
+
+    @figure
+    def stuck(self) -> Annotated[bool, Compared(less)]:
+        """Whether nothing slid."""
+        return self.grip > 1.0
+
+
+@keeps(Trial)
+class TrialFigures(Kept):
+    """The figures of a trial."""
+
+
+def differing(before, after, bands=OTHER_VERSIONS):
+    kept = [TrialFigures.of(each) for each in (before, after)]
+    return {
+        each.text.split(":")[0]: (each.worse, each.counts)
+        for each in differing_figures(*kept, bands)
+    }
+
+
+USUAL = Trial("a", 2.0, 0.1, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"id": "b"}, {}),
+        ({"grip": 2.09}, {"grip": (True, False)}),
+        ({"grip": 2.11}, {"grip": (True, True)}),
+        ({"grip": 1.89}, {"grip": (True, True)}),
+        ({"grip": 0.9}, {"grip": (True, True), "stuck": (True, True)}),
+        ({"way_m": 0.1001}, {"way_m": (False, False)}),
+        ({"way_m": 0.09}, {"way_m": (True, True)}),
+        ({"load": 4.5}, {"load": (False, True)}),
+        ({"load": None}, {"load": (True, True)}),
+        ({"tips": (USUAL,)}, {"fingertips": (False, True)}),
+    ],
+)
+def test_what_a_class_declares_is_kept_and_compared_as_it_says(changed, expected):
+    """A figure that says nothing of it is like a simulated one, and each change of it is worse."""
+    assert differing(USUAL, dataclasses.replace(USUAL, **changed)) == expected
+
+
+def test_the_analysis_depends_less_on_rounding_than_the_simulation():
+    assert differing(USUAL, dataclasses.replace(USUAL, load=4.001), OTHER_PROCESSOR) == {
+        "load": (False, True)
+    }
+    assert differing(USUAL, dataclasses.replace(USUAL, grip=2.001), OTHER_PROCESSOR) == {
+        "grip": (True, False)
+    }

@@ -124,9 +124,8 @@ def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
     assert code == 0, said
     kept = kept_in(project)
     assert kept["status"] == "improved"
-    better = (
-        f"  {record['grasps'][0]['id']} better than in the baseline: predicted_critical_friction: 0.2 -> 0."
-    )
+    name = record["grasps"][0]["id"]
+    better = f"  {name} better than in the baseline: predicted_critical_friction: 0.2 -> 0."
     assert any(text.startswith(better) for text in said.splitlines())
     toml = project / "part.grasps.toml"
     write_text(toml, "strict = true\n" + toml.read_text())
