@@ -20,8 +20,6 @@ from grasp_core.files.records import entries, property_kinds
 
 NONE = "-"
 """What a cell shows where there is no figure."""
-NEVER = "never"
-"""What a cell shows for an infinite number: what is counted never happens."""
 UNITS = {
     "m": "m", "m3": "m3", "rad": "rad", "deg": "deg", "s": "s", "n": "N", "nm": "N m", "kg": "kg",
     "m_per_s": "m/s", "n_per_m": "N/m", "kg_m2": "kg m^2", "n_nm": "N, N m", "n_s": "N s",
@@ -90,6 +88,8 @@ class Shown:
     """Format of a number."""
     times: float = 1.0
     """Factor on a number, such as 1e6 for micrometres."""
+    infinite: str = "never"
+    """What stands for an infinite number: most figures are multiples at which something happens."""
     compared: Compared | None = BY_DEFAULT
     """How it is compared with an earlier one; None if others say the same and are compared."""
 
@@ -158,12 +158,10 @@ def cell(value: Any, shown: Shown) -> str:
         return NONE
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, float) and math.isinf(value):
-        return NEVER
     if isinstance(value, Enum):
         return str(value.value).replace("_", " ")
     if isinstance(value, int | float):
-        return format(shown.times * value, shown.form)
+        return shown.infinite if math.isinf(value) else format(shown.times * value, shown.form)
     if isinstance(value, str):
         return value
     items: Sequence[Any] = value

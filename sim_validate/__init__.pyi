@@ -14,12 +14,12 @@ from sim_validate.engine.setup import Noise as Noise
 from sim_validate.engine.setup import Setup as Setup
 from sim_validate.engine.traces import Outcome as Outcome
 from sim_validate.execution.execute import execute as execute
-from sim_validate.execution.executions_json import Executions as Executions
-from sim_validate.execution.executions_json import load_executions as load_executions
 from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.verdict import Execution as Execution
+from sim_validate.execution.verdict import Executions as Executions
 from sim_validate.execution.verdict import ExecutionTrial as ExecutionTrial
+from sim_validate.execution.verdict import load_executions as load_executions
 from sim_validate.hands.dexgraspbench import DexRecord as DexRecord
 from sim_validate.hands.dexgraspbench import dex_record as dex_record
 from sim_validate.hands.dexgraspbench import load_dex_record as load_dex_record

@@ -8,8 +8,8 @@ solver of MuJoCo 4.0.0 has a bug).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, fields
+from typing import Annotated, Literal
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.checked import LARGEST
@@ -93,11 +93,6 @@ class PhysicsSettings(Settings):
                 f"torsion_m makes contacts of dimension {WITH_TORSION} by itself: leave condim at "
                 f"{WITHOUT_TORSION}, got {self.condim}"
             )
-
-    def record(self) -> dict[str, Any]:
-        """Return the settings by name; two of them only where unusual, as older files have it."""
-        usual = {"torsion_m": 0.0, "multiccd": True}
-        return {name: value for name, value in asdict(self).items() if value != usual.get(name)}
 
     def options(self) -> dict[str, float | int | str | tuple[float, ...]]:
         """Return the attributes of MJCF's `option` element."""

@@ -56,7 +56,7 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
         )  # fmt: skip
     except NoForcesError as error:
         return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
-    return ExecutedGrasp(*about, found, enough=found.enough)
+    return ExecutedGrasp(*about, found)
 
 
 def physics_of(job: ExecutionJob) -> PhysicsSettings | None:

@@ -113,4 +113,4 @@ def executed_by_hand(
         found = execute_hand(hand, body, reach, friction, settings)
     except (InputError, NoForcesError) as error:
         return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
-    return ExecutedGrasp(*about, found, enough=found.enough)
+    return ExecutedGrasp(*about, found)

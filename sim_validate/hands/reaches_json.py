@@ -17,6 +17,7 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError, about
 from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.files.json_text import record_of, text_of
+from grasp_core.files.records import record_of as plain_record
 from grasp_core.files.text_files import read_text
 from grasp_core.frames import POSE
 from grasp_core.hands.collisions import tip_distances
@@ -25,7 +26,6 @@ from grasp_core.hands.reach import HandReach, ReachReason
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import FINGERS, Contact, Grasp
-from sim_validate.execution.executions_json import EnoughRecord, enough_record, tip_radii
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.hand_model import hand_of_model, model_record
 from sim_validate.hands.validate_hand import HandVerdict
@@ -125,7 +125,7 @@ class ExecutedHandRecord(TypedDict):
 
     refused: str
     """Why the grasp cannot be executed; empty if it was."""
-    enough: EnoughRecord | None
+    enough: dict[str, Any] | None
     """The push within the motors' torques that would be enough; null where all was survived."""
     execution: HandExecutionRecord | None
 
@@ -278,10 +278,11 @@ def _record(hand: Hand, found: HandReach, planned: str, tried: HandTrials) -> Re
 
 def _executed(found: ExecutedGrasp) -> ExecutedHandRecord:
     execution = found.execution
+    radii = None if execution is None else execution.tip_radius_m
     losses = [] if execution is None else [trial.predicted_loss for trial in execution.trials]
     return {
         "refused": found.reason or "",
-        "enough": enough_record(found.enough),
+        "enough": None if found.enough is None else plain_record(found.enough),
         "execution": None if execution is None else {
             "mass_kg": execution.mass_kg,
             "survived": execution.survived,
@@ -291,7 +292,7 @@ def _executed(found: ExecutedGrasp) -> ExecutedHandRecord:
             "least_predicted_loss": min(losses) if losses else None,
             "payload_kg": execution.payload_kg,
             "squeeze_n": [force.tolist() for force in execution.squeeze],
-            "tip_radius_m": tip_radii(execution),
+            "tip_radius_m": None if radii is None else radii.tolist(),
             "controls_held": [each.name for each in execution.controls if not each.let_go],
         },
     }  # fmt: skip

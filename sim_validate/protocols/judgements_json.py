@@ -101,9 +101,7 @@ def judgements_to_json(
         "object": object_record(body),
         "friction": friction,
         "complete": complete,
-        "protocols": {
-            name: {**asdict(test), "physics": test.physics.record()} for name, test in tests.items()
-        },
+        "protocols": {name: asdict(test) for name, test in tests.items()},
         "summary": judgements_summary(listed),
         "judgements": [_record(each) for each in listed],
         "versions": {**versions()},

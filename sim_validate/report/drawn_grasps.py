@@ -23,8 +23,8 @@ from scenes.drawing.views import best_view
 from scenes.mujoco.fingertips import FingerSettings
 from sim_validate.closure.replaying import Wanted, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict
-from sim_validate.execution.executions_json import EXECUTIONS, Executions
 from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
+from sim_validate.execution.verdict import Executions
 from sim_validate.kit.result_folders import CLIPS, PICTURES
 from sim_validate.report.agreement import Record
 from sim_validate.report.charts.margin_charts import margin_panels
@@ -178,7 +178,7 @@ def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
     for place, trial in enumerate(worth_seeing(found.execution)):
         path = task.folder / CLIPS / f"{task.name}-executed-{place}.webp"
         try:
-            with about(f"{task.source.with_name(EXECUTIONS)}: {found.id}"):
+            with about(f"{task.source.with_name(Executions.FILE)}: {found.id}"):
                 film(job, trial.name, path)
         except GraphicsError as error:
             return replace(drawn, no_clip=str(error))

@@ -24,8 +24,8 @@ from sim_validate.report.agreement import (
 from sim_validate.report.charts.run_charts import fidelity_panel
 from sim_validate.report.executed_grasps import (
     described_executions,
+    execution_figures,
     execution_row,
-    execution_settings,
     said_of_both,
 )
 from sim_validate.report.grasp_page import MEASURES, MILLI, MIRRORED, PERCENT, Copy
@@ -105,6 +105,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         mismatches=[f"{each.id}: {line}" for each in verdicts for line in each.mismatches],
         controls=_controls(verdicts),
         executions=[described_executions(each) for each in executed],
+        executed_columns=[(each.shown.heading, each.meaning) for each in execution_figures()],
         judged=[
             {"name": name, "object": run.saved.body.name, **counts}
             for run in runs if run.judgements is not None
@@ -209,7 +210,8 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
         asked = {"setup": first.setup, "agenda": first.agenda, "scale": first.scale}
         yield from _lines({name: record_of(each) for name, each in asked.items()})
     if run.executions is not None:
-        yield from execution_settings(run.executions)
+        used = {"friction": run.executions.friction, **record_of(run.executions.settings)}
+        yield from _lines({"execution": used})
     if run.reaches is not None:
         yield from reach_settings(run.reaches)
     found = versions() if run.tested is None else run.tested.versions

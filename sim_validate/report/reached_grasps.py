@@ -5,11 +5,12 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from grasp_core.declared import counted
+from grasp_core.files.records import from_record
 from grasp_core.hands.named_hands import HANDS
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.execution.executions_json import enough_of
+from sim_validate.execution.verdict import Enough
 from sim_validate.report.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:
@@ -171,7 +172,8 @@ def _executed(tried: "ExecutedHandRecord") -> Iterable[tuple[str, str, str]]:
     loss = found["least_predicted_loss"]
     yield "Least predicted loss", "none" if loss is None else number(loss), LOSS
     yield "Payload of the squeeze", f"{number(found['payload_kg'])} kg", PAYLOAD
-    if (enough := enough_of(tried["enough"], ("executed", "enough"))) is not None:
+    if tried["enough"] is not None:
+        enough = from_record(Enough, tried["enough"], "executed.enough")
         yield "What would be enough", str(enough), ""
 
 

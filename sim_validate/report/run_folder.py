@@ -11,9 +11,8 @@ from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.planning.result import Plan
-from sim_validate.closure.verdict import Verdict, Verdicts, load_verdicts
-from sim_validate.execution.executions_json import EXECUTIONS, Executions, load_executions
-from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.closure.verdict import Verdict, Verdicts
+from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.kit.result_folders import BEST, JUDGEMENTS, REACHES
 from sim_validate.planning.best_json import BestFile, best_of
 from sim_validate.planning.grasps_json import GRASPS, read_grasps
@@ -24,8 +23,8 @@ from sim_validate.report.agreement import BAD, Record, said_of
 if TYPE_CHECKING:
     from sim_validate.hands.reaches_json import SavedReaches
 
-VERDICTS = "verdicts.json"
 Read = TypeVar("Read", RegionsFile, JudgementsFile, BestFile)
+Results = TypeVar("Results", Verdicts, Executions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +83,7 @@ class RunFolder:
     @property
     def verdicts_path(self) -> Path:
         """Path of the verdicts, which error messages name."""
-        return self.path / VERDICTS
+        return self.path / Verdicts.FILE
 
 
 def folder_of(path: Path) -> Path:
@@ -112,7 +111,7 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
 
 def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
-    tried = _tested(path / VERDICTS, saved)
+    tried = _results(Verdicts, path, saved)
     certified = _read(path / REGIONS, regions_file_of, saved)
     judgements_of = partial(record_of, JudgementsFile, wanted=JUDGEMENTS, schema=1)
     regions: Sequence[Record] = [] if certified is None else certified["grasps"]
@@ -123,7 +122,7 @@ def _run(path: Path) -> RunFolder:
         tested=tried,
         regions=_by_id(path / REGIONS, regions, saved),
         regions_friction=None if certified is None else certified["friction"],
-        executions=_executions(path / EXECUTIONS, saved),
+        executions=_results(Executions, path, saved),
         reaches=reaches_beside(path / GRASPS, saved),
         judgements=_read(path / JUDGEMENTS, judgements_of, saved),
         possible=_read(path / BEST[0], best_of, saved),
@@ -164,22 +163,14 @@ def _check_contacts(path: Path, records: Sequence[Record], saved: Plan) -> None:
         )
 
 
-def _tested(path: Path, saved: Plan) -> Verdicts | None:
+def _results(kind: type[Results], folder: Path, saved: Plan) -> Results | None:
+    """Read results about the grasps of a run, if there are any."""
+    path = folder / kind.FILE
     if not path.is_file():
         return None
-    found = load_verdicts(path)
+    found = kind.read(path)
     _check_object(path, found.object_sha256, saved)
     listed = [{"id": each.id, "contacts_sha256": each.contacts_sha256} for each in found]
-    _check_contacts(path, listed, saved)
-    return found
-
-
-def _executions(path: Path, saved: Plan) -> Executions | None:
-    if not path.is_file():
-        return None
-    found = load_executions(path)
-    _check_object(path, found.object_sha256, saved)
-    listed = [{"id": each.id, "contacts_sha256": each.contacts_sha256} for each in found.grasps]
     _check_contacts(path, listed, saved)
     return found
 

@@ -154,9 +154,7 @@ def test_hard_predictions_miss_what_soft_fingertips_hold():
     assert max(s.limit / h.limit for h, s in zip(hard, held, strict=True)) > 1.0 + 10 * AGREED
 
 
-def test_a_setup_file_and_its_tables_hold_torsion_only_where_there_is_some():
-    plain = tables_of(Setup())
-    assert "torsion_m" not in plain["physics"]
+def test_a_setup_file_and_its_tables_hold_torsion():
     setup = setup_from_tables({"physics": {"torsion_m": 0.002}}, Setup(), "setup.toml")
     assert setup.torsion_m == 0.002
     again = setup_from_tables(tables_of(setup), Setup(), "setup.toml")
