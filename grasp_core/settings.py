@@ -35,9 +35,10 @@ class Settings(Declared):
         """Make settings from a table of a file, with those of `usual` where it says nothing.
 
         `where` leads to the table, such as 'execution'. An unknown name, a missing one and a value
-        that the class refuses are errors that name the setting.
+        that the class refuses are errors that name the setting. What the program chooses may stand
+        in a table with its usual value, as records have it.
         """
-        given = named(table, for_users(cls), where)
+        given = named(table, for_users(cls), where, usual=_chosen(cls))
         for each in fields(cast("Any", cls)):
             inner = inside(types(cls)[each.name], Settings)
             if each.name in given and inner is not None:
@@ -74,14 +75,33 @@ def for_users(kind: type) -> tuple[str, ...]:
     return tuple(name for name, each in types(kind).items() if CHOSEN not in get_args(each))
 
 
+def _chosen(kind: type) -> dict[str, Any]:
+    """Return the usual values of the settings that the program chooses."""
+    users = for_users(kind)
+    every = fields(cast("Any", kind))
+    return {each.name: default_of(each) for each in every if each.name not in users}
+
+
+NONE_USUAL: Mapping[str, Any] = {}
+
+
 def named(
-    table: object, known: Collection[str], where: str, what: str = "setting"
-) -> dict[str, Any]:
-    """Return a table of a file by name, if it is one and nothing in it is unknown."""
+    table: object, known: Collection[str], where: str, what: str = "setting",
+    usual: Mapping[str, Any] = NONE_USUAL,
+) -> dict[str, Any]:  # fmt: skip
+    """Return a table of a file by name, if it is one and nothing in it is unknown.
+
+    Names with their `usual` value are left out.
+    """
     start = f"{where}: " if where else ""
     if not isinstance(table, Mapping):
         raise InputError(f"{start}expected a table of {what}s, got {shown(table)}")
-    given = {**cast("Mapping[str, Any]", table)}
+    entries = cast("Mapping[str, Any]", table)
+    given = {
+        name: value
+        for name, value in entries.items()
+        if not (name in usual and usual[name] == value)
+    }
     for name in given:
         if name not in known:
             raise InputError(

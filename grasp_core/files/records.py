@@ -224,8 +224,8 @@ def from_record(kind: type[Record], found: object, where: str = "") -> Record:
         ours = each.write(getattr(made, each.name))
         if not _agree(said[each.name], ours):
             raise InputError(
-                f"{at(where, each.key)}: {shown(said[each.name])} contradicts the other fields, "
-                f"which say {shown(ours)}; write the file again, or remove it"
+                f"{at(where, each.key)}: {_told(said[each.name])} contradicts the other fields, "
+                f"which say {_told(ours)}; write the file again, or remove it"
             )
     return made
 
@@ -284,6 +284,11 @@ def _values_read(kind: Any) -> Read | None:
         return {name: one(item, at(where, name)) for name, item in table.items()}
 
     return read
+
+
+def _told(value: Any) -> str:
+    """Write a value for a message; of a list, how many items it has."""
+    return f"a list of {len(cast('list[Any]', value))}" if isinstance(value, list) else shown(value)
 
 
 def _agree(said: Any, ours: Any) -> bool:

@@ -9,11 +9,10 @@ from grasp_core.planning.result import Plan
 from sim_validate.closure.asked_trials import prepared
 from sim_validate.closure.validate import Job, validated
 from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
-from sim_validate.engine.gate import Gate, require_faithful
+from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in, remove_results
@@ -64,19 +63,12 @@ def simulate_grasps(
         return verdict.held
 
     results = reporter.counted("simulating", validated(tasks, jobs), len(tasks), "held", kept)
-    about_object = AboutObject.of(saved.body)
-    collect = partial(_collected, about_object, saved.friction, gate)
+    collect = partial(Verdicts.of, saved.body, saved.friction, gate)
     path = folder and folder / Verdicts.FILE
     found = finished(results, len(tasks), collect, path, reporter)
     _show(found, setup, reporter)
     good = all(verdict.good for verdict in found)
     return (Exit.GOOD if good else Exit.NEGATIVE), found.text()
-
-
-def _collected(
-    body: AboutObject, friction: float, gate: Gate, verdicts: tuple[Verdict, ...], *, complete: bool
-) -> Verdicts:
-    return Verdicts(body, friction, complete, gate, verdicts)
 
 
 def _show(verdicts: Verdicts, setup: Setup, reporter: Reporter) -> None:

@@ -6,7 +6,7 @@ other. They are also what `verdicts.json` holds.
 
 import importlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -22,6 +22,7 @@ from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import Friction, Many, Measured, OrInfinity
 from grasp_core.notebooks import InNotebooks
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import Scene
@@ -162,6 +163,8 @@ PREDICTED_FRICTION = Shown("mu*", ".4f", compared=PREDICTED)
 SIMULATED_FRICTION = Shown("in sim", ".4f", compared=Compared(more, friction=True))
 SHARES = Shown("limits", ".3f", compared=None)
 MOVED = Compared(more, follows=True)
+MICRONS_MOVED = Shown("um moved", ".2g", MICRO, compared=MOVED)
+MICRONS_LOADED = Shown("um when loaded", ".2g", MICRO, compared=None)
 ENDED = Compared(_not_held, follows=True)
 LOST = Compared(items=("no longer held", "held now"), follows=True)
 LOST_WITH_NOISE = Compared(
@@ -217,14 +220,21 @@ class Verdict(Declared, InNotebooks):
     @recorded
     def displacement_m(
         self,
-    ) -> Annotated[Measured, Shown("um moved", ".2g", MICRO, compared=MOVED)]:
-        """Largest displacement of the object in the trials that hold a wrench [m]."""
-        return _largest(trial.hold.displacement_m for trial in self.wrenches)
+    ) -> Annotated[Measured, MICRONS_MOVED]:
+        """Largest displacement of the object under any wrench, after friction was lowered [m]."""
+        return _largest([trial.hold.displacement_m for trial in self.wrenches])
+
+    @recorded
+    def start_displacement_m(
+        self,
+    ) -> Annotated[Measured, MICRONS_LOADED]:
+        """Largest one before that, at high friction: the fingers give way a little [m]."""
+        return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
 
     @figure
     def rotation_rad(self) -> Annotated[Measured, MOVED]:
         """Largest rotation of the object in the trials that hold a wrench [rad]."""
-        return _largest(trial.hold.rotation_rad for trial in self.wrenches)
+        return _largest([trial.hold.rotation_rad for trial in self.wrenches])
 
     @figure
     def limit_n(self) -> Annotated[OrInfinity, Compared(less, analysed=True)]:
@@ -323,10 +333,8 @@ class Verdict(Declared, InNotebooks):
         return card(placed(self.scene.layout), title, _rows(self))
 
 
-def _largest(measured: Iterable[float]) -> float:
-    """Return the largest of some numbers; NaN if one of them is NaN."""
-    listed = tuple(measured)
-    return math.nan if any(map(math.isnan, listed)) else max(listed, default=0.0)
+def _largest(values: Sequence[float]) -> float:
+    return math.nan if any(map(math.isnan, values)) else max(values, default=0.0)
 
 
 def _disagreement(friction: CriticalFriction) -> str:
@@ -371,6 +379,14 @@ class Verdicts(RecordFile, ById[Verdict]):
     """How the simulator did on cases with known answers."""
     verdicts: tuple[Verdict, ...]
     versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @classmethod
+    def of(
+        cls, body: Polyhedron, friction: float, gate: Gate, verdicts: tuple[Verdict, ...], *,
+        complete: bool = True,
+    ) -> Self:  # fmt: skip
+        """Collect verdicts on the grasps of an object for a file."""
+        return cls(AboutObject.of(body), friction, complete, gate, verdicts)
 
     @property
     def object_sha256(self) -> str:

@@ -56,8 +56,8 @@ class ExecutionTrial(Declared):
     survived: Annotated[bool, Shown("survived")]
     """Whether the object was kept, and moved no farther than the settings allow."""
     fate: Annotated[Fate, Shown("fate")]
-    """What became of the object; if it was kept, and the trial was not survived, it moved or turned
-    too far."""
+    """What became of the object: `stuck`, `slipped`, `dropped` or `diverged`. If it was kept, and
+    the trial was not survived, it moved or turned too far."""
     slip_m: Annotated[OrInfinity, Shown("mm slid", ".3g", MILLI, UNKNOWN)]
     """Farthest that a point of contact slid on the object [m]; infinite where the simulator
     diverged, as the next two are."""
@@ -104,6 +104,7 @@ class ExecutionControl(Declared):
     name: Annotated[str, Shown("control")]
     """What is weaker than certified: friction, squeeze, or a finger that does not push."""
     let_go: Annotated[bool, Shown("let go")]
+    """Whether a contact slipped, as it must."""
     first_slip: Annotated[OrInfinity, Shown("first slip", MULTIPLE)]
     """Multiple of the load at which a contact slipped."""
 
@@ -130,6 +131,7 @@ class Enough(Declared):
     predicted_loss: OrInfinity | None = None
     """Least multiple of a trial's load at which the object is then lost, predicted."""
     reason: str | None = None
+    """Why no push is found to be enough; None where one is."""
 
     def _check_together(self) -> None:
         if self.push_n is not None and self.predicted_loss is None:
@@ -157,13 +159,16 @@ class Execution(Declared):
     """The trials of one grasp, executed with one squeeze that was never replanned."""
 
     mass_kg: Quantity
+    """Mass of the object [kg]."""
     squeeze: Annotated[Array, Shape("k", 3), Key("squeeze_n")]
     """Contact forces at rest, on the object, (k, 3) [N]."""
     load_multiple: Annotated[float, Shown("load", ".3g", compared=PREDICTED)]
     """Multiple of the object's weight, in any direction, that the squeeze is certified for; this
     less one is the acceleration [g] that the palm may slowly come to."""
     trials: Annotated[tuple[ExecutionTrial, ...], Compared(less)]
+    """How each trial ended."""
     controls: tuple[ExecutionControl, ...]
+    """How each negative control ended."""
     skipped: tuple[Skipped, ...]
     """Kinds of trials that were asked for and left out, with the reasons."""
     physics: PhysicsSettings | None = None
@@ -332,11 +337,13 @@ class Executions(RecordFile, ById[ExecutedGrasp]):
 
     object: AboutObject
     friction: Friction
+    """Coulomb coefficient that was simulated."""
     complete: bool
     """Whether every grasp that was asked for was executed."""
     settings: ExecutionSettings
     """How they were executed, with the impulse of a knock that was used."""
     grasps: Annotated[tuple[ExecutedGrasp, ...], Key("executions")]
+    """What the execution of each grasp found."""
     versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     def _check_together(self) -> None:

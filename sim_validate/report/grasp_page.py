@@ -9,6 +9,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
+from grasp_core.figures import figures
 from grasp_core.values import Grasp
 from scenes.drawing.pages import NOTHING, number
 from scenes.drawing.turntable import Fact, as_text, grasp_data, grasp_facts
@@ -35,17 +36,8 @@ SPAN = (
     "half-angle of the widest cones around the normals of which any choice of directions "
     "positively spans space; 0: none do, and the force cones lean"
 )
-MOTIONS = (
-    (
-        "Object moved at most", "displacement_m",
-        "under any of the loads below, from when friction was lowered until the answer was known; "
-        "the chart shows one trial in full length",
-    ),
-    (
-        "While a load came, at most", "start_displacement_m",
-        "before that, at high friction: the fingers give way a little",
-    ),
-)  # fmt: skip
+SAID_ABOVE = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
+"""Figures of a verdict that the page says in other places."""
 MEASURES = {
     "ferrari-canny": ("Ferrari-Canny quality", " N"),
     "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
@@ -128,10 +120,9 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable[Fa
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
         yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
     if verdict is not None:
-        for name, field, meaning in MOTIONS:
-            moved = [getattr(trial.hold, field) for trial in verdict.wrenches]
-            known = [MICRO * each for each in moved if not math.isnan(each)]
-            yield name, f"{number(max(known, default=None), 2)} µm", meaning
+        for figure in figures(Verdict):
+            if figure.name not in SAID_ABOVE and figure.of(verdict) is not None:
+                yield figure.shown.heading, figure.cell(verdict), figure.meaning
         if (repeats := verdict.robustness) is not None:
             low, high = repeats.interval
             said = f"held {repeats.held} of {len(repeats.trials)} times"

@@ -11,14 +11,16 @@ from pydantic_core import to_jsonable_python
 import grasp_core as gc
 from grasp_core.files.json_text import record_of
 from grasp_core.files.text_files import text_of
+from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.closure.setup_toml import setup_from_tables, tables_of
-from sim_validate.closure.verdict import verdicts_of
+from sim_validate.closure.setup_toml import setup_from_tables
+from sim_validate.closure.validate import validate
+from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import (
@@ -29,7 +31,7 @@ from sim_validate.datasets.manifest import (
     manifest_to_json,
 )
 from sim_validate.datasets.staging import UnitRecord
-from sim_validate.engine.setup import Setup
+from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches_json import reaches_from_json
 from sim_validate.kit.config_file import flags_from
@@ -97,35 +99,13 @@ def _same_given(data: bytes, found: Any) -> None:
         assert [each["position_m"] for each in one["contacts"]] == [list(p) for p in other.points]
 
 
-def _trial(**more: Any) -> dict[str, Any]:
-    return {
-        "name": "+force_x",
-        "wrench": [1.0, 0, 0, 0, 0, 0],
-        "outcome": "held",
-        "displacement_m": 1e-6,
-    } | more
-
-
-VERDICTS = {
-    "schema": 1, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
-    "complete": True,
-    "gate": {"passed": True, "checks": [{"name": "a", "value": 1.0, "least": 0.9, "largest": 1.1}]},
-    "summary": {"grasps": 1, "grasps_held": 1, "controls": 1, "controls_held": 0,
-                "controls_let_go": 1, "mismatches": 0},
-    "verdicts": [{
-        "id": "c-0-1-2-3", "contacts_sha256": HASH, "outcome": "held", "held": True,
-        "mismatches": [], "critical_friction": {"predicted": 0.3, "simulated": None},
-        "wrenches": [_trial(predicted_limit=2.0, simulated_limit=None, required_friction=0.2)],
-        "controls": {"low_friction": {"held": False, "friction": 0.1,
-                                      "wrenches": [_trial(outcome="slipped")]}},
-        "robustness": {"trials": 3, "held": 2, "pass_rate_interval": [0.1, 0.9],
-                       "noise": {"shift": 0.01},
-                       "not_held": [{"trial": 1, "wrench": "a", "outcome": "slipped"}]},
-        "settings": tables_of(Setup()) | {"surface": "pads", "random_wrenches": 0, "seed": 0,
-                                          "grasp_size_m": 0.1},
-        "versions": {"numpy": "2.2"},
-    }],
-}  # fmt: skip
+@cache
+def _verdicts_seed() -> bytes:
+    body = example_object("tetrahedron")
+    grasp = plan(body).grasps[0]
+    agenda = Agenda(trials=1, limits="ramp")
+    verdict = validate(body, grasp, agenda=agenda)
+    return Verdicts.of(body, 0.5, verdict.gate, (verdict,)).text().encode()
 
 
 def _same_executions(data: bytes, found: Any) -> None:
@@ -323,8 +303,8 @@ TARGETS = (
     Target("given", lambda data: given_from_json(text_of(data)), lambda: [_json(GIVEN)],
            _same_given, "json"),
     Target("verdicts",
-           lambda data: verdicts_of(text_of(data)),
-           lambda: [_json(VERDICTS)], _same_record, "json"),
+           lambda data: Verdicts.of_text(text_of(data)), lambda: [_verdicts_seed()],
+           lambda data, found: _same_record(data, json.loads(found.text())), "json"),
     Target("executions", lambda data: Executions.of_text(text_of(data)),
            lambda: [executions().text().encode()], _same_executions, "json"),
     Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=1),

@@ -33,7 +33,7 @@ MADE_BY_FUNCTIONS = {
     "HandPayload HandReach Improvement Payload Plan QualityCeiling Transfer WrenchLimit",
     "scenes": "HandScene HeldScene Layout Scene Sheet Turntable",
     "sv": "ExecutedGrasp Execution ExecutionTrial Executions HandVerdict Judgement "
-    "PublishedProtocol SavedVerdict SavedVerdicts Verdict",
+    "PublishedProtocol Verdict Verdicts",
 }
 """Results, by package: users read them and do not make them."""
 NAMED_OTHERWISE = {

@@ -138,7 +138,7 @@ def agree_on(body, found):
             compared += 1
         for wrench in verdict.wrenches:
             assert wrench.simulated_limit is not None
-            assert wrench.simulated_limit.share == pytest.approx(1.0, abs=AGREED)
+            assert wrench.let_go_at.share == pytest.approx(1.0, abs=AGREED)
             assert wrench.required_friction <= FRICTION * (1.0 + 1e-6)
     return compared
 

@@ -5,18 +5,17 @@ import re
 import shlex
 import shutil
 from dataclasses import asdict, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import sim_validate as sv
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.held import HeldSettings
 from scenes.mujoco.physics import PhysicsSettings
 from sim_validate import main as commands
-from sim_validate.engine.traces import Outcome
 from sim_validate.execution.asked_executions import execution_settings
 from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
@@ -38,7 +37,7 @@ from sim_validate.report.drawn_grasps import Drawn
 from sim_validate.report.executed_grasps import execute_command, said_of_both
 from sim_validate.report.report import write_report
 from sim_validate.report.run_folder import runs_in
-from tests.sim_validate.changing import changed
+from tests.sim_validate.changing import changed, slipped
 from tests.sim_validate.report.test_report import EVIL, Page
 
 SETTINGS = ExecutionSettings(0.3, shake_g=0.5, stop_m_per_s2=2.0 * GRAVITY_M_PER_S2,
@@ -146,8 +145,13 @@ def test_the_first_page_has_a_row_for_each_grasp(run, report):
 )
 def test_a_grasp_is_bad_if_its_closure_or_its_execution_is(run, closure, place, said, tone):
     found = load_executions(run / "executions.json")
-    verdict = SimpleNamespace(outcome=Outcome(closure), held=closure == "held", mismatches=(),
-                              controls=(), controls_let_go=True)  # fmt: skip
+    saved = read_grasps(run / "grasps.json")
+    friction = saved.friction
+    quick = sv.Agenda(controls=False, critical_friction=False)
+    verdict = sv.validate(saved.body, saved.grasps[0], friction, agenda=quick)
+    if closure == "slipped":  # as predicted
+        verdict = replace(verdict, wrenches=(replace(verdict.wrenches[0], predicted_limit=0.5),))
+        verdict = slipped(verdict)
     one = None if place is None else found.grasps[place]
     assert said_of_both(verdict, found, one) == (said, tone)
     assert said_of_both(verdict, None, None)[0] == closure

@@ -1,0 +1,45 @@
+"""The tables of docs/files.md from the classes of records: `python -m tests.file_reference`.
+
+The page has a line `<!-- fields: verdicts.json -->` where the tables of a file begin, and
+`<!-- end -->` where they end.
+"""
+
+import re
+from pathlib import Path
+
+from grasp_core.figures import described
+from grasp_core.settings import Settings
+from sim_validate.closure.verdict import Verdicts
+from sim_validate.execution.verdict import Executions
+
+PAGE = Path(__file__).parent.parent / "docs" / "files.md"
+FILES = {kind.FILE: kind for kind in (Verdicts, Executions)}
+IN_FILES = re.compile(r"\b(None|NaN)\b")
+"""What JSON lacks: files have null there."""
+MARKED = re.compile(r"(<!-- fields: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
+
+
+def tables_of(kind: type) -> str:
+    """The tables of a file: its own keys, then those of each record inside it."""
+    said = []
+    for part in described(kind):
+        if issubclass(part.kind, Settings):
+            said.append(
+                f"`{part.where}` holds the settings of `{part.kind.__name__}` by their names.\n"
+            )
+            continue
+        if part.where:
+            said.append(f"`{part.where}`: {(part.kind.__doc__ or '').partition(chr(10))[0]}\n")
+        rows = [f"| `{key}` | {IN_FILES.sub('null', meaning)} |" for key, meaning in part.rows]
+        said.append("\n".join(["| field | what |", "|---|---|", *rows, ""]))
+    return "\n" + "\n".join(said) + "\n"
+
+
+def page() -> str:
+    """The text of the page with the tables as the classes say them."""
+    text = PAGE.read_text(encoding="utf-8")
+    return MARKED.sub(lambda found: found[1] + tables_of(FILES[found[2]]), text)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
