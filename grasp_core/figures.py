@@ -110,6 +110,11 @@ class Figure(NamedTuple):
     path: tuple[str, ...]
     """Attributes that lead to it; more than one where it stands in a flat part of the record."""
 
+    @property
+    def called(self) -> str:
+        """What messages call the figure."""
+        return (self.compared and self.compared.words) or self.name
+
     def of(self, record: Any) -> Any:
         """Return the figure of a record; None where the record lacks the part that has it."""
         for name in self.path:

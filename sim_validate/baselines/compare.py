@@ -105,7 +105,6 @@ def differing_figures(
             after = type(before)()
         if how is None or how.worse is None or _same(before, after):
             continue
-        name = how.words or each.name
         near = [close.of(record) for close in listed if close.name == how.close
                 for record in (one, other)]  # fmt: skip
         if how.items is not None:
@@ -116,11 +115,11 @@ def differing_figures(
             band = math.inf if aside else bands.of(each.name, how, before or 0.0)
             if numbers:
                 text, worse, counts = _of_number(before, after, band, how.worse)
-                yield Difference(f"{name}: {text}", worse, counts, how.follows)
+                yield Difference(f"{each.called}: {text}", worse, counts, how.follows)
         else:
             count = isinstance(before, int) and not isinstance(before, bool)
             yield Difference(
-                f"{name}: {_said(before)} -> {_said(after)}",
+                f"{each.called}: {_said(before)} -> {_said(after)}",
                 worse=how.worse(before, after),
                 counts=bands.same_part or not how.of_part,
                 of_holding=how.follows and not (count and abs(after - before) > flips),

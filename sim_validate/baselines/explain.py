@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grasp_core.declared import Declared, counted
-from grasp_core.figures import NONE, compared
+from grasp_core.figures import NONE, Shown, cell, compared
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.check import Checked
 from sim_validate.baselines.compare import WORDS, Finding, Status
@@ -13,6 +13,8 @@ from sim_validate.baselines.part import Present
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.engine.setup import AXIS_NAMES, WEAKEST
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
+
+PLAIN = Shown("", infinite="infinite")
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
@@ -117,12 +119,12 @@ def _figures(finding: Finding) -> Iterator[str]:
 
 
 def _rows(records: Sequence[Declared | None], start: str) -> Iterator[tuple[str, ...]]:
-    """Yield the heading of each figure that a record has, and its cells."""
+    """Yield what differences call each figure that a record has, and its cells in SI units."""
     kind = next((type(record) for record in records if record is not None), None)
     for each in () if kind is None else compared(kind):
-        cells = [NONE if record is None else each.cell(record) for record in records]
+        cells = [cell(each.of(record), PLAIN) for record in records]
         if {*cells} != {NONE}:
-            yield (f"{start}{each.shown.heading}", *cells)
+            yield (f"{start}{each.called}", *cells)
 
 
 def not_survived(grasp: ExecutedGrasp) -> str:
