@@ -1,22 +1,22 @@
 """Shows figures of records: as cells of tables and pages, as columns, and with their meaning.
 
-A figure is a field or a recorded property whose kind carries `Shown`; its docstring is its meaning,
-and the end of its name its unit. Whoever shows records asks here which figures they have, so that a
-new figure appears everywhere at once.
+A figure is a field or a property whose kind carries `Shown` or `Compared`; its docstring is its
+meaning, and the end of its name its unit. Whoever shows records, or compares them with earlier
+ones, asks here which figures they have, so that a new figure appears everywhere at once.
 """
 
 import ast
 import inspect
 import math
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from typing import Any, NamedTuple, cast, get_args
 
 from grasp_core.declared import rules
-from grasp_core.files.records import entries, inside_record
+from grasp_core.files.records import entries, inside_record, property_kinds
 from grasp_core.kinds import words
 
 NONE = "-"
@@ -26,6 +26,57 @@ UNITS = {
     "m_per_s": "m/s", "n_per_m": "N/m", "kg_m2": "kg m^2", "n_nm": "N, N m", "n_s": "N s",
 }  # fmt: skip
 """Units by the ends of names; the longest end counts."""
+
+
+Worse = Callable[[Any, Any], bool]
+"""A function that tells whether a change is for the worse, of the figure before and after."""
+
+
+def more(before: Any, after: Any) -> bool:
+    """Return whether a figure has grown."""
+    return after > before
+
+
+def less(before: Any, after: Any) -> bool:
+    """Return whether a figure has become smaller."""
+    return after < before
+
+
+def changed(before: Any, after: Any) -> bool:
+    """Return whether a figure is another one."""
+    return before != after
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """How a figure is compared with that of an earlier record, as baselines do.
+
+    Numbers may differ within a band, motions in metres and radians by absolute ones; all else must
+    be the same. A figure that says nothing of it is compared like a simulated number, and each
+    change counts as worse: a new figure raises a question where it should not, but hides nothing.
+    """
+
+    worse: Worse | None = changed
+    """Whether a change is for the worse; None for a figure that is kept without being compared."""
+    words: str = ""
+    """What messages call it, if not by its name."""
+    items: tuple[str, str] | None = None
+    """What messages say of items that came into a list of faults, and of those that left it; None
+    for a list of which only the number of items is kept."""
+    analysed: bool = False
+    """Whether the number comes from the analysis, which depends less on rounding."""
+    friction: bool = False
+    """Whether it is a friction, which other shapes of a part change by a share of the friction."""
+    follows: bool = False
+    """Whether it also changes where a wrench is now held, or no longer."""
+    of_part: bool = False
+    """Whether another shape of the part may change it."""
+    close: str = ""
+    """Name of the figure that says where rounding may decide: whether it does, or for which items
+    of a list."""
+
+
+BY_DEFAULT = Compared()
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +91,12 @@ class Shown:
     """Factor on a number, such as 1e6 for micrometres."""
     infinite: str = "never"
     """What stands for an infinite number: most figures are multiples at which something happens."""
+    compared: Compared | None = BY_DEFAULT
+    """How it is compared with an earlier one; None if others say the same and are compared."""
+
+
+class figure(property):  # noqa: N801 - it is used as a decorator, as `property` is
+    """A property that is a figure although no file of the record holds it."""
 
 
 class Figure(NamedTuple):
@@ -48,15 +105,25 @@ class Figure(NamedTuple):
     name: str
     kind: Any
     shown: Shown
+    compared: Compared | None
     meaning: str
     path: tuple[str, ...]
     """Attributes that lead to it; more than one where it stands in a flat part of the record."""
+
+    @property
+    def called(self) -> str:
+        """What messages call the figure."""
+        return (self.compared and self.compared.words) or self.name
 
     def of(self, record: Any) -> Any:
         """Return the figure of a record; None where the record lacks the part that has it."""
         for name in self.path:
             record = None if record is None else getattr(record, name)
         return record
+
+    def lacking(self, record: object) -> bool:
+        """Return whether a record lacks the part that has the figure."""
+        return self._replace(path=self.path[:-1]).of(record) is None
 
     def cell(self, record: object) -> str:
         """Write the figure of a record for people."""
@@ -66,15 +133,29 @@ class Figure(NamedTuple):
 @cache
 def figures(kind: type) -> tuple[Figure, ...]:
     """Return the figures that tables and pages show of a class, in the order of its entries."""
+    return tuple(_marked(kind, Shown))
+
+
+@cache
+def compared(kind: type) -> tuple[Figure, ...]:
+    """Return the figures of a class that are kept, to be compared with those of later records."""
+    return tuple(each for each in _marked(kind, Shown, Compared) if each.compared is not None)
+
+
+def _marked(kind: type, *marks: type[Shown | Compared]) -> Iterator[Figure]:
+    """Yield the figures whose kinds carry one of some marks, those of flat parts among them."""
     own, properties = entries(kind)
     said = meanings(kind)
-    found: list[Figure] = []
-    for each in (*own, *properties):
-        if each.flat is not None:
-            found += [one._replace(path=(each.name, *one.path)) for one in figures(each.flat)]
-        for shown in (rule for rule in rules(each.kind) if isinstance(rule, Shown)):
-            found.append(Figure(each.name, each.kind, shown, said.get(each.name, ""), (each.name,)))
-    return tuple(found)
+    listed = [(each.name, each.kind, each.flat) for each in (*own, *properties)]
+    listed += [(name, each, None) for name, each in property_kinds(kind, figure).items()]
+    for name, own_kind, flat in listed:
+        if flat is not None:
+            for one in _marked(flat, *marks):
+                yield one._replace(path=(name, *one.path))
+        for rule in (rule for rule in rules(own_kind) if isinstance(rule, marks)):
+            shown = rule if isinstance(rule, Shown) else Shown(rule.words or name)
+            how = rule.compared if isinstance(rule, Shown) else rule
+            yield Figure(name, own_kind, shown, how, said.get(name, ""), (name,))
 
 
 def cell(value: Any, shown: Shown) -> str:
@@ -98,8 +179,8 @@ def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tu
     """Return headings and rows of a table of records, without figures that none of them has."""
     records = list(records)
     listed = [each for each in figures(kind) if any(each.of(one) is not None for one in records)]
-    rows = [tuple(figure.cell(record) for figure in listed) for record in records]
-    return [figure.shown.heading for figure in listed], rows
+    rows = [tuple(each.cell(record) for each in listed) for record in records]
+    return [each.shown.heading for each in listed], rows
 
 
 def scalars(record: object) -> Mapping[str, Any]:

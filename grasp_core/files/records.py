@@ -100,18 +100,18 @@ def entries(kind: type) -> Entries:
             own.append(Entry(name, key, each, defaults[name], writes(each), reads(each), flat))
     properties = [
         Entry(name, name, said, MISSING, writes(said), None, None)
-        for name, said in recorded_kinds(kind).items()
+        for name, said in property_kinds(kind, recorded).items()
     ]
     return Entries(tuple(own), tuple(properties))
 
 
 @cache
-def recorded_kinds(kind: type) -> Mapping[str, Any]:
-    """Return the kinds of a class's recorded properties, by name."""
+def property_kinds(kind: type, mark: type[property]) -> Mapping[str, Any]:
+    """Return the kinds of a class's properties that a decorator marks, by name."""
     members = {name: each for base in reversed(kind.__mro__) for name, each in vars(base).items()}
     return {
         name: get_type_hints(each.fget, include_extras=True)["return"]
-        for name, each in members.items() if isinstance(each, recorded)
+        for name, each in members.items() if isinstance(each, mark)
     }  # fmt: skip
 
 

@@ -14,7 +14,13 @@ from grasp_core.errors import InputError, about
 from grasp_core.kinds import Range, Seed
 from grasp_core.planning.result import Plan
 from grasp_core.settings import CHOSEN, Settings
-from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
+from sim_validate.baselines.baseline import (
+    Baseline,
+    How,
+    check_writable,
+    read_baseline,
+    write_baseline,
+)
 from sim_validate.baselines.check import (
     Checked,
     check_one,
@@ -22,6 +28,7 @@ from sim_validate.baselines.check import (
     demanded,
     measured,
     seen_from,
+    setup_for,
     with_planned_fingers,
 )
 from sim_validate.baselines.part import (
@@ -33,7 +40,6 @@ from sim_validate.baselines.part import (
     source_of,
     testable,
 )
-from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.engine.setup import Agenda, LimitSearch, Noise
 from sim_validate.execution.settings import TABLE, AskedExecution
 from sim_validate.kit.toml_tables import read_tables
@@ -155,7 +161,7 @@ class Suite(Settings):
         if before is None:
             how = How(setup_for(self.saved, None), Agenda(seed=self.saved.seed))
         else:
-            how = of_settings(before.settings, str(self.baseline))
+            how = before.settings
         setup = how.setup if self.setup is None else setup_for(self.saved, self.setup)
         execution = how.execution if self.execution is None else self.execution
         if self.survives and execution is None:

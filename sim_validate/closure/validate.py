@@ -116,7 +116,7 @@ def tested(
         robustness=repeats,
         setup=setup,
         agenda=agenda,
-        scale=Scale.of(scene.layout),
+        scale=Scale.of(scene.layout, body.radius),
         gate=gate,
         scene=scene,
     )

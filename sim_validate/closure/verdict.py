@@ -11,11 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Self
 
+import numpy as np
+
 from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared
-from grasp_core.figures import Shown, scalars
+from grasp_core.figures import Compared, Shown, figure, less, more, scalars
 from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import Friction, Many, Measured, OrInfinity
@@ -28,7 +30,7 @@ from scenes.mujoco.layout import FingerDrive, Layout
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
-from sim_validate.engine.setup import Agenda, Noise, Setup
+from sim_validate.engine.setup import WEAKEST, Agenda, Noise, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
 from sim_validate.kit.about_object import AboutObject
 
@@ -138,27 +140,52 @@ class Scale(Declared):
 
     grasp_size_m: float
     """Root mean square lever of the contacts [m]; displacements are judged relative to it."""
+    object_radius_m: float
+    """Largest distance of the object's surface from its centre of mass [m]."""
     object_mass_kg: float
     """Mass of the object, not its own: it is chosen so that similar grasps behave alike [kg]."""
     object_inertia_kg_m2: Annotated[Array, Shape(3, 3)]
     fingers: FingerDrive
 
     @classmethod
-    def of(cls, layout: Layout) -> Self:
-        """Return the sizes of a scene."""
-        return cls(layout.grasp_size_m, layout.mass_kg, layout.inertia_kg_m2, layout.drive)
+    def of(cls, layout: Layout, radius_m: float) -> Self:
+        """Return the sizes of a scene with an object of a radius [m]."""
+        size = layout.grasp_size_m
+        return cls(size, radius_m, layout.mass_kg, layout.inertia_kg_m2, layout.drive)
+
+
+def _not_held(_before: Outcome, after: Outcome) -> bool:
+    return after is not Outcome.HELD
+
+
+PREDICTED = Compared(more, analysed=True, friction=True)
+PREDICTED_FRICTION = Shown("mu*", ".4f", compared=PREDICTED)
+SIMULATED_FRICTION = Shown("in sim", ".4f", compared=Compared(more, friction=True))
+SHARES = Shown("limits", ".3f", compared=None)
+MOVED = Compared(more, follows=True)
+MICRONS_MOVED = Shown("um moved", ".2g", MICRO, compared=MOVED)
+MICRONS_LOADED = Shown("um when loaded", ".2g", MICRO, compared=None)
+ENDED = Compared(_not_held, follows=True)
+LOST = Compared(items=("no longer held", "held now"), follows=True)
+LOST_WITH_NOISE = Compared(
+    items=("repeats with noise no longer held", "repeats with noise held now"), close="noisy_close"
+)
+CONTROLS = Compared(less, "negative controls", of_part=True)
+CONTROLS_HELD = Compared(more, "negative controls that were not let go")
+CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
+"""How the figures of a verdict are shown, and compared with those of an earlier one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Verdict(Declared, InNotebooks):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
-    id: Annotated[str, Shown("grasp")]
+    id: Annotated[str, Shown("grasp", compared=None)]
     contacts: tuple[Contact, ...]
     friction: Friction
     critical_friction: CriticalFriction
-    wrenches: tuple[WrenchVerdict, ...]
-    controls: tuple[ControlVerdict, ...]
+    wrenches: Annotated[tuple[WrenchVerdict, ...], Compared(less)]
+    controls: Annotated[tuple[ControlVerdict, ...], CONTROLS]
     robustness: Robustness | None
     """How often the grasp holds with noise, if asked for."""
     setup: Setup
@@ -175,30 +202,59 @@ class Verdict(Declared, InNotebooks):
         return contacts_sha256(self.contacts)
 
     @recorded
-    def predicted_critical_friction(self) -> Annotated[OrInfinity, Shown("mu*", ".4f")]:
+    def predicted_critical_friction(self) -> Annotated[OrInfinity, PREDICTED_FRICTION]:
         """The critical friction by analysis."""
         return self.critical_friction.predicted
 
     @recorded
-    def simulated_critical_friction(self) -> Annotated[float | None, Shown("in sim", ".4f")]:
+    def simulated_critical_friction(self) -> Annotated[float | None, SIMULATED_FRICTION]:
         """The one found in simulation; None if it was not measured or not found."""
         return self.critical_friction.simulated
 
     @recorded
-    def shares_found(self) -> Annotated[tuple[float, float] | None, Shown("limits", ".3f")]:
+    def shares_found(self) -> Annotated[tuple[float, float] | None, SHARES]:
         """Least and largest share of predicted limits at which the object let go; None if none."""
         found = [each.let_go_at.share for each in self.wrenches if each.let_go_at]
         return (min(found), max(found)) if found else None
 
     @recorded
-    def displacement_m(self) -> Annotated[Measured, Shown("um moved", ".2g", MICRO)]:
+    def displacement_m(
+        self,
+    ) -> Annotated[Measured, MICRONS_MOVED]:
         """Largest displacement of the object under any wrench, after friction was lowered [m]."""
         return _largest([trial.hold.displacement_m for trial in self.wrenches])
 
     @recorded
-    def start_displacement_m(self) -> Annotated[Measured, Shown("um when loaded", ".2g", MICRO)]:
+    def start_displacement_m(
+        self,
+    ) -> Annotated[Measured, MICRONS_LOADED]:
         """Largest one before that, at high friction: the fingers give way a little [m]."""
         return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
+
+    @figure
+    def rotation_rad(self) -> Annotated[Measured, MOVED]:
+        """Largest rotation of the object in the trials that hold a wrench [rad]."""
+        return _largest([trial.hold.rotation_rad for trial in self.wrenches])
+
+    @figure
+    def limit_n(self) -> Annotated[OrInfinity, Compared(less, analysed=True)]:
+        """Largest wrench that is resisted in the weakest direction, by analysis [N].
+
+        Torques are divided by the object's radius.
+        """
+        weakest = self._weakest
+        scaled = weakest.wrench / np.array([1.0] * 3 + [self.scale.object_radius_m] * 3)
+        return weakest.predicted_limit * float(np.linalg.norm(scaled))
+
+    @figure
+    def simulated_limit_n(self) -> Annotated[float | None, Compared(less)]:
+        """The one found in simulation [N]; None if it was not measured or not found."""
+        found = self._weakest.let_go_at
+        return None if found is None else self.limit_n * found.share
+
+    @property
+    def _weakest(self) -> WrenchVerdict:
+        return next(trial for trial in self.wrenches if trial.name == WEAKEST)
 
     @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
@@ -206,7 +262,7 @@ class Verdict(Declared, InNotebooks):
         return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
 
     @recorded
-    def outcome(self) -> Annotated[Outcome, Shown("outcome")]:
+    def outcome(self) -> Annotated[Outcome, Shown("outcome", compared=ENDED)]:
         """`held`, or how the first wrench that was not held ended."""
         return self.failures[0].hold.outcome if self.failures else Outcome.HELD
 
@@ -215,13 +271,23 @@ class Verdict(Declared, InNotebooks):
         """Whether every wrench held."""
         return self.outcome is Outcome.HELD
 
-    @recorded
-    def controls_let_go(self) -> Annotated[bool, Shown("controls let go")]:
-        """Whether every negative control let go of the object, as it must."""
-        return all(control.let_go for control in self.controls)
+    @figure
+    def not_held(self) -> Annotated[tuple[str, ...], LOST]:
+        """Names of the wrenches that were not held, in order."""
+        return tuple(trial.name for trial in self.failures)
 
     @recorded
-    def mismatches(self) -> tuple[str, ...]:
+    def controls_let_go(self) -> Annotated[bool, Shown("controls let go", compared=None)]:
+        """Whether every negative control let go of the object, as it must."""
+        return not self.controls_held
+
+    @figure
+    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
+        """Names of the negative controls that did not let go of the object."""
+        return tuple(each.control.name for each in self.controls if not each.let_go)
+
+    @recorded
+    def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
         """Where simulation contradicts the analysis, one sentence each."""
         found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
         if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
@@ -232,6 +298,25 @@ class Verdict(Declared, InNotebooks):
         if self.robustness is not None:
             found += self.robustness.contradictions
         return tuple(found)
+
+    @figure
+    def noisy_trials(self) -> Annotated[int, Compared(less, "repeats with noise")]:
+        """Number of repeats with noise."""
+        return len(self._repeats)
+
+    @figure
+    def noisy_not_held(self) -> Annotated[tuple[int, ...], LOST_WITH_NOISE]:
+        """Numbers of the repeats with noise in which a load was not held."""
+        return tuple(trial.number for trial in self._repeats if trial.outcome is not Outcome.HELD)
+
+    @figure
+    def noisy_close(self) -> Annotated[tuple[int, ...], Compared(None, items=("", ""))]:
+        """Numbers of the repeats with a load very close to the largest that can be resisted."""
+        return tuple(trial.number for trial in self._repeats if trial.close)
+
+    @property
+    def _repeats(self) -> tuple[NoisyTrial, ...]:
+        return () if self.robustness is None else self.robustness.trials
 
     @recorded
     def good(self) -> bool:

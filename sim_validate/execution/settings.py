@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 from grasp_core.declared import FieldError, types
 from grasp_core.errors import InputError, about
 from grasp_core.execution.grips import STIFFNESS_N_PER_M
+from grasp_core.files.records import FLAT
 from grasp_core.kinds import NotNegative, Quantity, Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.settings import Settings, named
@@ -119,7 +120,7 @@ ANY_MASS_KG = 1.0
 class AskedExecution(Settings):
     """How the grasps of all objects of a file are executed."""
 
-    settings: ExecutionSettings
+    settings: Annotated[ExecutionSettings, FLAT]
     density_kg_m3: Quantity | None = None
     """Density of every object; None where all objects have the mass of the settings [kg/m^3]."""
 

@@ -13,7 +13,7 @@ from grasp_core.arrays import Array, Shape
 from grasp_core.checked import path_of
 from grasp_core.declared import Declared, FieldError
 from grasp_core.errors import InputError
-from grasp_core.figures import Shown, cell, scalars
+from grasp_core.figures import Compared, Shown, cell, figure, less, more, scalars
 from grasp_core.files.records import FLAT, UNRECORDED, Key, RecordFile, recorded
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import Friction, OrInfinity, Quantity
@@ -38,6 +38,11 @@ MULTIPLE = ".2f"
 MILLI, DEGREES = 1e3, math.degrees(1.0)
 UNKNOWN = "-"
 """What stands for a motion that the simulator could not follow."""
+LOSSES = Compared(items=("no longer survived", "survived now"))
+CONTROLS_HELD = Compared(more, "controls that did not slip")
+PREDICTED, SIMULATED = Compared(less, analysed=True), Compared(less, close="slips")
+MOVED = Compared(more, close="slips")
+"""How figures are compared with those of an earlier execution."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -157,10 +162,10 @@ class Execution(Declared):
     """Mass of the object [kg]."""
     squeeze: Annotated[Array, Shape("k", 3), Key("squeeze_n")]
     """Contact forces at rest, on the object, (k, 3) [N]."""
-    load_multiple: Annotated[float, Shown("load", ".3g")]
+    load_multiple: Annotated[float, Shown("load", ".3g", compared=PREDICTED)]
     """Multiple of the object's weight, in any direction, that the squeeze is certified for; this
     less one is the acceleration [g] that the palm may slowly come to."""
-    trials: tuple[ExecutionTrial, ...]
+    trials: Annotated[tuple[ExecutionTrial, ...], Compared(less)]
     """How each trial ended."""
     controls: tuple[ExecutionControl, ...]
     """How each negative control ended."""
@@ -180,34 +185,55 @@ class Execution(Declared):
                              f"{len(self.squeeze)}")  # fmt: skip
 
     @recorded
-    def payload_kg(self) -> Annotated[float, Shown("payload kg", ".3g")]:
+    def payload_kg(self) -> Annotated[float, Shown("payload kg", ".3g", compared=None)]:
         """Largest mass that the squeeze is certified to carry slowly, in any direction [kg]."""
         return self.load_multiple * self.mass_kg
 
     @recorded
-    def predicted_first_slip(self) -> Annotated[OrInfinity, Shown("slip", MULTIPLE)]:
+    def predicted_first_slip(
+        self,
+    ) -> Annotated[OrInfinity, Shown("slip", MULTIPLE, compared=PREDICTED)]:
         """Least multiple of a trial's load at which a contact slips, predicted."""
         return min((trial.predicted_first_slip for trial in self.trials), default=math.inf)
 
     @recorded
-    def simulated_first_slip(self) -> Annotated[OrInfinity, Shown("in sim", MULTIPLE)]:
+    def simulated_first_slip(
+        self,
+    ) -> Annotated[OrInfinity, Shown("in sim", MULTIPLE, compared=SIMULATED)]:
         """The same in simulation; one also stands for a slip once the whole weight had come."""
         return min((trial.simulated_first_slip for trial in self.trials), default=math.inf)
 
     @recorded
-    def displacement_m(self) -> Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, UNKNOWN)]:
+    def displacement_m(
+        self,
+    ) -> Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, UNKNOWN, compared=MOVED)]:
         """Largest displacement of the centre of mass against the palm in any trial [m]."""
         return max((trial.displacement_m for trial in self.trials), default=0.0)
 
     @recorded
-    def lost(self) -> Annotated[tuple[str, ...], Shown("lost")]:
+    def lost(self) -> Annotated[tuple[str, ...], Shown("lost", compared=LOSSES)]:
         """Trials that the object did not survive, by name."""
         return tuple(trial.name for trial in self.trials if not trial.survived)
 
     @recorded
-    def controls_held(self) -> tuple[str, ...]:
+    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
         """Negative controls that did not slip, as they must, by name."""
         return tuple(control.name for control in self.controls if not control.let_go)
+
+    @figure
+    def slips(self) -> Annotated[bool, Compared(None)]:
+        """Whether a contact may slip by prediction: how far it then slides depends on rounding."""
+        return self.predicted_first_slip < CLEAR_OF_SLIP
+
+    @figure
+    def slip_m(self) -> Annotated[OrInfinity, MOVED]:
+        """Farthest that a point of contact slid on the object in any trial [m]."""
+        return max((trial.slip_m for trial in self.trials), default=0.0)
+
+    @figure
+    def turn_rad(self) -> Annotated[OrInfinity, MOVED]:
+        """Largest turn of the object against the palm in any trial [rad]."""
+        return max((trial.turn_rad for trial in self.trials), default=0.0)
 
     @property
     def survived(self) -> bool:
@@ -238,18 +264,22 @@ class Execution(Declared):
         return sum(trial.survived for trial in own), len(own)
 
 
+def _failed(_before: str | None, after: str | None) -> bool:
+    return after is not None
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ExecutedGrasp(Declared):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
 
-    id: Annotated[str, Shown("grasp")]
+    id: Annotated[str, Shown("grasp", compared=None)]
     family: str
     """Construction of the contacts; empty where a hand executed them."""
     contacts_sha256: str
     """Hash of the contacts, which tells grasps of one id apart."""
     execution: Annotated[Execution | None, FLAT]
     """Trials and negative controls; None where no squeeze carries the weight."""
-    reason: str | None = None
+    reason: Annotated[str | None, Compared(_failed)] = None
     """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
     enough: Enough | None = None
     """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
@@ -269,7 +299,7 @@ class ExecutedGrasp(Declared):
             raise FieldError("enough", "must be None (null), as every trial was survived")
 
     @recorded
-    def survived(self) -> Annotated[bool, Shown("survived")]:
+    def survived(self) -> Annotated[bool, Shown("survived", compared=Compared(less))]:
         """Whether the object survived every trial, of at least one."""
         return self.execution is not None and self.execution.survived
 
@@ -279,7 +309,9 @@ class ExecutedGrasp(Declared):
         return self.execution is None or self.execution.controls_let_go
 
     @recorded
-    def least_predicted_loss(self) -> Annotated[OrInfinity, Shown("least loss", MULTIPLE)]:
+    def least_predicted_loss(
+        self,
+    ) -> Annotated[OrInfinity, Shown("least loss", MULTIPLE, compared=None)]:
         """Least multiple of a trial's load at which the object is lost, predicted.
 
         It is the number to choose by, but does not see where fingers meet a misplaced object. It is

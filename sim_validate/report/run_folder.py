@@ -156,7 +156,7 @@ def _check_about(path: Path, found: Any, saved: Plan) -> None:
             "or remove it"
         )
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    listed: list[Any] = list(found) if hasattr(type(found), "ITEMS") else []
+    listed: list[Any] = list(found) if hasattr(found, "ITEMS") else []
     for each in listed:
         if contacts.get(each.id) != each.contacts_sha256:
             raise InputError(

@@ -16,8 +16,7 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
-from sim_validate.baselines.settings import of_settings
+from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.setup_toml import setup_from_tables
 from sim_validate.closure.validate import validate
@@ -162,16 +161,15 @@ def _baseline_seed() -> list[bytes]:
 
 
 def _baseline(data: bytes) -> Any:
-    found = baseline_from_json(text_of(data), "b.json")
-    return found, of_settings(found.settings, "b.json")
+    return Baseline.of_text(text_of(data))
 
 
-def _same_baseline(data: bytes, found: Any) -> None:
-    again = json.loads(baseline_to_json(found[0]))
+def _same_baseline(data: bytes, found: Baseline) -> None:
+    again = json.loads(found.text())
     stated = json.loads(data)
     _compare(stated, again)
     assert stated.keys() == again.keys()
-    setup, agenda = found[1].setup, found[1].agenda
+    setup, agenda = found.settings.setup, found.settings.agenda
     assert agenda.seed == stated["settings"]["seed"]
     given = stated["settings"]["setup"].get("hold", {})
     assert {name: getattr(setup.hold, name) for name in given} == given

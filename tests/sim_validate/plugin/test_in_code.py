@@ -111,7 +111,7 @@ def test_assert_stable_in_code(tmp_path):
     assert "1 failed, 1 passed" in said
     assert "push [0.0, 0.0, 900.0" in said
     assert "predicted limit" in said
-    assert ".critical_friction" in (tmp_path / "j.xml").read_text()
+    assert ".predicted_critical_friction" in (tmp_path / "j.xml").read_text()
 
 
 BAD_DEMANDS = [
