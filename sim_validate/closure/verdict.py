@@ -181,7 +181,7 @@ class Verdict(Declared, InNotebooks):
 
     @recorded
     def simulated_critical_friction(self) -> Annotated[float | None, Shown("in sim", ".4f")]:
-        """The one found in simulation; None if it was not measured or not found."""
+        """The critical friction in simulation; None if it was not measured or not found."""
         return self.critical_friction.simulated
 
     @recorded

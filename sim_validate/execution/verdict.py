@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 from grasp_core.arrays import Array
 from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
+from grasp_core.kinds import OrInfinity
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.physics import PhysicsSettings
 from sim_validate.execution.enough import Enough
@@ -34,21 +35,22 @@ class ExecutionTrial:
     survived: bool
     """Whether the object was kept, and moved no farther than the settings allow."""
     fate: Fate
-    slip_m: float
+    """`stuck`, `slipped` (at a contact, but kept), `dropped`, or `diverged`."""
+    slip_m: OrInfinity
     """Farthest that a point of contact slid on the object [m]; infinite where the simulator
     diverged, as the next two are."""
-    displacement_m: float
+    displacement_m: OrInfinity
     """Largest displacement of the centre of mass against the palm [m]."""
-    turn_rad: float
+    turn_rad: OrInfinity
     """Largest turn against the palm [rad]."""
-    predicted_first_slip: float
+    predicted_first_slip: OrInfinity
     """Multiple of the trial's load at which the first contact slips, predicted; for `misplaced`,
     that of the weight in the planned place."""
-    predicted_loss: float
+    predicted_loss: OrInfinity
     """Multiple of the trial's load at which the object is lost, predicted: it moves or turns
     farther than the settings allow, or nothing balances the load; for `misplaced`, that of the
     weight in the planned place."""
-    simulated_first_slip: float
+    simulated_first_slip: OrInfinity
     """Multiple of the trial's load at which the first contact slips, from the simulated contact
     forces: one or less if a contact slipped, else how far away slip stayed."""
     step_s: float
