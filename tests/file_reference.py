@@ -1,7 +1,7 @@
-"""The tables of docs/files.md from the classes of records: `python -m tests.file_reference`.
+"""The tables of docs/files.md and docs/datasets.md: `python -m tests.file_reference`.
 
 The page has a line `<!-- fields: verdicts.json -->` where the tables of a file begin, and
-`<!-- end -->` where they end.
+`<!-- end -->` where they end. Those of columns of grasps begin with `<!-- columns: GROUP -->`.
 """
 
 import re
@@ -10,15 +10,18 @@ from pathlib import Path
 from grasp_core.figures import described
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
+from sim_validate.datasets.rows import TABLES, dataset_tables
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.planning.transfer import TransferFile
 from sim_validate.protocols.verdict import Judgements
 
 PAGE = Path(__file__).parent.parent / "docs" / "files.md"
+DATASETS = PAGE.parent / "datasets.md"
 FILES = {kind.FILE: kind for kind in (Verdicts, Executions, Reaches, Judgements, TransferFile)}
 IN_FILES = re.compile(r"\b(None|NaN)\b")
 """What JSON lacks: files have null there."""
+COLUMNS = re.compile(r"(<!-- columns: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 MARKED = re.compile(r"(<!-- fields: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 
@@ -54,5 +57,20 @@ def page() -> str:
     return MARKED.sub(lambda found: found[1] + tables_of(found[2], known), text)
 
 
+def columns(group: str) -> str:
+    """The columns that grasps have with a group of columns, as their row class says them."""
+    usual = {each.name for each in TABLES["grasps"]}
+    more = [each for each in dataset_tables({group: 1})["grasps"] if each.name not in usual]
+    rows = [f"| `{each.name}` | {each.meaning} |" for each in more]
+    return "\n".join(["", "| column | what |", "|---|---|", *rows, "", ""])
+
+
+def datasets_page() -> str:
+    """The text of the page about datasets with the tables as the classes say them."""
+    text = DATASETS.read_text(encoding="utf-8")
+    return COLUMNS.sub(lambda found: found[1] + columns(found[2]), text)
+
+
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
+    DATASETS.write_text(datasets_page(), encoding="utf-8")

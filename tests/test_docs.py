@@ -127,6 +127,10 @@ def test_every_module_function_and_test_that_pages_name_exists():
         assert not name or name in definitions_of(ROOT / file), f"{file}::{name}"
 
 
+def test_columns_of_datasets_are_told_as_their_classes_tell_them():
+    assert file_reference.datasets_page() == DATASETS
+
+
 def test_the_python_reference_is_that_of_the_docstrings():
     text = PAGES["api"]
     assert text == api_reference.page()

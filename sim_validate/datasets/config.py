@@ -25,7 +25,7 @@ from grasp_core.objects.surface import FaceKind
 from grasp_core.planning.request import METHODS, ConeKind
 from grasp_core.settings import Settings
 from grasp_core.values import Method
-from sim_validate.datasets.tables import Tables, dataset_tables
+from sim_validate.datasets.tables import EXECUTED
 from sim_validate.execution.settings import (
     TABLE,
     AskedExecution,
@@ -161,16 +161,11 @@ class DatasetConfig(Settings):
             )
 
     @property
-    def tables(self) -> Tables:
-        """Tables of the dataset, with their columns."""
-        return dataset_tables(executed=self.execution is not None, groups=self.groups)
-
-    @property
     def groups(self) -> dict[str, int]:
         """Groups of columns that the tables have on request, with their sizes."""
-        if self.learning is None:
-            return {}
-        return self.learning.groups(executed=self.execution is not None)
+        executed = self.execution is not None
+        asked = {} if self.learning is None else self.learning.groups(executed=executed)
+        return {**({EXECUTED: 1} if executed else {}), **asked}
 
     @property
     def sha256(self) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic_core import to_jsonable_python
 
 import grasp_core as gc
-from grasp_core.files.json_text import record_of
+from grasp_core.files.records import RecordFile, record_of
 from grasp_core.files.text_files import text_of
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
@@ -27,8 +27,6 @@ from sim_validate.datasets.manifest import (
     Listed,
     Manifest,
     left_out_from,
-    manifest_from_json,
-    manifest_to_json,
 )
 from sim_validate.datasets.staging import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup
@@ -144,7 +142,7 @@ def _compare(stated: Any, found: Any) -> None:
             if key in stated:
                 _compare(stated[key], value)
             else:
-                assert value in (None, "")
+                assert value in (None, "", {})
     elif isinstance(found, list):
         assert isinstance(stated, list)
         for one, other in zip(stated, found, strict=True):
@@ -196,27 +194,25 @@ MANIFEST = Manifest(
 )  # fmt: skip
 
 
+def _same_file(data: bytes, found: RecordFile) -> None:
+    _compare(json.loads(data), json.loads(found.text()))
+
+
 def _same_manifest(data: bytes, found: Manifest) -> None:
-    stated, again = json.loads(data), json.loads(manifest_to_json(found))
-    for each in stated["files"]:
-        for key in [key for key, value in each.items() if value is None]:
-            del each[key]
-    stated["files"].sort(key=lambda each: each["path"])
-    assert stated == again
+    _same_file(data, found)
     assert not any(Path("/a/b", each.path).resolve() == Path("/a/b") for each in found.files)
     assert all(Path("/a/b", e.path).resolve().is_relative_to("/a/b") for e in found.files)
 
 
 LEFT_OUT = {"object": "a.obj", "source_sha256": HASH, "friction": 0.5, "given": ["given-000001"],
             "reason": "no solid"}  # fmt: skip
-UNIT = {"object": "a.obj", "friction": 0.5, "files": {"grasps.parquet": HASH}, "object_id": HASH,
-        "split": "train"}  # fmt: skip
+UNIT = UnitRecord("a.obj", 0.5, {"grasps.parquet": HASH}, HASH, "train")
 
 
 def _same_lines(data: bytes, found: Any) -> None:
     lines = data.decode().removesuffix("\n").split("\n") if data else []
     for line, other in zip(lines, found, strict=True):
-        assert json.loads(line, parse_int=float) == other.model_dump()
+        assert json.loads(line, parse_int=float) == record_of(other)
 
 
 def _setup(data: bytes) -> Any:
@@ -322,12 +318,13 @@ TARGETS = (
     Target("baseline", _baseline, _baseline_seed, _same_baseline, "json"),
     Target("wrenches", lambda data: wrenches_from_json(text_of(data)), lambda: [_json(WRENCHES)],
            _same_wrenches, "json"),
-    Target("manifest", lambda data: manifest_from_json(text_of(data)),
-           lambda: [manifest_to_json(MANIFEST).encode()], _same_manifest, "json"),
+    Target("manifest", lambda data: Manifest.of_text(text_of(data)),
+           lambda: [MANIFEST.text().encode()], _same_manifest, "json"),
     Target("quarantine", lambda data: left_out_from(text_of(data)),
            lambda: [_json(LEFT_OUT) + b"\n" + _json(LEFT_OUT) + b"\n"], _same_lines, "json"),
-    Target("staged", lambda data: record_of(UnitRecord, text_of(data), "unit.json"),
-           lambda: [_json(UNIT)], _same_record, "json"),
+    Target("staged", lambda data: UnitRecord.of_text(text_of(data)),
+           lambda: [UNIT.text().encode()],
+           _same_file, "json"),
     Target("setup", _setup, lambda: [SETUP], _same_setup, "toml"),
     Target("suite", _suite, lambda: [SUITE], _same_suite, "toml"),
     Target("dataset-config",
