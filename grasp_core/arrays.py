@@ -1,22 +1,22 @@
 """Checks arrays once when they are passed in, and fields of certificates whenever they are used.
 
 Arrays that users pass are copied and made read-only, or refused with an error. A certificate may
-come from anywhere, so its `verify` answers False to a bad field (`is_array` and the like), never an
-error. Its real arrays must be float64, and whole ones int64, as this package makes them: narrower
-types wrap or overflow in the sums of a check, unsigned ones in its differences, and subclasses of
-arrays may hide entries. To check arrays of other types, convert them first,
-`array.astype(np.float64)`.
+come from anywhere, so its `verify` answers False to a bad field (see `Declared.is_sound`), never an
+error. Its real arrays must be float64, and whole ones int64, as its constructor makes them:
+narrower types wrap or overflow in the sums of a check, unsigned ones in its differences, and
+subclasses of arrays may hide entries.
 """
 
 import math
-from numbers import Real
-from typing import Any, TypeAlias, TypeGuard, cast
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.checked import LARGEST_FRICTION, MOST_COUNT, shown
 from grasp_core.errors import InputError
+from grasp_core.kinds import Range, UnfitError
 
 Array: TypeAlias = NDArray[np.float64]
 """Float array of any shape; the docstring of each value or argument gives its shape."""
@@ -65,6 +65,114 @@ def frozen(
         )
     array.setflags(write=False)
     return array
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The rule of a kind that a value is an array of a shape, copied and read-only.
+
+    Lengths that are None are free; those with the same letter in a class are the same.
+    """
+
+    shape: tuple[int | str | None, ...]
+    units: bool = False
+    """Whether vectors along the last axis have length one."""
+    whole: bool = False
+    """Whether entries are whole numbers from 0 up."""
+    least: float = -LARGEST_ENTRY
+    most: float = LARGEST_ENTRY
+    nan: bool = False
+    """Whether entries may be NaN, where a simulation diverged or a finger is missing; null in
+    files."""
+
+    _lengths: tuple[int | None, ...] = ()
+
+    def __init__(self, *shape: int | str | None, **rules: Any) -> None:
+        lengths = tuple(None if isinstance(n, str) else n for n in shape)
+        for name, value in {"shape": shape, "_lengths": lengths, **rules}.items():
+            object.__setattr__(self, name, value)
+
+    def take(self, value: Any) -> NDArray[Any]:
+        """Return a read-only copy of a value as an array of this shape.
+
+        An array that is read-only and owns its entries is kept as it is.
+        """
+        if self._fits(value):
+            array = value if value.base is None and not value.flags.writeable else np.array(value)
+            array.setflags(write=False)
+        else:
+            make = frozen_indices if self.whole else frozen_units if self.units else frozen
+            try:
+                if self.nan:
+                    return self._with_nan(value)
+                array = make(value, self._lengths, "")
+            except InputError as error:
+                raise UnfitError(str(error).strip()) from None
+        self._check_ends(array)
+        return array
+
+    def _with_nan(self, value: Any) -> Array:
+        """Return a copy whose entries may be NaN, for which lists have None."""
+        listed: Any = value.tolist() if hasattr(value, "tolist") else value
+        array = np.array(listed, dtype=np.float64) if _is_rows(listed) else real_array(value, "")
+        frozen(np.nan_to_num(array), self._lengths, "")
+        array.setflags(write=False)
+        return array
+
+    def exact(self, value: Any) -> NDArray[Any]:
+        """Return an array that is of this shape and type already."""
+        if not self._fits(value):
+            raise UnfitError
+        self._check_ends(value)
+        return value
+
+    def _fits(self, value: Any) -> bool:
+        if self.whole:
+            known = is_indices(value, *self._lengths)
+            return known and 0 <= value.min(initial=0) <= value.max(initial=0) <= MOST_COUNT
+        return (are_units if self.units else is_array)(value, *self._lengths)
+
+    def _check_ends(self, array: NDArray[Any]) -> None:
+        free = self.least == -LARGEST_ENTRY and self.most == LARGEST_ENTRY
+        if not free and array.size and not self.least <= array.min() <= array.max() <= self.most:
+            raise UnfitError(
+                f"must hold numbers from {self.least:g} to {self.most:g}, got "
+                f"{float(array.min()):.6g} to {float(array.max()):.6g}"
+            )
+
+    def __str__(self) -> str:
+        """Return the shape in words."""
+        lengths = ", ".join("any" if n is None else str(n) for n in self.shape)
+        entries = "whole numbers" if self.whole else "unit vectors" if self.units else "numbers"
+        return f"an array of {entries} of shape ({lengths}{',' * (len(self.shape) == 1)})"
+
+
+def _is_rows(listed: Any) -> bool:
+    """Return whether lists hold only numbers, None and further such lists."""
+    if isinstance(listed, list | tuple):
+        return all(map(_is_rows, cast("list[Any]", listed)))
+    number = type(listed) is not bool and isinstance(listed, int | float | np.number)
+    return listed is None or number
+
+
+Point = Annotated[Array, Shape(3)]
+"""A point or a vector, (3,)."""
+UnitVector = Annotated[Array, Shape(3, units=True)]
+Wrench = Annotated[Array, Shape(6)]
+"""A force [N], then a torque [N m], (6,)."""
+Points = Annotated[Array, Shape("k", 3)]
+"""A point or a vector for each of k contacts, (k, 3)."""
+UnitVectors = Annotated[Array, Shape("k", 3, units=True)]
+Frictions = Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
+"""A Coulomb coefficient for each of k contacts, (k,)."""
+Polygon = Annotated[Array, Shape(None, 3)]
+"""Any number of points in space, (n, 3) [m], such as the corners of a polygon in order."""
+Figure = Annotated[float, Range(least=-LARGEST_ENTRY, most=LARGEST_ENTRY)]
+"""A number that a proof may square."""
+Amount = Annotated[float, Range(least=0.0, most=LARGEST_ENTRY)]
+"""How much there is of something, that a proof may square."""
+Triangles = Annotated[Indices, Shape(None, 3, whole=True)]
+"""Places of the corners of triangles among points, (t, 3)."""
 
 
 def frozen_copy(values: Array) -> Array:
@@ -145,31 +253,11 @@ def rounded(value: float) -> float:
     return float(to_digits(np.array(value, dtype=np.float64)))
 
 
-def is_a(value: Any, kind: type) -> bool:
-    """Return whether a value is an instance of a class, whatever type is declared for it."""
-    return isinstance(value, kind)
-
-
-def is_tuple_of(value: Any, kind: type, count: int | None = None) -> bool:
-    """Return whether a value is a tuple of instances of a class, `count` of them if given."""
-    if not isinstance(value, tuple):
-        return False
-    things = cast("tuple[Any, ...]", value)
-    fits = count is None or len(things) == count
-    return fits and all(isinstance(thing, kind) for thing in things)
-
-
-def is_number(value: Any, *, least: float = -LARGEST_ENTRY, most: float = LARGEST_ENTRY) -> bool:
-    """Return whether a value is a single real number in a range, and not NaN."""
-    real = isinstance(value, Real) and not is_a(value, bool)
-    return real and least <= cast("float", value) <= most
-
-
 def is_array(value: Any, *shape: int | None) -> TypeGuard[Array]:
     """Return whether a value is a float64 array of finite numbers; None is any length."""
     if not _fits(value, np.float64, shape):
         return False
-    return bool((np.abs(cast("Array", value)) <= LARGEST_ENTRY).all())
+    return bool(np.abs(cast("Array", value)).max(initial=0.0) <= LARGEST_ENTRY)
 
 
 def is_indices(value: Any, *shape: int | None) -> TypeGuard[Indices]:
@@ -190,9 +278,10 @@ def _fits(value: Any, kind: type, shape: tuple[int | None, ...]) -> bool:
 
 def are_units(value: Any, *shape: int | None, slack: float = UNIT_SLACK) -> bool:
     """Return whether a value is an array of unit vectors along its last axis."""
-    return is_array(value, *shape) and bool(
-        (np.abs(np.linalg.norm(value, axis=-1) - 1.0) <= slack).all()
-    )
+    if not is_array(value, *shape):
+        return False
+    lengths = np.sqrt((value * value).sum(axis=-1))
+    return bool((np.abs(lengths - 1.0) <= slack).all())
 
 
 def are_frictions(value: Any, count: int) -> bool:

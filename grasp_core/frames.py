@@ -1,7 +1,7 @@
-"""Frames along directions, always completed in the same way, and angles that files keep exactly.
+"""Frames along directions, always completed in the same way, and angles that degrees keep exactly.
 
-Angles are kept in degrees. Two neighbouring numbers of radians may become the same degrees, and one
-of them stands for both: every angle of a plan is such a number, so it is read as it was written.
+Two neighbouring numbers of radians may become the same degrees, and one of them stands for both:
+every angle of a plan is such a number, so what a table shows in degrees can be turned back into it.
 """
 
 import math
@@ -56,5 +56,5 @@ def radians_of(degrees: float) -> float:
 
 
 def kept_angle(radians: float) -> float:
-    """Return the angle that files keep for one: the same, or its neighbour in the last digit."""
+    """Return the angle that degrees keep for one: the same, or its neighbour in the last digit."""
     return radians_of(math.degrees(radians))

@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_core.checked import function, number, one_of, several, shown
 from grasp_core.errors import InputError
-from grasp_core.settings import Method
+from grasp_core.kinds import Method
 from grasp_core.values import Grasp
 
 SHOWN_IDS = 5
@@ -130,9 +130,9 @@ def _is_of(grasp: Grasp, family: Method) -> bool:
 def data_frame(grasps: Sequence[Grasp]) -> Any:
     """Return a `pandas.DataFrame` with a row for each grasp, indexed by id.
 
-    Columns have the names and units of `grasps.json`: `family`, `radius_m`, `span_angle_deg`,
-    `critical_friction`, `closure_margin`, `ferrari_canny_lower_n` and `_upper_n`; for each finger
-    `face_0`, its contact `position_0_x_m` and its inward normal `normal_0_x`, and so on.
+    Columns are named as in `grasps.json`, with angles in degrees: `family`, `radius_m`,
+    `span_angle_deg`, `critical_friction`, `closure_margin`, `ferrari_canny_lower_n` and `_upper_n`;
+    for each finger `face_0`, its contact `position_0_x_m`, its inward normal `normal_0_x`, etc.
     """
     return frame_of([_row(grasp) for grasp in grasps], [grasp.id for grasp in grasps])
 

@@ -4,78 +4,70 @@ All of them are frozen. Every vector is in the object's frame and in SI units. N
 vectors that point into the object. Arrays are copied, checked and made read-only on construction.
 """
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen, frozen_units
-from grasp_core.by_value import ByValue, counted, summary, vector
-from grasp_core.checked import LARGEST, instance, number, one_of, several, shown, text, whole
+from grasp_core.arrays import Array, Shape, UnitVector
+from grasp_core.checked import LARGEST, number, shown
+from grasp_core.declared import Declared, FieldError, counted, summary, vector
 from grasp_core.errors import InputError
+from grasp_core.files.records import Key, recorded
 from grasp_core.frames import poses_along
-from grasp_core.settings import Family
+from grasp_core.kinds import Family, NotNegative, Null, Number, Range, Signed
 
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
-FaceQuadruple: TypeAlias = tuple[int, int, int, int]
+FaceQuadruple: TypeAlias = tuple[Number, Number, Number, Number]
 """Indices of four faces, in finger order."""
 
 Item = TypeVar("Item")
 
 FINGERS = 4
-RIGHT_ANGLE = np.pi / 2
+RIGHT_ANGLE = math.pi / 2
+HalfAngle = Annotated[float, Range(least=0.0, below=RIGHT_ANGLE)]
+"""The half-angle of a cone, from 0 to below pi / 2 [rad]."""
+Bounds = tuple[Signed, Signed]
+"""A proved lower and a proved upper bound of one number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ForceCone(ByValue):
+class ForceCone(Declared):
     """A circular cone of force directions inside a friction cone.
 
     In the paper its axis is the contact normal and its half-angle the friction angle.
     """
 
-    axis: Array
+    axis: UnitVector
     """Unit vector along the middle of the cone, (3,)."""
-    half_angle: float
+    half_angle: Annotated[HalfAngle, Key("half_angle_rad")]
     """Angle between the axis and the cone's surface, from 0 to below pi / 2 [rad]."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
-        number(self.half_angle, "half_angle", least=0.0, below=RIGHT_ANGLE)
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Contact(ByValue):
+class Contact(Declared):
     """A point where one fingertip touches the object, with the direction in which it can push."""
 
-    position: Array
+    position: Annotated[Array, Shape(3), Key("position_m")]
     """Point on the surface, (3,) [m]."""
-    normal: Array
+    normal: UnitVector
     """Unit vector into the object, (3,)."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "position", frozen(self.position, (3,), "position"))
-        object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ContactRegion(ByValue):
+class ContactRegion(Declared):
     """A region where one finger may stand while the others stay anywhere in their own regions."""
 
     kind: RegionKind
     """Which proof certifies the region: `cone` is the inverted force cone of a focus point cut with
     the face, `disc` a disc around the contact of a pencil, `certified` a region with a proof of its
     own (see `certify_regions`); `point` claims nothing but the contact."""
-    polygon: Array
+    polygon: Annotated[Array, Shape(None, 3), Key("polygon_m")]
     """Convex polygon on the face, (k, 3) [m]; for a disc, points of its border."""
-    inscribed_radius: float
+    inscribed_radius: Annotated[NotNegative, Key("inscribed_radius_m")]
     """Radius of the largest disc inside the region [m]."""
-
-    def __post_init__(self) -> None:
-        one_of(self.kind, get_args(RegionKind), "kind")
-        object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
-        number(self.inscribed_radius, "inscribed_radius", least=0.0, most=LARGEST)
 
     def __repr__(self) -> str:
         corners = counted(len(self.polygon), "corner")
@@ -83,19 +75,15 @@ class ContactRegion(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Witness(ByValue):
+class Witness(Declared):
     """Balanced contact forces, whose four lines show to which family a grasp belongs."""
 
-    points: Array
+    points: Annotated[Array, Shape(FINGERS, 3), Key("points_m")]
     """One point on each line, namely the contact, (4, 3) [m]."""
-    forces: Array
+    forces: Annotated[Array, Shape(FINGERS, 3)]
     """Forces along the lines, into the object, whose normal parts sum to one, (4, 3)."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen(self.points, (FINGERS, 3), "points"))
-        object.__setattr__(self, "forces", frozen(self.forces, (FINGERS, 3), "forces"))
-
-    @property
+    @recorded
     def directions(self) -> Array:
         """Return unit vectors along the lines, (4, 3)."""
         return self.forces / np.linalg.norm(self.forces, axis=1, keepdims=True)
@@ -109,7 +97,7 @@ PUT_OFF = ("critical_friction", "ferrari_canny")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Grasp(ByValue):
+class Grasp(Declared):
     """Four contacts in finger order, with a witness that shows why they hold the object.
 
     A planned grasp computes its `critical_friction` and its `ferrari_canny` when they are first
@@ -121,60 +109,41 @@ class Grasp(ByValue):
     family: Family
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
-    focus_points: Array
+    focus_points: Annotated[Array, Shape(None, 3), Key("focus_points_m")]
     """Points where witness lines meet, (k, 3) [m]: one for a concurrent grasp, one for each pair of
     a pencil. For a regulus, the points midway between the two lines of each pair; empty for other
     grasps."""
     force_cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
     """Force cones that the construction used; each lies inside its contact's friction cone."""
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
-    radius: float
+    radius: Annotated[NotNegative, Key("radius_m")]
     """Radius of the smallest of four discs in which fingers may stand independently [m]; 0.0 where
     no discs are claimed."""
-    span_angle: float
+    span_angle: Annotated[HalfAngle, Key("span_angle_rad")]
     """theta*, the largest half-angle [rad] below which cones around the four normals positively
     span."""
-    critical_friction: float
+    critical_friction: Annotated[float, Range(least=0.0, most=math.inf), Null(math.inf)]
     """Smallest Coulomb coefficient above which the contacts are in force closure; computed at
     first use if the grasp was planned."""
-    closure_margin: float
+    closure_margin: Signed
     """Proved margin of force closure at the planned friction (see `ClosureCertificate.margin`)."""
-    ferrari_canny: tuple[float, float]
+    ferrari_canny: Bounds
     """Proved lower and upper bound [N] of the `l1` quality at the planned friction, with torques
     about the centre of mass and divided by the object's radius; computed at first use if the grasp
     was planned."""
     witness: Witness
     """Balanced forces whose four lines belong to the grasp's family."""
-    approach_directions: Array | None = None
+    approach_directions: Annotated[Array, Shape(FINGERS, 3, units=True)] | None = None
     """Unit vector along which each finger moves in to its contact on a free line, (4, 3); None if
     no free lines were asked for (`plan(finger=...)`)."""
     _figures: Any = field(default=None, init=False, compare=False)
     """Has a method for each figure that is `PUT_OFF`, by its name; None where they were given."""
 
-    def __post_init__(self) -> None:
-        text(self.id, "id")
-        one_of(self.family, get_args(Family), "family")
-        if self.approach_directions is not None:
-            ways = frozen_units(self.approach_directions, (FINGERS, 3), "approach_directions")
-            object.__setattr__(self, "approach_directions", ways)
-        _one_per_finger(self.faces, partial(whole, name="faces"), "faces", "indices")
-        for name, kind in PER_FINGER.items():
-            each = partial(instance, kind=kind, name=name)
-            _one_per_finger(getattr(self, name), each, name, f"{kind.__name__} values")
-        points = frozen(self.focus_points, (None, 3), "focus_points")
-        object.__setattr__(self, "focus_points", points)
-        number(self.radius, "radius", least=0.0, most=LARGEST)
-        number(self.span_angle, "span_angle", least=0.0, below=RIGHT_ANGLE)
-        number(self.critical_friction, "critical_friction", least=0.0, most=np.inf)
-        number(self.closure_margin, "closure_margin")
-        bounds = several(
-            self.ferrari_canny, partial(number, name="ferrari_canny"), "ferrari_canny", "bounds"
-        )
-        if len(bounds) != len(("lower", "upper")) or bounds[0] > bounds[1]:
-            raise InputError(
-                f"ferrari_canny must be a pair, lower bound then upper bound, got {shown(bounds)}"
-            )
-        instance(self.witness, Witness, "witness")
+    def _check_together(self) -> None:
+        lower, upper = self.ferrari_canny
+        if lower > upper:
+            said = f"must be a lower bound, then an upper bound, got {shown((lower, upper))}"
+            raise FieldError("ferrari_canny", said)
 
     if not TYPE_CHECKING:  # or any misspelt field would pass the type checker
 
@@ -225,16 +194,6 @@ class Grasp(ByValue):
             critical_friction=self.critical_friction, closure_margin=self.closure_margin,
             ferrari_canny=np.array(self.ferrari_canny),
         )  # fmt: skip
-
-
-PER_FINGER = {"contacts": Contact, "force_cones": ForceCone, "regions": ContactRegion}
-"""Class of the values in each field of a grasp that has one value per finger, by field name."""
-
-
-def _one_per_finger(value: Any, each: Callable[[Any], object], name: str, kind: str) -> None:
-    things = several(value, each, name, kind)
-    if len(things) != FINGERS:
-        raise InputError(f"a grasp needs {FINGERS} {name}, one per finger, got {len(things)}")
 
 
 def four(items: Iterable[Item]) -> tuple[Item, Item, Item, Item]:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 from grasp_core.checked import LARGEST
 from grasp_core.errors import InputError
-from grasp_core.settings import CHOSEN, Direction, NotNegative, Quantity, Range, Settings, Share
+from grasp_core.kinds import Direction, NotNegative, Quantity, Range, Share
+from grasp_core.settings import CHOSEN, Settings
 
 if TYPE_CHECKING:
     from grasp_core.objects.polyhedron import Polyhedron

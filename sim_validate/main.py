@@ -13,8 +13,8 @@ from typing import Any, get_args
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
+from grasp_core.declared import FieldError
 from grasp_core.errors import GraspError, InputError
-from grasp_core.settings import SettingError
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.flags import Baseline
 from sim_validate.datasets import flags as dataset_flags
@@ -109,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         sys.stdout.write(examples_for(arguments))
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
-    except SettingError as error:
+    except FieldError as error:
         return _complain(f"{_flag_of(error)} {error.fault}", Exit.USAGE)
     except InputError as error:  # settings that do not fit each other
         return _complain(str(error), Exit.USAGE)
@@ -118,7 +118,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
 
 
-def _flag_of(error: SettingError) -> str:
+def _flag_of(error: FieldError) -> str:
     found = (each.name for each in flags_of(Command)
              if (each.owner, each.field) == (error.owner, error.name))  # fmt: skip
     return "--" + next(found, error.name).replace("_", "-")

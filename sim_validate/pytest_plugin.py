@@ -4,7 +4,6 @@ Nothing but pytest is imported until such a file, the fixtures or the marker are
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -171,7 +170,6 @@ class GraspItem(_SuiteItem):
     def runtest(self) -> None:
         """Fail if the grasp is worse, gone, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
-        from sim_validate.baselines.baseline import plain, properties_of
         from sim_validate.baselines.compare import Status, failing
         from sim_validate.baselines.explain import explained, passing
         from sim_validate.baselines.part import ChangedPartError
@@ -190,7 +188,7 @@ class GraspItem(_SuiteItem):
         told = "" if fails else passing(done, suite.compared)
         _note(self, "status", finding.status.value, suite.compared.mesh, told=told)
         if finding.after is not None:
-            self.user_properties += properties_of(plain(finding.after)).items()
+            self.user_properties += finding.after.properties().items()
         if fails:
             raise UnstableError(f"{why}\n  to accept the change: pytest --grasp-bless {self.path}")
 
@@ -230,14 +228,13 @@ def assert_stable(
 
     def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls."""
-        from sim_validate.baselines.baseline import entry_of, plain
+        from sim_validate.baselines.baseline import Entry
         from sim_validate.baselines.demands import case_of, checked, demands_of
 
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
         name = chosen.grasp.id
-        entry = entry_of(chosen.grasp, verdict, chosen.body.radius)
-        for key, value in plain(entry).items():
+        for key, value in Entry.of(verdict).properties().items():
             record_property(f"{name}.{key}", value)
         _note(request.node, f"{name}.status", "unstable" if why else "stable", chosen.source)
         if why:
@@ -255,11 +252,12 @@ def assert_survives(
 
     def check(*case: Any, settings: Any = None, friction: float | None = None) -> "Execution":
         """Execute a grasp with its negative controls."""
-        from sim_validate.baselines.baseline import execution_entry
+        from grasp_core.files.records import record_of
+        from sim_validate.baselines.baseline import ExecutedFigures
         from sim_validate.baselines.demands import survival
 
         chosen, found, why = survival(case, friction, settings)
-        for key, value in asdict(execution_entry(found)).items():
+        for key, value in record_of(ExecutedFigures.of(found)).items():
             record_property(f"{found.id}.execution.{key}", value)
         _note(request.node, f"{found.id}.status", "lost" if why else "survived", chosen.source)
         if why or found.execution is None:

@@ -16,6 +16,8 @@ from grasp_core.settings import Settings
 
 PAGE = Path(__file__).parent.parent / "docs" / "api.md"
 PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
+UNTOLD = ("Key", "Shape", "UNRECORDED", "FLAT")
+"""Rules of types that the page leaves out."""
 INTRODUCTION = """\
 # Python reference
 
@@ -79,6 +81,18 @@ def flowed(text: str) -> str:
     return "\n\n".join(parts)
 
 
+class Shown(ast.NodeTransformer):
+    """Leaves out of types what only files need, and shapes, which are said in words."""
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)
+        if ast.unparse(node.value) != "Annotated" or not isinstance(node.slice, ast.Tuple):
+            return node
+        kind, *rules = node.slice.elts
+        told = [rule for rule in rules if ast.unparse(rule).partition("(")[0] not in UNTOLD]
+        return ast.Subscript(node.value, ast.Tuple([kind, *told])) if told else kind
+
+
 def members_of(kind: type) -> Iterator[str]:
     """Fields with what is said below each, then properties and methods; inherited settings too."""
     for parent in kind.__bases__:
@@ -98,7 +112,8 @@ def own_members_of(kind: type) -> Iterator[str]:
         if isinstance(part, ast.AnnAssign) and not ast.unparse(part.target).startswith("_"):
             default = f" = {ast.unparse(part.value)}" if part.value else ""
             default = "" if "(" in default else default
-            name = f"{ast.unparse(part.target)}: {ast.unparse(part.annotation)}{default}"
+            type_shown = ast.unparse(Shown().visit(part.annotation))
+            name = f"{ast.unparse(part.target)}: {type_shown}{default}"
         elif isinstance(part, ast.Assign) and isinstance(part.value, ast.Constant):
             name = f"{ast.unparse(part.targets[0])} = {part.value.value!r}"
         elif isinstance(part, ast.FunctionDef) and not part.name.startswith("_"):

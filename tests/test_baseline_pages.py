@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from grasp_core.files.records import keys
 from grasp_core.settings import for_users
-from sim_validate.baselines.baseline import Entry, ExecutionEntry
+from sim_validate.baselines.baseline import Entry, ExecutedFigures
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import Suite, suite_from_toml
-from sim_validate.engine.settings import Noise
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.settings.trials import Noise
 from tests.sim_validate.plugin.project import run_pytest, run_pytest_alone
 
 ROOT = Path(__file__).parent.parent
@@ -77,9 +78,7 @@ def test_all_settings_are_shown(tmp_path):
 
 
 def test_all_fields_and_all_answers_are_described():
-    for field in dataclasses.fields(Entry):
-        assert f"`{field.name}`" in PAGE
-    for field in dataclasses.fields(ExecutionEntry):
-        assert f"`{field.name}`" in PAGE
+    for key in (*keys(Entry), *keys(ExecutedFigures)):
+        assert f"`{key}`" in PAGE
     for status in Status:
         assert f"`{status.value}`" in PAGE

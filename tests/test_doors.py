@@ -18,7 +18,7 @@ ROOT = Path(__file__).parent.parent
 
 HEAVY = (
     "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
-    "mujoco", "pydantic", "resvg_py",
+    "mujoco", "resvg_py",
 )  # fmt: skip
 NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize")
 

@@ -13,7 +13,7 @@ import pytest
 
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.planning.regions_json import SCHEMA
+from sim_validate.planning.regions_json import Regions
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "regions.md").read_text()
@@ -106,8 +106,8 @@ def test_the_check_of_the_page_refuses_what_is_not_proved(page, small, change, s
 
 def test_the_files_hold_what_the_page_lists(folder):
     document = json.loads((folder / "regions.json").read_text())
-    assert document.pop("schema") == SCHEMA
-    assert f"(schema {SCHEMA})" in PAGE
+    assert document.pop("schema") == Regions.SCHEMA
+    assert f"(schema {Regions.SCHEMA})" in PAGE
     fields = re.search(r"`regions.json` \(schema \d\) has (.*?) and for each of", PAGE, re.DOTALL)[
         1
     ]
@@ -116,6 +116,6 @@ def test_the_files_hold_what_the_page_lists(folder):
     listed = set(re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", PAGE, re.MULTILINE))
     names = set(re.findall(r"`(\w+)`", " ".join(listed)))
     assert set(grasps[0]) <= names
-    assert set(grasps[0]["regions"][0]) == {"kind", "polygon_m", "inscribed_radius_m", "area_m2"}
+    assert set(grasps[0]["regions"][0]) == {"kind", "polygon_m", "inscribed_radius_m"}
     with np.load(next((folder / "proofs").iterdir()), allow_pickle=False) as proof:
         assert all(f"`{name}`" in PAGE for name in proof.files if name[:6] != "region")

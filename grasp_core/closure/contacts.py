@@ -147,16 +147,6 @@ def to_origin(twist: Array, center: Array, size: Array | float) -> Array:
     return np.concatenate([twist[..., :3] - cross(turning, center), turning], axis=-1)
 
 
-def keep_arrays(certificate: object, *names: str) -> None:
-    """Copy fields of a frozen value into read-only float arrays; None stays None."""
-    for name in names:
-        array = getattr(certificate, name)
-        if array is not None:
-            kept = real_array(array, name)
-            kept.setflags(write=False)
-            object.__setattr__(certificate, name, kept)
-
-
 def contacts_sha256(contacts: Iterable[Contact]) -> str:
     """Hash positions and normals in finger order with SHA-256; 0.0 and -0.0 count as equal."""
     # adding zero turns -0.0 into 0.0

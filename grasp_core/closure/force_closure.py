@@ -32,6 +32,8 @@ made explicit; the cone program is standard.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,19 +42,19 @@ from grasp_core.arrays import (
     SMALLEST_SIZE,
     UNIT_SLACK,
     Array,
-    are_frictions,
-    are_units,
+    Frictions,
+    Points,
+    Shape,
+    UnitVectors,
+    Wrench,
     cross,
-    is_array,
-    is_number,
     of_order_one,
 )
-from grasp_core.by_value import ByValue, trusted
+from grasp_core.checked import LARGEST
 from grasp_core.closure import proofs, soft_closure, soft_contacts
 from grasp_core.closure.contacts import (
     contact_arrays,
     contact_frictions,
-    keep_arrays,
     normal_and_tangential,
     to_center,
     to_origin,
@@ -60,7 +62,9 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
+from grasp_core.declared import Declared, trusted
 from grasp_core.errors import UndecidedError
+from grasp_core.kinds import Range
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6
@@ -76,41 +80,37 @@ FAR_BELOW = -1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ClosureCertificate(ByValue):
+class ClosureCertificate(Declared):
     """A verdict on force closure, with the forces or the wrench that prove it."""
 
     closed: bool
     """Whether the contacts are in force closure."""
-    margin: float
+    margin: Annotated[float, Range(most=math.inf)]
     """Proved bound of the optimum t of the margin program, dimensionless, unchanged by moving and
     scaling. If closed, the optimum is no less. If not, it is no more than a negative margin, while
     zero says only that there is no closure: contacts may balance deep inside their cones, and yet
     leave the object free. `force_closure` gives the optimum to some 1e-9 where contacts and
     friction are not nearly degenerate; a margin below -1e6 is reported as minus infinity."""
-    positions: Array
+    positions: Points
     """Contact points, (k, 3) [m]."""
-    normals: Array
+    normals: UnitVectors
     """Inward normals, (k, 3), of length 1 to nine digits; only their directions count."""
-    friction: Array
+    friction: Frictions
     """Coulomb coefficient of each contact, (k,)."""
-    forces: Array | None
+    forces: Points | None
     """If closed: balancing forces strictly inside the cones, (k, 3), with normal parts that sum to
     1, both to within 1e-9; torques are about the mean contact, at unit size. None otherwise."""
-    separating_wrench: Array | None
+    separating_wrench: Wrench | None
     """If not closed: y = (a, b), (6,), about the frame's origin, with y.w <= 0 for every wrench w
     that the contacts can apply, to within 1e-12 of lengths at unit size; an external wrench w with
     y.w < 0 is not resisted. None otherwise."""
-    torsion_m: Array | None = field(default=None, repr=False)
+    torsion_m: Annotated[Array, Shape("k", least=0.0, most=LARGEST)] | None = field(
+        default=None, repr=False
+    )
     """Torsional coefficient of each contact, (k,) [m]; None if no contact has torsion."""
-    torques: Array | None = field(default=None, repr=False)
+    torques: Annotated[Array, Shape("k")] | None = field(default=None, repr=False)
     """If closed, with torsion: torques about the inward normals that balance with the forces, (k,)
     [m], strictly inside the cones. None otherwise."""
-
-    def __post_init__(self) -> None:
-        keep_arrays(
-            self, "positions", "normals", "friction", "forces", "separating_wrench", "torsion_m",
-            "torques",
-        )  # fmt: skip
 
     def verify(self) -> bool:
         """Check every field again in plain arithmetic, without any solver.
@@ -119,24 +119,23 @@ class ClosureCertificate(ByValue):
             Whether the fields prove the verdict and the margin; False if they are no certificate.
         """
         with np.errstate(all="ignore"):
-            if not (self._are_contacts() and is_number(self.margin, least=-math.inf)):
+            if not self.is_sound():
                 return False
-            if self.closed is True:
+            if self.closed:
                 return self.separating_wrench is None and 0.0 < self.margin <= self.proved()
             no_forces = self.forces is None and self.torques is None
-            return self.closed is False and no_forces and 0.0 >= self.margin >= self.proved()
+            return no_forces and 0.0 >= self.margin >= self.proved()
 
     def separates(self) -> bool:
-        """Return whether the wrench separates, whatever the margin, in fields of sound shapes."""
+        """Return whether the wrench separates, whatever the margin, in sound fields."""
         return self.forces is None and self.proved() <= 0.0
 
-    def _are_contacts(self) -> bool:
-        count = len(self.normals) if is_array(self.normals, None, 3) else 0
-        placed = is_array(self.positions, count, 3) and are_units(self.normals, count, 3)
-        if count == 0 or not placed:
+    def _is_consistent(self) -> bool:
+        """Return whether there are contacts, none of them too near the others."""
+        if len(self.friction) == 0:
             return False
         spread = float(np.ptp(self.positions, axis=0).max())
-        rubbing = are_frictions(self.friction, count) and (
+        rubbing = (
             self.torques is None
             if self.torsion_m is None
             else are_torsions(self.torsion_m, self.friction)
@@ -159,12 +158,12 @@ class ClosureCertificate(ByValue):
         if self.torsion_m is not None:
             soft = SoftContacts.of(self.positions, normals, self.friction, self.torsion_m)
         if self.closed:
-            if not is_array(self.forces, *arms.shape):
+            if self.forces is None:
                 return -math.inf
             if soft is not None:
                 return self._proved_with_torques(soft, self.forces, caution)
             return float(_lower_bound(self.forces, arms, normals, self.friction, caution))
-        if not is_array(self.separating_wrench, 6):
+        if self.separating_wrench is None:
             return math.inf
         # the twist of (4), whose length means nothing
         twist = to_center(of_order_one(self.separating_wrench)[0], center, size)
@@ -175,7 +174,7 @@ class ClosureCertificate(ByValue):
 
     def _proved_with_torques(self, contacts: SoftContacts, forces: Array, caution: float) -> float:
         torques = self.torques
-        if not is_array(torques, len(self.friction)):
+        if torques is None:
             return -math.inf
         local = contacts.local(forces, torques)
         missed = max(contacts.missed(forces, torques), abs(float(local[:, 0].sum()) - 1.0))
@@ -225,13 +224,15 @@ def force_closure(
     if answer.closed is False:
         wrench = to_origin(answer.twist, center, size)
     if answer.closed is not None:
-        found = ClosureCertificate(
-            answer.closed, answer.margin, points, units, mu, forces, wrench, torsions, torques
-        )
+        made = partial(
+            trusted, ClosureCertificate, closed=answer.closed, positions=points, normals=units,
+            friction=mu, forces=forces, separating_wrench=wrench, torsion_m=torsions,
+            torques=torques,
+        )  # fmt: skip
         # a caution above one leaves room for `verify` to round otherwise on another processor
-        found = replace(found, margin=found.proved(CAUTION))
+        found = made(margin=made(margin=0.0).proved(CAUTION))
         if found.verify():
-            return found
+            return replace(found)
     if abs(answer.margin) < UNSAFE:
         raise UndecidedError(
             f"the closure margin is {answer.margin:.2g}, too close to zero to decide; change the "

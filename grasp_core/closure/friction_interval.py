@@ -26,21 +26,21 @@ but for the rounding of their coordinates.
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, are_units, cross, is_array, is_number
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import (
     FEWEST,
     WRENCH,
     grasp_map,
-    keep_arrays,
     normal_and_tangential,
     unit_size,
 )
+from grasp_core.declared import Declared
+from grasp_core.kinds import Range
 
 Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]
@@ -281,7 +281,7 @@ def _cross(a: list[Number], b: list[Number]) -> list[Number]:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FrictionInterval(ByValue):
+class FrictionInterval(Declared):
     """Friction up to `lower`, without force closure, and from `upper` on, with force closure.
 
     Open means not in force closure. Where wrenches are dependent except for rounding, the proof
@@ -289,23 +289,20 @@ class FrictionInterval(ByValue):
     that they are closed holds for the contacts as they are.
     """
 
-    lower: float
+    lower: Annotated[float, Range(least=0.0, most=math.inf)]
     """Coulomb coefficient; 0 where nothing is claimed, infinite where no friction is enough."""
-    upper: float
+    upper: Annotated[float, Range(least=0.0, most=math.inf)]
     """Coulomb coefficient, at most `LARGEST_FRICTION`, or infinite where nothing is claimed."""
-    positions: Array
+    positions: Points
     """Contact points, (k, 3) [m]."""
-    normals: Array
+    normals: UnitVectors
     """Inward unit normals, (k, 3)."""
-    forces: Array | None
+    forces: Points | None
     """Forces that balance strictly inside cones of friction `upper`, once their imbalance, which is
     rounding, is removed; (k, 3), in any unit of force. None where `upper` is infinite."""
-    twist: Array | None
+    twist: Wrench | None
     """Velocity of the object at the first contact, and angular velocity, (6,) [m/s, rad/s], along
     which no force inside cones of friction `lower` has positive power. None where `lower` is 0."""
-
-    def __post_init__(self) -> None:
-        keep_arrays(self, "positions", "normals", "forces", "twist")
 
     @property
     def critical_friction(self) -> float:
@@ -314,9 +311,8 @@ class FrictionInterval(ByValue):
 
     def verify(self) -> bool:
         """Check both ends again, in rational arithmetic and without any solver."""
-        # without a twist nothing is claimed from below, without forces nothing from above; and
-        # nothing is proved by an end that is not a number
-        if not (self._fits() and 0.0 <= self.lower <= self.upper):
+        # without a twist nothing is claimed from below, without forces nothing from above
+        if not (self.is_sound() and len(self.normals) >= FEWEST and self.lower <= self.upper):
             return False
         contacts = self.positions, self.normals
         if self.twist is None:
@@ -327,18 +323,6 @@ class FrictionInterval(ByValue):
             return below and self.upper == math.inf
         bounded = below and self.upper <= LARGEST_FRICTION
         return bounded and closes(self.forces, *contacts, self.upper)
-
-    def _fits(self) -> bool:
-        count = len(self.normals) if is_array(self.normals, None, 3) else 0
-        return (
-            count >= FEWEST
-            and are_units(self.normals, count, 3)
-            and is_array(self.positions, count, 3)
-            and (self.forces is None or is_array(self.forces, count, 3))
-            and (self.twist is None or is_array(self.twist, WRENCH))
-            and is_number(self.lower, most=math.inf)
-            and is_number(self.upper, most=math.inf)
-        )
 
 
 def at_the_first(twist: Array, positions: Array) -> Array:

@@ -38,12 +38,11 @@ manipulation", IJRR 15(6), 1996; MuJoCo's documentation, "Computation", on ellip
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each, is_array
+from grasp_core.arrays import Array, frozen, frozen_each
 from grasp_core.checked import LARGEST
 from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map, in_frames, unit_size
 from grasp_core.closure.proofs import CHECK_SLACK, RANK
@@ -76,12 +75,9 @@ def torsion_lengths(torsions: Array, friction: Array) -> Array:
     return torsions / np.where(friction > 0.0, friction, 1.0)
 
 
-def are_torsions(value: Any, friction: Array) -> bool:
-    """Return whether a value holds a torsional coefficient for each contact, some above zero."""
-    if not is_array(value, len(friction)):
-        return False
-    fits = bool(((value >= 0.0) & (value <= LARGEST) & ((friction > 0.0) | (value == 0.0))).all())
-    return fits and bool(value.any())
+def are_torsions(torsions: Array, friction: Array) -> bool:
+    """Return whether some torsional coefficients are above zero, and only where friction is."""
+    return bool(torsions.any() and ((friction > 0.0) | (torsions == 0.0)).all())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

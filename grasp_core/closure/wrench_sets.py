@@ -23,13 +23,12 @@ Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular co
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Self, TypeAlias, get_args
+from typing import Annotated, Literal, Self, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, are_frictions, frozen, is_a, is_array
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Frictions, Shape, frozen
 from grasp_core.checked import one_of, positive, shown
 from grasp_core.closure.contacts import (
     WRENCH,
@@ -41,6 +40,7 @@ from grasp_core.closure.contacts import (
     in_frames,
 )
 from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
+from grasp_core.declared import Declared, trusted
 from grasp_core.errors import InputError
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
@@ -85,17 +85,17 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WrenchSet(ByValue):
+class WrenchSet(Declared):
     """The set of wrenches that contacts can apply with bounded normal forces.
 
     Contact forces are local here: components (normal, tangent, tangent) of each contact in turn,
     or (normal, tangent, tangent, torque over a length) of soft ones.
     """
 
-    G: Array
+    G: Annotated[Array, Shape(WRENCH, None)]
     """Matrix from local contact forces to their wrench, with torques over the torque scale, (6,
     3k), or (6, 4k) with torsion."""
-    friction: Array
+    friction: Frictions
     """Coulomb coefficients, (k,)."""
     norm: Norm
     """How normal forces are bounded: their sum is one newton (`l1`), or each is at most one newton
@@ -128,21 +128,18 @@ class WrenchSet(ByValue):
     @classmethod
     def at(cls, arms: Array, normals: Array, friction: Array, norm: Norm = "l1") -> Self:
         """Make the set of contacts with levers and inward unit normals, unchecked."""
-        return cls(in_frames(grasp_map(arms), contact_frames(normals)), friction, norm)
+        G = in_frames(grasp_map(arms), contact_frames(normals))
+        return trusted(cls, G=G, friction=friction, norm=norm)
 
     def on_grid(self) -> "WrenchSet":
         """Round the set to a grid, so that searches do not depend on last digits."""
-        return replace(
-            self, G=on_grid(self.G, SEARCH_DIGITS), friction=on_grid(self.friction, SEARCH_DIGITS)
-        )
+        G, friction = on_grid(self.G, SEARCH_DIGITS), on_grid(self.friction, SEARCH_DIGITS)
+        return trusted(WrenchSet, G=G, friction=friction, norm=self.norm)
 
-    def sound(self) -> bool:
+    def _is_consistent(self) -> bool:
         """Return whether this is the wrench set of some contacts, up to `SAME_FRAME`."""
-        k = len(self.friction) if is_array(self.friction, None) else 0
-        known = is_a(self.norm, str) and self.norm in get_args(Norm)
-        if not (known and k and are_frictions(self.friction, k)):
-            return False
-        if not (is_array(self.G, WRENCH, 3 * k) or is_array(self.G, WRENCH, LOCAL * k)):
+        k = len(self.friction)
+        if not (k and self.G.shape[1] in (3 * k, LOCAL * k)):
             return False
         each = self.G.reshape(2, 3, k, -1).transpose(0, 2, 1, 3)
         frames, turns = each[..., :3]

@@ -70,29 +70,30 @@ certificate. Then they are sought among smaller ones, which are allowed as well.
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from grasp_core.arrays import (
     SHIFT,
+    Amount,
     Array,
+    Frictions,
     Indices,
-    are_frictions,
-    are_units,
+    Shape,
+    Triangles,
+    UnitVectors,
     cross,
-    frozen_copy,
-    is_a,
-    is_array,
-    is_indices,
-    is_number,
     of_order_one,
 )
-from grasp_core.by_value import ByValue, summary
-from grasp_core.checked import LARGEST, SMALLEST, number
+from grasp_core.checked import SMALLEST, number
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.declared import Declared, summary
 from grasp_core.execution.ball_in_hull import ball_in, nearest_facet, outward
+from grasp_core.execution.grips import Bounded
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.kinds import Quantity, Range
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import HELD, WrenchBody
 from grasp_core.solvers.ties import first_best
@@ -125,28 +126,28 @@ FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandPayload(ByValue):
+class HandPayload(Declared):
     """The largest mass that a hand holds in every orientation, proved from both sides.
 
     The hand stands still, its motors carry its links too, and forces are chosen anew for each
     orientation. Everything is along the object's axes and about its centre of mass.
     """
 
-    lower: float
+    lower: Amount
     """Mass that is held in every orientation [kg]; zero where none is shown to be, without corners
     of a hull then."""
-    upper: float
+    upper: Annotated[float, Range(most=math.inf)]
     """Mass above which some orientation is not held [kg]."""
-    gravities: Array
+    gravities: Annotated[Array, Shape("n", 3)]
     """Corners of a hull that contains the unit ball, (n, 3): gravity in units of its own size.
     Under each of them the lower mass and the links are held."""
-    forces: Array
+    forces: Annotated[Array, Shape("n", None, 3)]
     """Contact forces on the object that hold them there, (n, k, 3) [N]."""
-    triangles: Indices
+    triangles: Triangles
     """Triangles of that hull, by the indices of their corners, (t, 3)."""
-    facet: Array
+    facet: Annotated[Array, Shape(WRENCH)]
     """Twist y in (5), (6,)."""
-    motor_multipliers: Array
+    motor_multipliers: Annotated[Array, Shape(None)]
     """Multipliers u of the joints in (5), (joints,)."""
     hand: "CarryingHand"
     """The contacts, and the motors and links behind them."""
@@ -176,7 +177,7 @@ class HandPayload(ByValue):
             Whether both bounds are proved.
         """
         with np.errstate(all="ignore"):
-            if not (is_a(self.hand, CarryingHand) and self.hand.sound() and self._has_numbers()):
+            if not self.is_sound():
                 return False
             hand = replace(self.hand)  # without what it has kept
             most = hand.most(self.facet, self.motor_multipliers)
@@ -187,32 +188,27 @@ class HandPayload(ByValue):
             covered = ball_in(self.gravities, self.triangles) >= 1.0 - ROUNDING  # (3)
             return covered and hand.holds(self.lower, self.gravities, self.forces)
 
-    def _has_numbers(self) -> bool:
-        n = len(self.gravities) if is_array(self.gravities, None, 3) else 0
+    def _is_consistent(self) -> bool:
         return (
-            is_number(self.lower, least=0.0)
-            and is_number(self.upper, least=self.lower)
-            and is_array(self.gravities, n, 3)
-            and is_array(self.forces, n, len(self.hand.friction), 3)
-            and is_indices(self.triangles, None, 3)
-            and is_array(self.facet, WRENCH)
-            and is_array(self.motor_multipliers, len(self.hand.motors.limits))
+            self.lower <= self.upper < math.inf
+            and self.forces.shape[1] == len(self.hand.friction)
+            and len(self.motor_multipliers) == len(self.hand.motors.limits)
         )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CarryingHand(ByValue):
+class CarryingHand(Declared):
     """Contacts on an object, with the motors of the hand behind them and the links they carry.
 
     Everything is along the object's axes and about its centre of mass.
     """
 
-    arms: Array  # contact points from the centre of mass, (k, 3) [m]
-    normals: Array  # unit normals into the object, (k, 3)
-    friction: Array  # Coulomb coefficients, (k,)
-    max_push_n: float  # largest normal force of a fingertip [N]
+    arms: Bounded  # contact points from the centre of mass, (k, 3) [m]
+    normals: UnitVectors  # into the object, (k, 3)
+    friction: Frictions  # Coulomb coefficients, (k,)
+    max_push_n: Quantity  # largest normal force of a fingertip [N]
     motors: Motors  # the joints behind the contacts, without gravity
-    weights: Array
+    weights: Annotated[Array, Shape(None, 3)]
     """Torque W of each joint that carries the weight of the links, per unit vector of the direction
     of gravity, (joints, 3) [N m]."""
 
@@ -240,20 +236,14 @@ class CarryingHand(ByValue):
         """The wrenches that the contacts resist where links have no weight."""
         return WrenchBody(self.arms, self.normals, self.friction, self.push_n, self.motors)
 
-    def sound(self) -> bool:
+    def _is_consistent(self) -> bool:
         """Return whether the fields are those of contacts, and of motors that carry their links."""
-        k = len(self.friction) if is_array(self.friction, None) else 0
+        k = len(self.friction)
         return (
             k > 0
-            and are_frictions(self.friction, k)
-            and is_array(self.arms, k, 3)
-            and float(np.abs(self.arms).max()) <= LARGEST
-            and are_units(self.normals, k, 3)
-            and is_number(self.max_push_n, least=SMALLEST, most=LARGEST)
-            and is_a(self.motors, Motors)
-            and self.motors.sound(k)
+            and self.motors.are_for(k)
             and not self.motors.gravity.any()
-            and is_array(self.weights, len(self.motors.limits), 3)
+            and len(self.weights) == len(self.motors.limits)
             # then (5) has a root, and links without a mass are held in every orientation
             and bool((np.linalg.norm(self.weights, axis=1) < self.motors.limits).all())
         )
@@ -407,11 +397,9 @@ def _held(
     hand: CarryingHand, mass: float, weakest: Ray, ends: Array, forces: Array, triangles: Indices
 ) -> HandPayload:
     used, corners = np.unique(triangles, return_inverse=True)
-    numbered = corners.reshape(-1, 3).astype(np.int64)
-    numbered.setflags(write=False)
     return HandPayload(
-        mass, max(weakest.most, mass), frozen_copy(ends[used]), frozen_copy(forces[used]),
-        numbered, frozen_copy(weakest.facet), frozen_copy(weakest.multipliers), hand,
+        mass, max(weakest.most, mass), ends[used], forces[used], corners.reshape(-1, 3),
+        weakest.facet, weakest.multipliers, hand,
     )  # fmt: skip
 
 

@@ -37,9 +37,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, number, one_of
 from grasp_core.closure.contacts import WRENCH, cross_matrix, grasp_map
+from grasp_core.declared import ByValue, trusted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.quality.motors import Motors, motors_for
@@ -120,7 +120,10 @@ def stepped(held: Held, start: Grip, step: Array) -> Held:
     moved = held.moved + shift
     tips = moved + centers - (start.arms - radii * start.normals)
     forces = start.squeeze - np.einsum("kij,kj->ki", start.stiffness, tips)
-    turned = Grip(arms, normals, grip.friction, forces, grip.stiffness, grip.tip_radius_m)
+    turned = trusted(
+        Grip, arms=arms, normals=normals, friction=grip.friction, squeeze=forces,
+        stiffness=grip.stiffness, tip_radius_m=grip.tip_radius_m,
+    )  # fmt: skip
     return Held(turned, moved, R @ held.rotation, tips, held.load)
 
 

@@ -42,20 +42,20 @@ compliance of a robotic hand" (1989); Howard & Kumar, "On the stability of grasp
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import (
     Array,
-    are_frictions,
-    are_units,
+    Frictions,
+    Shape,
+    UnitVectors,
     frozen,
     frozen_each,
-    is_array,
     real_array,
 )
-from grasp_core.by_value import ByValue
 from grasp_core.checked import LARGEST, SMALLEST, instance
 from grasp_core.closure.contacts import (
     FEWEST,
@@ -68,11 +68,14 @@ from grasp_core.closure.contacts import (
     listed_contacts,
     stacked,
 )
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 
+Bounded = Annotated[Array, Shape("k", 3, least=-LARGEST, most=LARGEST)]
+"""A vector of plausible size for each of k contacts, (k, 3)."""
 SYMMETRIC = 1e-9
 """How far the matrix of a spring may be from symmetric, relative to its largest eigenvalue."""
 STIFFNESS_N_PER_M = 2000.0
@@ -109,44 +112,33 @@ def are_springs(K: Array) -> bool:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Grip(ByValue):
+class Grip(Declared):
     """Contacts on an object, held by fingertips on springs with a squeeze that is never replanned.
 
     Everything is along the world's axes and about the object's centre of mass.
     """
 
-    arms: Array
+    arms: Bounded
     """Contact points from the centre of mass, (k, 3) [m]."""
-    normals: Array
+    normals: UnitVectors
     """Unit normals into the object, (k, 3)."""
-    friction: Array
+    friction: Frictions
     """Coulomb coefficients, (k,)."""
-    squeeze: Array
+    squeeze: Bounded
     """Contact forces at rest, on the object, (k, 3) [N]; zero in sum, with their torques."""
-    stiffness: Array
+    stiffness: Annotated[Array, Shape("k", 3, 3)]
     """Stiffness of each fingertip's spring, (k, 3, 3) [N/m], symmetric and positive definite."""
-    tip_radius_m: Array
+    tip_radius_m: Annotated[Array, Shape("k", least=0.0, most=LARGEST)]
     """Radii of the spherical fingertips, (k,) [m]."""
 
     def squeezed(self, squeeze: Array) -> "Grip":
         """Return the same contacts and springs with another squeeze, (k, 3) [N]."""
         return replace(self, squeeze=squeeze)
 
-    def sound(self) -> bool:
+    def _is_consistent(self) -> bool:
         """Return whether the fields are those of contacts whose squeeze balances."""
-        k = len(self.friction) if is_array(self.friction, None) else 0
-        return (
-            k >= FEWEST
-            and are_frictions(self.friction, k)
-            and all(is_array(part, k, 3) for part in (self.arms, self.squeeze))
-            and max(float(np.abs(part).max()) for part in (self.arms, self.squeeze)) <= LARGEST
-            and are_units(self.normals, k, 3)
-            and is_array(self.stiffness, k, 3, 3)
-            and is_array(self.tip_radius_m, k)
-            and are_springs(self.stiffness)
-            and bool(((self.tip_radius_m >= 0.0) & (self.tip_radius_m <= LARGEST)).all())
-            and self.balanced
-        )
+        plain = replace(self)  # without what it has kept, which may be anything
+        return len(self.friction) >= FEWEST and are_springs(self.stiffness) and plain.balanced
 
     @property
     def imbalance(self) -> float:
@@ -289,7 +281,7 @@ def grip(
         InputError: Shapes or ranges are wrong, or the squeeze does not balance.
     """
     loose = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
-    built = loose.squeezed(frozen(squeeze, loose.arms.shape, "squeeze", most=LARGEST))
+    built = replace(loose, squeeze=squeeze)
     if not built.balanced:
         total = float(np.linalg.norm(built.squeeze, axis=1).sum())
         raise InputError(
@@ -315,19 +307,13 @@ def unsqueezed(
     else:
         points, units = contact_arrays(*stacked(listed_contacts(contacts, "contacts")))
     count = len(points)
-    arms = frozen(points - body.center_of_mass, (count, 3), "contacts", most=LARGEST)
+    arms, idle = points - body.center_of_mass, np.zeros((count, 3))
     radii = frozen_each(tip_radius_m, count, "tip_radius_m")
-    if (radii < 0.0).any() or (radii > LARGEST).any():
-        raise InputError(
-            f"tip_radius_m must be from 0 to {LARGEST:g} m, got "
-            f"{float(radii.min()):.6g} to {float(radii.max()):.6g}"
-        )
     mu = contact_frictions(friction, count)
-    idle = frozen(np.zeros((count, 3)), (count, 3), "squeeze")
     return Grip(arms, units, mu, idle, springs(stiffness, count), radii)
 
 
 def check_grip(value: Grip) -> None:
     """Refuse a value that is not a grip, or is one that was tampered with."""
-    if not instance(value, Grip, "grip", "gc.grip makes one").sound():
+    if not instance(value, Grip, "grip", "gc.grip makes one").is_sound():
         raise InputError("grip must be as gc.grip makes it; its fields are not those of contacts")

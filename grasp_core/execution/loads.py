@@ -8,14 +8,15 @@ beside it makes the radius m (g + a); an upright object that is shaken has the o
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, is_array
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Shape, frozen
 from grasp_core.checked import LARGEST, SMALLEST, number, positive
 from grasp_core.closure.contacts import WRENCH
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 
 GRAVITY_M_PER_S2 = 9.80665
@@ -23,17 +24,16 @@ GRAVITY_M_PER_S2 = 9.80665
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LoadSet(ByValue):
+class LoadSet(Declared):
     """Loads offset + E z with |z| <= 1, the torques about the centre of mass."""
 
-    offset: Array
+    offset: Annotated[Array, Shape(WRENCH, least=-LARGEST, most=LARGEST)]
     """Load in the middle, (6,) [N, N m]."""
-    axes: Array
+    axes: Annotated[Array, Shape(WRENCH, None, least=-LARGEST, most=LARGEST)]
     """Columns E of the ellipsoid, (6, m) [N, N m]."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "offset", frozen(self.offset, (WRENCH,), "offset", most=LARGEST))
-        axes = frozen(self.axes, (WRENCH, None), "axes", most=LARGEST)
+    def _check_together(self) -> None:
+        axes = self.axes
         if not 1 <= axes.shape[1] <= WRENCH:
             raise InputError(f"axes must have 1 to {WRENCH} columns, got {axes.shape[1]}")
         if float(np.abs(axes).max()) < SMALLEST:
@@ -41,17 +41,6 @@ class LoadSet(ByValue):
                 f"axes must not be zero: the largest entry is from {SMALLEST:g} to {LARGEST:g}, "
                 f"got {float(np.abs(axes).max()):.3g}"
             )
-        object.__setattr__(self, "axes", axes)
-
-    def sound(self) -> bool:
-        """Return whether the fields are those of a set of loads."""
-        columns = self.axes.shape[1] if is_array(self.axes, WRENCH, None) else 0
-        return (
-            1 <= columns <= WRENCH
-            and is_array(self.offset, WRENCH)
-            and SMALLEST <= float(np.abs(self.axes).max()) <= LARGEST
-            and float(np.abs(self.offset).max()) <= LARGEST
-        )
 
 
 def any_direction(

@@ -31,20 +31,22 @@ the weight of its links turns: `Motors.in_any_orientation` has limits that leave
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, is_a, is_indices, is_number, is_tuple_of
-from grasp_core.by_value import ByValue, summary
+from grasp_core.arrays import Amount, Array, Triangles
 from grasp_core.checked import positive
 from grasp_core.closure.contacts import WRENCH
+from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
 from grasp_core.execution.ball_in_hull import ball_in, least_distance, nearest_facet, outward
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
+from grasp_core.kinds import Range
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, limit_of
@@ -64,22 +66,22 @@ FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FreeMass(ByValue):
+class FreeMass(Declared):
     """Bounds of the mass that forces chosen anew for each orientation hold."""
 
-    lower: float
+    lower: Amount
     """Mass that is held in every orientation [kg]."""
-    upper: float
+    upper: Annotated[float, Range(most=np.inf)]
     """Mass above which some orientation is not held [kg]."""
     rays: tuple[WrenchLimit, ...]
     """Largest masses in some directions: weights of one kilogram, and multiples of them."""
-    triangles: Indices
+    triangles: Triangles
     """Triangles (2) of the hull of the rays' ends, by their indices, (t, 3); none where the lower
     bound is zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Payload(ByValue):
+class Payload(Declared):
     """The largest mass held in every orientation, with forces chosen beforehand and chosen anew."""
 
     fixed: BestSqueeze
@@ -109,17 +111,13 @@ class Payload(ByValue):
         """
         with np.errstate(all="ignore"):
             return (
-                is_a(self.fixed, BestSqueeze)
-                and is_a(self.free, FreeMass)
+                self.is_sound()
                 and self.fixed.verify()
                 and _is_weight(self.fixed)
                 and (self.fixed.motors is None or not self.fixed.motors.gravity.any())
-                and is_tuple_of(self.free.rays, WrenchLimit)
-                and is_number(self.free.lower, least=0.0)
-                and is_number(self.free.upper, least=self.free.lower)
+                and self.free.lower <= self.free.upper < np.inf
                 and self._are_rays()
                 and _outer(self.free.rays) <= self.free.upper * (1.0 + ROUNDING)
-                and is_indices(self.free.triangles, None, 3)
                 and (
                     self.free.lower == 0.0
                     or ball_in(_ends(self.free.rays), self.free.triangles) * (1.0 + ROUNDING)

@@ -6,16 +6,17 @@ this response survives, (4) of `squeeze_rows`. Torques of joints are sums and le
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, is_a, is_array, is_indices, is_number
-from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST
+from grasp_core.arrays import Amount, Array, Figure, Shape
 from grasp_core.closure.contacts import WRENCH
+from grasp_core.declared import Declared
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.squeeze_rows import Cuts, Survival
+from grasp_core.kinds import NotNegative
 from grasp_core.quality.motors import Motors
 
 ROUNDING = 1e-9
@@ -27,7 +28,7 @@ NONE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class BestSqueeze(ByValue):
+class BestSqueeze(Declared):
     """A squeeze, the loads that it survives without replanning, and a bound on what others survive.
 
     All of this is about the linear model of small motions. The upper bound is for squeezes under
@@ -40,28 +41,28 @@ class BestSqueeze(ByValue):
     """The contacts with the squeeze, `grip.squeeze` (k, 3) [N]."""
     loads: LoadSet
     """The loads that were asked about."""
-    max_push_n: float
+    max_push_n: NotNegative
     """Largest push of any finger, at rest and under all loads up to the scale [N]."""
-    scale: float
+    scale: Amount
     """Scale of the set's ellipsoid up to which no contact slips, no push exceeds the limit, and no
     joint its torque."""
-    upper: float
+    upper: Figure
     """Scale that no squeeze with the same response and largest push exceeds."""
     contact: int
     """Index of the contact that slips, or reaches the limit, first; -1 where a joint is first."""
-    direction: Array
+    direction: Annotated[Array, Shape(None)]
     """Place z in the ellipsoid, of unit length, of the load that makes it, or the joint, do so,
     (m,)."""
-    proofs: Array
+    proofs: Annotated[Array, Shape(None)]
     """S-lemma multiplier of each case, (cases,) [N^2]: contacts under the loads, then, where the
     loads have an offset, contacts at rest."""
     cuts: Cuts
     """Tangent directions whose rows bound the scale from above."""
-    multipliers: Array
+    multipliers: Annotated[Array, Shape(None)]
     """Multipliers of these rows, of the limits on pushes from above and from below in each case,
     and of both directions of the joints, under the loads and at rest, (r + 2 cases + joint rows,).
     """
-    balance: Array
+    balance: Annotated[Array, Shape(WRENCH)]
     """Multipliers of the balance, (6,)."""
     motors: Motors | None = None
     """Joints behind the contacts, with the torques of their motors; None for fingers that are as
@@ -95,14 +96,14 @@ class BestSqueeze(ByValue):
         hand.
         """
         with np.errstate(all="ignore"):
+            if not (self.is_sound() and self.scale <= self.upper):
+                return False
             # without what the grip has kept, which may be anything
-            return self._has_numbers() and replace(self, grip=replace(self.grip))._is_proved()
+            return replace(self, grip=replace(self.grip))._is_proved()
 
     def _is_proved(self) -> bool:
         grip, motors = self.grip, self.motors
-        if not (grip.sound() and grip.stable):
-            return False
-        if not (motors is None or (is_a(motors, Motors) and motors.sound(len(grip.friction)))):
+        if not (grip.stable and (motors is None or motors.are_for(len(grip.friction)))):
             return False
         survival = Survival.of(grip, self.loads, motors)
         return (
@@ -113,37 +114,21 @@ class BestSqueeze(ByValue):
             <= self.upper * (1.0 + ROUNDING) + no_scale(survival, self.max_push_n)
         )
 
-    def _has_numbers(self) -> bool:
-        return (
-            is_a(self.grip, Grip)
-            and is_a(self.loads, LoadSet)
-            and self.loads.sound()
-            and is_number(self.max_push_n, least=0.0, most=LARGEST)
-            and is_number(self.scale, least=0.0)
-            and is_number(self.upper, least=self.scale)
-        )
-
     def _fits(self, survival: Survival) -> bool:
-        cases = len(survival.friction)
-        angles = self.cuts.angles if is_a(self.cuts, Cuts) else None
-        r = len(angles) if is_array(angles, None) else 0
+        cases, r = len(survival.friction), len(self.cuts.cases)
         return (
             r > 0
-            and is_indices(self.cuts.cases, r)
-            and bool(((self.cuts.cases >= 0) & (self.cuts.cases < cases)).all())
-            and is_array(self.multipliers, r + 2 * cases + survival.joints.rows)
+            and bool((self.cuts.cases < cases).all())
+            and len(self.multipliers) == r + 2 * cases + survival.joints.rows
             and bool((self.multipliers >= 0.0).all())
-            and is_array(self.balance, WRENCH)
-            and is_array(self.proofs, cases)
+            and len(self.proofs) == cases
             and self._names_one(survival.contacts, len(survival.joints.limits))
-            and is_array(self.direction, self.loads.axes.shape[1])
+            and len(self.direction) == self.loads.axes.shape[1]
             and abs(float(np.linalg.norm(self.direction)) - 1.0) <= ROUNDING
         )
 
     def _names_one(self, contacts: int, joints: int) -> bool:
         """Return whether the fields name a contact or a joint, and not both."""
-        if any(not is_a(place, int) or is_a(place, bool) for place in (self.contact, self.joint)):
-            return False
         if self.joint == -1:
             return 0 <= self.contact < contacts
         return self.contact == -1 and 0 <= self.joint < joints

@@ -36,12 +36,13 @@ which bounds s where c.y > 0. The residual r is zero but for rounding.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, of_order_one
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Indices, Shape, of_order_one
 from grasp_core.closure.contacts import grasp_map, in_frames
+from grasp_core.declared import Declared
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet
 from grasp_core.execution.worst_loads import Reactions
@@ -123,12 +124,12 @@ class JointTorques:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Cuts(ByValue):
+class Cuts(Declared):
     """Angles and cases of some rows (1)."""
 
-    angles: Array
+    angles: Annotated[Array, Shape("r")]
     """Angles of the tangent directions in their contacts' frames, (r,) [rad]."""
-    cases: Indices  # index of each row's case, (r,)
+    cases: Annotated[Indices, Shape("r", whole=True)]  # index of each row's case, (r,)
 
     @classmethod
     def first(cls, count: int) -> "Cuts":

@@ -53,24 +53,24 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
-from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, are_frictions, is_a, is_tuple_of
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array
 from grasp_core.closure.contacts import cross_matrix, grasp_map, normal_and_tangential
 from grasp_core.closure.force_closure import ClosureCertificate, certificates, force_closure
 from grasp_core.closure.lines import classify_lines
 from grasp_core.cones.pyramids import pyramid_facets
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
 from grasp_core.geometry.polygons import clip
+from grasp_core.kinds import FrictionOrZero
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.nearest_point import least_distance
 from grasp_core.solvers.ties import first_best, graded
-from grasp_core.values import FINGERS
+from grasp_core.values import FINGERS, four
 
 SMALLER = 0.5
 """Size of randomly shrunk pieces, relative to the piece."""
@@ -123,9 +123,9 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
     return tuple(part)
 
 
-def _cover_everything(paths: Sequence[Any]) -> bool:
+def _cover_everything(paths: Sequence[Path]) -> bool:
     """Return whether paths name parts, none inside another, that together make up the whole."""
-    if not all(is_tuple_of(p, int) and len(p) <= DEEPEST and set(p) <= {0, 1} for p in paths):
+    if not all(len(path) <= DEEPEST and set(path) <= {0, 1} for path in paths):
         return False
     apart = not any(
         two[: len(one)] == one
@@ -296,11 +296,11 @@ def of_general_type(
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Absence(ByValue):
+class Absence(Declared):
     """A proof that no four contacts on four convex pieces are in force closure."""
 
-    pieces: tuple[FacePiece, ...]
-    friction: float
+    pieces: tuple[FacePiece, FacePiece, FacePiece, FacePiece]
+    friction: FrictionOrZero
     leaves: tuple[tuple[Path, ClosureCertificate], ...]
     """Parts that together cover the pieces, each with a twist that separates contacts at all its
     corners."""
@@ -313,20 +313,14 @@ class Absence(ByValue):
         """
         with np.errstate(all="ignore"):
             return (
-                are_frictions(np.array([self.friction]), 1)
-                and is_tuple_of(self.pieces, FacePiece, FINGERS)
-                and all(piece.sound() for piece in self.pieces)
-                and is_tuple_of(self.leaves, tuple)
-                and all(len(leaf) == len(("path", "proof")) for leaf in self.leaves)
+                self.is_sound()
                 and _cover_everything([path for path, _ in self.leaves])
                 and all(self._separated(path, proof) for path, proof in self.leaves)
             )
 
     def _separated(self, path: Path, proof: ClosureCertificate) -> bool:
-        if not is_a(proof, ClosureCertificate) or proof.closed is not False:
-            # a twist that separates at more friction separates at less
-            return False
-        if not proof.verify() or float(proof.friction.min()) < self.friction:
+        # a twist that separates at more friction separates at less
+        if proof.closed or not proof.verify() or float(proof.friction.min()) < self.friction:
             return False
         points, normals = corner_contacts(self.pieces, part_at(self.pieces, path))
         return (
@@ -383,7 +377,7 @@ def place_free(
             heappush(waiting, (-graded(margin), (*path, half)))
     if waiting:
         return Undecided(_share(waiting))
-    return Absence(tuple(pieces), friction, tuple(leaves))
+    return Absence(four(pieces), friction, tuple(leaves))
 
 
 def _share(waiting: Sequence[tuple[float, Path]]) -> float:

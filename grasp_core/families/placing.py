@@ -15,9 +15,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.by_value import trusted
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
+from grasp_core.declared import trusted
 from grasp_core.errors import SolverError
 from grasp_core.families.concurrent import BEFORE, BEHIND, MIXED_SIDES
 from grasp_core.families.constructions import DISC_CORNERS, MIXED, Construction, circle, regions_of

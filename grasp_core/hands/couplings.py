@@ -12,13 +12,15 @@ that follow it are in their ranges too. By virtual work the motor of a free join
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.by_value import ByValue
-from grasp_core.checked import number, text
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.files.records import Key
+from grasp_core.kinds import Range
 
 LARGEST_RATIO, SMALLEST_RATIO, LARGEST_OFFSET = 100.0, 0.01, 100.0
 """Sizes of ratios and offsets of couplings, which keep (1) exact to rounding."""
@@ -27,23 +29,21 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Coupling(ByValue):
+class Coupling(Declared):
     """A joint that follows another: its angle is `offset + ratio * angle of the driver`."""
 
     joint: str
     """Name of the joint that follows."""
     driver: str
     """Name of the joint that it follows, which follows none itself."""
-    ratio: float
+    ratio: Annotated[float, Range(least=-LARGEST_RATIO, most=LARGEST_RATIO)]
     """Change of the angle per change of the driver's angle."""
-    offset: float = 0.0
+    offset: Annotated[
+        float, Range(least=-LARGEST_OFFSET, most=LARGEST_OFFSET), Key("offset_rad")
+    ] = 0.0
     """Angle where the driver's is zero [rad]."""
 
-    def __post_init__(self) -> None:
-        text(self.joint, "joint")
-        text(self.driver, "driver")
-        number(self.ratio, "ratio", least=-LARGEST_RATIO, most=LARGEST_RATIO)
-        number(self.offset, "offset", least=-LARGEST_OFFSET, most=LARGEST_OFFSET)
+    def _check_together(self) -> None:
         if abs(self.ratio) < SMALLEST_RATIO:
             raise InputError(
                 f"ratio must be at least {SMALLEST_RATIO:g} or at most -{SMALLEST_RATIO:g}, got "

@@ -10,18 +10,18 @@ zero makes it a box, two half-sizes of zero a capsule, three a ball.
 """
 
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each, frozen_units
-from grasp_core.by_value import ByValue, counted, summary
-from grasp_core.checked import instance, number, several, text
+from grasp_core.arrays import Array, Shape, UnitVector, frozen_each
+from grasp_core.checked import text
+from grasp_core.declared import Declared, counted, summary
 from grasp_core.errors import InputError
+from grasp_core.files.records import Key
 from grasp_core.hands.couplings import Coupling, Drives, drives
-from grasp_core.settings import TorqueLimit, value_of
+from grasp_core.kinds import Many, Range, TorqueLimit
 
 LARGEST_SIZE = 2.0
 """Largest length of a hand [m]: a larger one is in other units."""
@@ -41,42 +41,48 @@ PALM = "palm"
 """Name of the palm among the links."""
 
 
-def _rotation(value: ArrayLike, name: str) -> Array:
-    turned = frozen(value, (3, 3), name)
-    off = float(np.abs(turned @ turned.T - np.eye(3)).max())
-    if off > RIGID_SLACK or np.linalg.det(turned) < 0.0:
-        raise InputError(
-            f"{name} must be a rotation matrix, right-handed with orthonormal rows, got rows off "
-            f"by {off:.3g}"
-        )
-    return turned
+class _Turn:
+    """The rule that a matrix is a rotation."""
+
+    def holds(self, turned: Array) -> bool:
+        """Return whether rows are orthonormal and right-handed."""
+        off = float(np.abs(turned @ turned.T - np.eye(3)).max())
+        return off <= RIGID_SLACK and bool(np.linalg.det(turned) > 0.0)
+
+    def __str__(self) -> str:
+        """Return what is asked for in words."""
+        return "that is a rotation matrix, right-handed with orthonormal rows"
+
+
+Rotation = Annotated[Array, Shape(3, 3), _Turn()]
+Place = Annotated[Array, Shape(3, least=-LARGEST_SIZE, most=LARGEST_SIZE)]
+"""A point of a hand, (3,) [m]."""
+Corners = Annotated[
+    Array, Shape(None, 3, least=-LARGEST_SIZE, most=LARGEST_SIZE), Many(2, MOST_CORNERS)
+]  # fmt: skip
+"""Two or more points of a hand, (m, 3) [m]: one corner would make a ball."""
+Length = Annotated[float, Range(least=0.0, most=LARGEST_SIZE)]
+Angle = Annotated[float, Range(least=-MOST_TURN, most=MOST_TURN)]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LinkShape(ByValue):
+class LinkShape(Declared):
     """All points within `radius` of a box: a box, a capsule or a ball of a link."""
 
-    position: Array
+    position: Annotated[Place, Key("position_m")]
     """Middle in the link's frame, (3,) [m]."""
-    rotation: Array
+    rotation: Rotation
     """Columns are the box's axes in the link's frame, (3, 3)."""
-    half_sizes: Array
+    half_sizes: Annotated[
+        Array, Shape(3, least=0.0, most=LARGEST_SIZE), Key("half_sizes_m")
+    ]  # fmt: skip
     """Half the box's lengths along its axes, (3,) [m], each zero or more."""
-    radius: float
+    radius: Annotated[Length, Key("radius_m")]
     """Distance from the box to the surface [m]."""
 
-    def __post_init__(self) -> None:
-        place = frozen(self.position, (3,), "position", most=LARGEST_SIZE)
-        sizes = frozen(self.half_sizes, (3,), "half_sizes", most=LARGEST_SIZE)
-        object.__setattr__(self, "position", place)
-        object.__setattr__(self, "rotation", _rotation(self.rotation, "rotation"))
-        object.__setattr__(self, "half_sizes", sizes)
-        number(self.radius, "radius", least=0.0, most=LARGEST_SIZE)
-        if sizes.min() < 0.0 or (sizes.max() == 0.0 and self.radius == 0.0):
-            raise InputError(
-                f"half_sizes must be zero or more, and some of them or the radius above zero, got "
-                f"{sizes.tolist()} and {self.radius:g}"
-            )
+    def _check_together(self) -> None:
+        if self.half_sizes.max() == 0.0 and self.radius == 0.0:
+            raise InputError("half_sizes or radius must be above zero, got 0 for all")
 
     def holds(self, points: Array, radius: float) -> bool:
         """Return whether balls about points (n, 3) of the link's frame are within the shape."""
@@ -86,88 +92,68 @@ class LinkShape(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Joint(ByValue):
+class Joint(Declared):
     """A revolute joint: where it is on the link before it, its axis, range and torque limit."""
 
     name: str
-    position: Array
+    position: Annotated[Place, Key("position_m")]
     """Origin of the moved link's frame, in the frame of the link before it, (3,) [m]."""
-    rotation: Array
+    rotation: Rotation
     """Axes of that frame at the angle zero, (3, 3)."""
-    axis: Array
+    axis: UnitVector
     """Unit vector of the axis through the origin, in the moved link's frame, (3,)."""
-    lowest: float
+    lowest: Annotated[Angle, Key("lowest_rad")]
     """Smallest angle [rad]."""
-    highest: float
+    highest: Annotated[Angle, Key("highest_rad")]
     """Largest angle [rad]."""
-    torque_limit_n_m: float | None = None
+    torque_limit_n_m: TorqueLimit | None = None
     """Largest torque of the motor in either direction [N m]; None where no source states one."""
 
-    def __post_init__(self) -> None:
-        text(self.name, "name")
-        place = frozen(self.position, (3,), "position", most=LARGEST_SIZE)
-        object.__setattr__(self, "position", place)
-        object.__setattr__(self, "rotation", _rotation(self.rotation, "rotation"))
-        object.__setattr__(self, "axis", frozen_units(self.axis, (3,), "axis"))
-        number(self.lowest, "lowest", least=-MOST_TURN, most=MOST_TURN)
-        number(self.highest, "highest", least=self.lowest, most=MOST_TURN)
-        if self.torque_limit_n_m is not None:
-            value_of(TorqueLimit, self.torque_limit_n_m, "torque_limit_n_m")
+    def _check_together(self) -> None:
+        if self.highest < self.lowest:
+            raise InputError(
+                f"highest must be no less than lowest, {self.lowest:g}, got {self.highest:g}"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Link(ByValue):
+class Link(Declared):
     """A part of a finger behind one joint."""
 
     name: str
     joint: Joint
     shapes: tuple[LinkShape, ...]
-    mass_kg: float | None = None
+    mass_kg: Annotated[float, Range(least=0.0, most=1e3)] | None = None
     """Mass [kg]; None where no source states one."""
-    center_of_mass: Array | None = None
+    center_of_mass: Annotated[Place, Key("center_of_mass_m")] | None = None
     """Centre of mass in the link's frame, (3,) [m]; None where no source states one."""
-
-    def __post_init__(self) -> None:
-        text(self.name, "name")
-        instance(self.joint, Joint, "joint")
-        each = partial(instance, kind=LinkShape, name="shapes")
-        object.__setattr__(self, "shapes", several(self.shapes, each, "shapes", "LinkShape values"))
-        if self.mass_kg is not None:
-            number(self.mass_kg, "mass_kg", least=0.0, most=1e3)
-        if self.center_of_mass is not None:
-            place = frozen(self.center_of_mass, (3,), "center_of_mass", most=LARGEST_SIZE)
-            object.__setattr__(self, "center_of_mass", place)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Fingertip(ByValue):
+class Fingertip(Declared):
     """The end of a finger that touches the object: a ball, or a block.
 
     A block is all points within `rounding` of the hull of its `corners`. A ball stands for it where
     a tip has to be one: in planning, and in simulations, where it lies at the block's contact.
     """
 
-    center: Array
+    center: Annotated[Place, Key("center_m")]
     """Middle of the ball in the last link's frame, (3,) [m]."""
-    radius: float
+    radius: Annotated[float, Range(above=0.0, most=LARGEST_SIZE), Key("radius_m")]
     """Radius of the ball [m]."""
-    corners: Array | None = None
+    corners: Annotated[Corners, Key("corners_m")] | None = None
     """Corners of the block in the last link's frame, (m, 3) [m]; None for a ball."""
-    rounding: float = 0.0
+    rounding: Annotated[Length, Key("rounding_m")] = 0.0
     """Distance from their hull to the surface of the block [m]; zero for a ball."""
 
-    def __post_init__(self) -> None:
-        middle = frozen(self.center, (3,), "center", most=LARGEST_SIZE)
-        object.__setattr__(self, "center", middle)
-        number(self.radius, "radius", above=0.0, most=LARGEST_SIZE)
-        if self.corners is None:
-            number(self.rounding, "rounding", least=0.0, most=0.0)
-            return
-        corners = frozen(self.corners, (None, 3), "corners", most=LARGEST_SIZE)
-        object.__setattr__(self, "corners", corners)
-        number(self.rounding, "rounding", least=LEAST_ROUNDING, most=LARGEST_SIZE)
-        if not 2 <= len(corners) <= MOST_CORNERS:  # noqa: PLR2004 - one corner makes a ball
-            raise InputError(f"corners must be 2 to {MOST_CORNERS}, got {len(corners)}")
+    def _check_together(self) -> None:
+        if self.corners is None and self.rounding > 0.0:
+            raise InputError(f"rounding must be 0 for a ball, got {self.rounding:g}")
+        if self.corners is not None and self.rounding < LEAST_ROUNDING:
+            raise InputError(
+                f"rounding must be from {LEAST_ROUNDING:g} to {LARGEST_SIZE:g} m for a block, got "
+                f"{self.rounding:g}"
+            )
 
     @property
     def core(self) -> tuple[Array, float]:
@@ -178,7 +164,7 @@ class Fingertip(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandFinger(ByValue):
+class HandFinger(Declared):
     """A chain of links from the palm, with a fingertip on the last of them.
 
     The last shape of the last link covers a fingertip that is a block: it stands for the tip
@@ -189,12 +175,8 @@ class HandFinger(ByValue):
     links: tuple[Link, ...]
     tip: Fingertip
 
-    def __post_init__(self) -> None:
-        text(self.name, "name")
-        each = partial(instance, kind=Link, name="links")
-        links = several(self.links, each, "links", "Link values")
-        object.__setattr__(self, "links", links)
-        instance(self.tip, Fingertip, "tip")
+    def _check_together(self) -> None:
+        links = self.links
         if not links:
             raise InputError(f"links of finger {self.name} must be at least one, got none")
         if self.tip.corners is not None and not (
@@ -207,7 +189,7 @@ class HandFinger(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Hand(ByValue):
+class Hand(Declared):
     """A palm with three to five fingers, and where its numbers come from."""
 
     name: str
@@ -224,16 +206,7 @@ class Hand(ByValue):
     notes: tuple[str, ...] = ()
     """How the hand differs from the file that it was read from, a sentence each."""
 
-    def __post_init__(self) -> None:
-        text(self.name, "name")
-        text(self.torque_source, "torque_source")
-        for name, kind in (
-            ("palm", LinkShape), ("fingers", HandFinger), ("sources", str),
-            ("couplings", Coupling), ("notes", str), ("ignored_pairs", tuple),
-        ):  # fmt: skip
-            each: Any = partial(instance, kind=kind, name=name)
-            kept = several(getattr(self, name), each, name, f"{kind.__name__} values")
-            object.__setattr__(self, name, kept)
+    def _check_together(self) -> None:
         if not FEWEST_FINGERS <= len(self.fingers) <= MOST_FINGERS:
             raise InputError(
                 f"fingers must be {FEWEST_FINGERS} to {MOST_FINGERS}, got {len(self.fingers)}"
@@ -248,7 +221,7 @@ class Hand(ByValue):
         if len(set(names)) < len(names):
             raise InputError("names of links must differ from each other and from 'palm'")
         for pair in self.ignored_pairs:
-            if len(pair) != 2 or not set(pair) <= set(names):  # noqa: PLR2004 - a pair
+            if not set(pair) <= set(names):
                 raise InputError(f"ignored_pairs must be pairs of names of links, got {pair}")
         _ = self.drives  # refuses couplings that cannot be
 

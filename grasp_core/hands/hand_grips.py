@@ -34,17 +34,19 @@ A finger needs joints that let its fingertip move in all directions, or L' S L h
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import UNIT_SLACK, Array, cross, is_array, is_number
-from grasp_core.checked import LARGEST, SMALLEST
+from grasp_core.arrays import UNIT_SLACK, Array, Shape, cross
+from grasp_core.checked import LARGEST
 from grasp_core.closure.contacts import WRENCH, cross_matrix
 from grasp_core.execution.grips import Grip
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.reach import Stance
+from grasp_core.kinds import Quantity
 
 STIFFEST = 1e12
 """Condition of a finger's stiffness from which on it gives way in some direction only."""
@@ -54,24 +56,20 @@ STIFFEST = 1e12
 class HandGrip(Grip):
     """Contacts held by fingers whose joints have servos, with commands that stay as they are."""
 
-    joint_axes: Array  # w_a from the palm outwards, (k, m, 3); zero for none
-    joint_arms: Array  # arms x - p_a from them to the contact, (k, m, 3) [m]
-    servo_n_m_per_rad: float  # stiffness k_q of every servo
+    joint_axes: Annotated[Array, Shape("k", "m", 3)]
+    """Unit axes w_a from the palm outwards, (k, m, 3); zero for none."""
+    joint_arms: Annotated[Array, Shape("k", "m", 3, least=-LARGEST, most=LARGEST)]
+    """Arms x - p_a from them to the contact, (k, m, 3) [m]."""
+    servo_n_m_per_rad: Quantity
+    """Stiffness k_q of every servo."""
 
-    def sound(self) -> bool:
+    def _is_consistent(self) -> bool:
         """Return whether the fields are those of contacts and of fingers that can move them."""
-        k = len(self.friction) if super().sound() else 0
-        joints = self.joint_axes.shape[1] if is_array(self.joint_axes, k, None, 3) else 0
-        if not (
-            joints > 0
-            and is_array(self.joint_arms, k, joints, 3)
-            and float(np.abs(self.joint_arms).max()) <= LARGEST
-            and is_number(self.servo_n_m_per_rad, least=SMALLEST, most=LARGEST)
-        ):
+        if not (super()._is_consistent() and self.joint_axes.shape[1]):
             return False
         lengths = np.linalg.norm(self.joint_axes, axis=2)
         units = (lengths == 0.0) | (np.abs(lengths - 1.0) <= UNIT_SLACK)
-        return bool(units.all()) and all(map(self._gives, range(k)))
+        return bool(units.all()) and all(map(self._gives, range(len(self.friction))))
 
     def _gives(self, k: int) -> bool:
         """Return whether the joints of a finger let its fingertip move in all directions."""

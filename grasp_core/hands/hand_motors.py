@@ -19,8 +19,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, cross, frozen, frozen_copy
-from grasp_core.checked import LARGEST, positive, switch
+from grasp_core.arrays import Array, cross
+from grasp_core.checked import switch
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
@@ -140,14 +140,13 @@ def hand_payload(
         SolverError: A program's answer failed its check.
     """
     check_body(body)
-    most = positive(max_push_n, "max_push_n")
     stance = stance_of(hand, reach)
     found, levers, limits = _joints(hand, stance)
-    weights = frozen_copy(GRAVITY_M_PER_S2 * _weights(hand, found))
+    weights = GRAVITY_M_PER_S2 * _weights(hand, found)
     Motors.in_any_orientation(levers, limits, weights)  # refuses motors that are too weak
     motors, count = Motors.of(levers, limits), len(stance.contacts)
     points = np.array([contact.position for contact in stance.contacts])
-    arms = frozen(points - body.center_of_mass, (count, 3), "contacts", most=LARGEST)
-    normals = frozen_copy(np.array([contact.normal for contact in stance.contacts]))
+    normals = np.array([contact.normal for contact in stance.contacts])
     mu = contact_frictions(friction, count)
-    return carried_mass(CarryingHand(arms, normals, mu, most, motors, weights), gap)
+    arms = points - body.center_of_mass
+    return carried_mass(CarryingHand(arms, normals, mu, max_push_n, motors, weights), gap)

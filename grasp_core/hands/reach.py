@@ -13,32 +13,33 @@ The stance of a pose is what mechanics and scenes need of it, with balls for all
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias, get_args
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
-from grasp_core.by_value import ByValue, summary
+from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen
 from grasp_core.checked import (
     coefficient,
     instance,
-    one_of,
     seed_of,
+    shown,
     switch,
-    text,
-    whole,
 )
 from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
+from grasp_core.figures import Shown
+from grasp_core.files.records import Key, recorded
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.opening import opened
 from grasp_core.hands.pose_search import Asked, contact_choices, find_pose
+from grasp_core.kinds import HandClearance, Number, Starts
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.settings import HandClearance, Starts, value_of
+from grasp_core.settings import value_of
 from grasp_core.values import FINGERS, Contact, Grasp
 
 ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]
@@ -51,41 +52,39 @@ OBEYED = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandReach(ByValue):
+class HandReach(Declared):
     """A pose in which a hand stands in a grasp, or why none was found."""
 
     hand: str
     """Name of the hand."""
-    grasp: str
+    grasp: Annotated[str, Key("id"), Shown("grasp")]
     """Id of the grasp."""
     reason: ReachReason
     """Why no pose was found; empty where one was."""
     explanation: str
     """Reason why no pose was found, as a sentence; empty where one was found."""
-    starts: int
+    starts: Annotated[Number, Shown("starts")]
     """Number of starts that were tried."""
-    clearance_m: float
+    clearance_m: HandClearance
     """Least distance that was asked for between all that must not touch [m]."""
-    fingers: Indices | None = None
+    fingers: Annotated[Indices, Shape("k", whole=True)] | None = None
     """The hand's finger at each contact that is used, (k,)."""
-    joints: Array | None = None
+    joints: Annotated[Array, Shape("j"), Key("joints_rad")] | None = None
     """Joint angles in the order of `Hand.joints`, (j,) [rad]."""
-    palm_pose: Array | None = None
+    palm_pose: Annotated[Array, Shape(POSE, POSE)] | None = None
     """Pose of the palm in the object's frame, (4, 4)."""
-    contacts: tuple[Contact, ...] | None = None
-    """Contacts that are reached, k of them, in the grasp's finger order."""
     certificate: ClosureCertificate | None = None
-    """Proof of force closure with these contacts."""
+    """Proof that the k contacts that are reached are in force closure."""
     within_regions: tuple[bool, ...] | None = None
     """Whether each is in the grasp's region for it, or at the planned contact; regions are proved
     for four contacts together, so that they promise nothing to three."""
-    pregrasp: Array | None = None
+    pregrasp: Annotated[Array, Shape("j"), Key("pregrasp_joints_rad")] | None = None
     """Joint angles at which the fingers are open and the hand is free, (j,) [rad]; None if none
     were found."""
-    approach: Array | None = None
+    approach: UnitVector | None = None
     """Unit vector along which the palm moves in with open fingers, over 60 mm, in the object's
     frame, (3,); None if no straight way was found."""
-    used: Indices | None = None
+    used: Annotated[Indices, Shape("k", whole=True)] | None = None
     """Indices of the grasp's contacts at which fingers stand, (k,), rising: all four, or three for
     a hand with three fingers. All are taken to be used where `fingers` are given and this is
     not."""
@@ -94,27 +93,54 @@ class HandReach(ByValue):
     `no closure`."""
 
     def __post_init__(self) -> None:
-        for name in ("hand", "grasp", "explanation"):
-            text(getattr(self, name), name)
-        one_of(self.reason, get_args(ReachReason), "reason")
-        whole(self.starts, "starts")
-        value_of(HandClearance, self.clearance_m, "clearance_m")
-        if self.fingers is not None:
-            used = range(FINGERS) if self.used is None else self.used
-            kept = frozen_indices(used, (None,), "used")
-            fingers = frozen_indices(self.fingers, (len(kept),), "fingers")
-            object.__setattr__(self, "used", kept)
-            object.__setattr__(self, "fingers", fingers)
-        shapes = {"joints": (None,), "palm_pose": (POSE, POSE), "pregrasp": (None,),
-                  "approach": (3,)}  # fmt: skip
-        for name, shape in shapes.items():
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
+        if self.fingers is not None and self.used is None:
+            object.__setattr__(self, "used", range(FINGERS))
+        Declared.__post_init__(self)
 
-    @property
-    def reached(self) -> bool:
-        """Return whether a pose was found."""
+    def _check_together(self) -> None:
+        found = (self.fingers, self.joints, self.palm_pose, self.certificate)
+        if [each is None for each in found] != [self.reason != ""] * len(found):
+            raise InputError(
+                f"fingers, joints, palm_pose and certificate must be there exactly where the "
+                f"reason is empty, which is {shown(self.reason)} for grasp {self.grasp}"
+            )
+        counts = {len(each) for each in (self.used, self.contacts, self.within_regions)
+                  if each is not None}  # fmt: skip
+        if len(counts) > 1:
+            raise InputError(
+                f"used, contacts and within_regions must be equally many for grasp {self.grasp}"
+            )
+
+    @recorded
+    def reached(self) -> Annotated[bool, Shown("reached")]:
+        """Whether a pose was found."""
         return self.joints is not None
+
+    @recorded
+    def contacts(self) -> tuple[Contact, ...] | None:
+        """Contacts that are reached, k of them, in the grasp's finger order."""
+        proof = self.certificate
+        return None if proof is None else tuple(map(Contact, proof.positions, proof.normals))
+
+    @recorded
+    def closure_margin(self) -> Annotated[float | None, Shown("margin")]:
+        """Margin of force closure with the contacts that are reached, proved."""
+        return None if self.certificate is None else self.certificate.margin
+
+    @recorded
+    def contacts_within_regions(self) -> Annotated[int | None, Shown("within regions")]:
+        """How many of the contacts are in the grasp's regions for them, or as planned."""
+        return None if self.within_regions is None else sum(self.within_regions)
+
+    @recorded
+    def opens(self) -> Annotated[bool | None, Shown("opens")]:
+        """Whether the fingers can open by 3 to 15 mm, with the palm where it is."""
+        return self.pregrasp is not None if self.reached else None
+
+    @recorded
+    def comes_straight(self) -> Annotated[bool | None, Shown("straight way in")]:
+        """Whether the open hand comes in straight over 60 mm, with nothing in the way."""
+        return self.approach is not None if self.reached else None
 
     def __repr__(self) -> str:
         told = "reached" if self.reached else self.reason
@@ -173,11 +199,9 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
         reason, said = _why(found)
         return HandReach(hand.name, grasp.id, reason, said, found.total(), clearance_m)
     joints, way = opened(asked, found)
-    proof = found.certificate
-    contacts = tuple(map(Contact, proof.positions, proof.normals))
     return HandReach(
         hand.name, grasp.id, "", "", found.starts, clearance_m, found.fingers, found.joints,
-        found.palm_pose, contacts, proof, found.within, joints, way, found.used,
+        found.palm_pose, found.certificate, found.within, joints, way, found.used,
     )  # fmt: skip
 
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
-from grasp_core.settings import Count, Quantity, Range, Settings
+from grasp_core.kinds import Count, Quantity, Range
+from grasp_core.settings import Settings
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
 Unit: TypeAlias = Literal["m", "cm", "mm", "in"]

@@ -6,12 +6,12 @@ All linear programs work on these pieces, so their tolerances mean the same for 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, are_units, is_array, is_number
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Amount, Array, Point, Shape, UnitVector
+from grasp_core.declared import Declared
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,
@@ -39,41 +39,32 @@ LARGEST_INSET = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FacePiece(ByValue):
+class FacePiece(Declared):
     """One convex piece of a face: the points origin + frame @ y for all y with E y <= b."""
 
     face: int  # index in the polyhedron of the face that the piece belongs to
-    normal: Array  # unit vector into the object, (3,)
-    origin: Array  # the point of the plane whose plane coordinates are zero, (3,)
-    frame: Array
+    normal: UnitVector  # unit vector into the object, (3,)
+    origin: Point  # the point of the plane whose plane coordinates are zero, (3,)
+    frame: Annotated[Array, Shape(3, 2)]
     """Orthonormal columns spanning the plane, the first along an edge, (3, 2).
 
     The frame is tied to the object: the pyramids inscribed in force cones turn with it.
     """
-    corners: Array
+    corners: Annotated[Array, Shape(None, 2)]
     """Corners in plane coordinates, (k, 2), counter-clockwise in `frame`. For a mirrored piece the
     frame is mirrored too."""
-    E: Array  # unit outward edge normals, (k, 2)
-    b: Array
+    E: Annotated[Array, Shape("k", 2, units=True)]  # outward edge normals, (k, 2)
+    b: Annotated[Array, Shape("k")]
     """Distances of the edges from the origin of the plane coordinates: E y <= b inside, (k,)."""
-    inradius: float  # radius of the largest disc in the piece
+    inradius: Amount  # radius of the largest disc in the piece
     spread: float = 0.0  # largest angle between the true surface and the plane [rad]
     depth: float = 0.0  # largest distance of the true surface from the plane
 
-    def sound(self) -> bool:
+    def _is_consistent(self) -> bool:
         """Return whether the fields describe one polygon; spread and depth are not checked."""
+        count, rows = len(self.corners), len(self.E)
         with np.errstate(all="ignore"):
-            count = len(self.corners) if is_array(self.corners, None, 2) else 0
-            rows = len(self.E) if are_units(self.E, None, 2) else 0
-            if not (
-                are_units(self.normal, 3)
-                and is_array(self.origin, 3)
-                and is_array(self.frame, 3, 2)
-                and min(count, rows) >= FEWEST_CORNERS
-                and max(count, rows) <= MOST_CORNERS
-                and is_array(self.b, rows)
-                and is_number(self.inradius, least=0.0)
-            ):
+            if not FEWEST_CORNERS <= min(count, rows) <= max(count, rows) <= MOST_CORNERS:
                 return False
             axes = np.column_stack([self.frame, self.normal])
             return bool(np.abs(axes.T @ axes - np.eye(3)).max() <= SOUND) and self._is_polygon()

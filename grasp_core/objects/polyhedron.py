@@ -9,27 +9,25 @@ above it. The whole triangle is then within 3 d of the hull's border.
 import hashlib
 import importlib
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices, rounded
-from grasp_core.by_value import ByValue, counted, summary
+from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
 from grasp_core.checked import (
     LARGEST,
     instance,
-    number,
     one_of,
     path_of,
     positive,
-    several,
     shown,
     text,
 )
+from grasp_core.declared import Declared, counted, summary
 from grasp_core.errors import InputError, about
+from grasp_core.kinds import Range
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.notebooks import InNotebooks
@@ -38,24 +36,23 @@ from grasp_core.objects.surface import Face, Surface
 from grasp_core.settings import extended
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
-SHAPES = {"vertices": (None, 3), "center_of_mass": (3,), "inertia": (3, 3)}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Polyhedron(ByValue, InNotebooks):
+class Polyhedron(Declared, InNotebooks):
     """A solid bounded by planar faces, with the mass properties of uniform density 1 kg/m^3."""
 
     name: str
-    vertices: Array
+    vertices: Polygon
     """Welded vertices, (n, 3) [m]."""
-    triangles: Indices
+    triangles: Triangles
     """Vertex indices, (t, 3), counter-clockwise seen from outside."""
     faces: tuple[Face, ...]
-    volume: float
+    volume: Annotated[float, Range(above=0.0, most=LARGEST)]
     """Volume [m^3]."""
-    center_of_mass: Array
+    center_of_mass: Point
     """Centre of mass, (3,) [m]."""
-    inertia: Array
+    inertia: Annotated[Array, Shape(3, 3)]
     """Inertia about the centre of mass at density 1 kg/m^3, (3, 3) [kg m^2]."""
     content_sha256: str
     """Hash of the sorted mesh: the same for any file name, vertex order or triangle order."""
@@ -73,25 +70,16 @@ class Polyhedron(ByValue, InNotebooks):
     lengths and asked for very often."""
 
     def __post_init__(self) -> None:
-        triangles = frozen_indices(self.triangles, (None, 3), "triangles")
-        object.__setattr__(self, "triangles", triangles)
-        for name, shape in SHAPES.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
-        for name in ("name", "content_sha256", "source_sha256"):
-            text(getattr(self, name), name)
-        number(self.volume, "volume", above=0.0, most=LARGEST)
-        if triangles.max(initial=0) >= max(len(self.vertices), 1):
-            raise InputError(
-                f"triangles must hold vertex numbers from 0 to {len(self.vertices) - 1}"
-            )
+        Declared.__post_init__(self)
         away = self.vertices - self.center_of_mass
         reach = np.linalg.norm(away, axis=1).max(initial=0.0)
         object.__setattr__(self, "radius", float(reach))
-        several(self.faces, partial(instance, kind=Face, name="faces"), "faces", "Face values")
-        several(self.notes, partial(text, name="notes"), "notes", "texts")
-        if self.patches is not None:
-            instance(self.patches, PatchLimits, "patches")
-        instance(self.surface, Surface, "surface")
+
+    def _check_together(self) -> None:
+        if self.triangles.max(initial=0) >= max(len(self.vertices), 1):
+            raise InputError(
+                f"triangles must hold vertex numbers from 0 to {len(self.vertices) - 1}"
+            )
 
     @classmethod
     def from_mesh(

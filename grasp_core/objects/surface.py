@@ -6,52 +6,42 @@ no field, because such meshes are refused.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices, frozen_units
-from grasp_core.by_value import ByValue, counted, summary
-from grasp_core.checked import LARGEST, number, several, switch, text, whole
+from grasp_core.arrays import Indices, Point, Polygon, Shape, UnitVector
+from grasp_core.checked import LARGEST
+from grasp_core.declared import Declared, counted, summary
+from grasp_core.kinds import NotNegative, Number, Range
 from grasp_core.values import RIGHT_ANGLE
+
+Places = Annotated[Indices, Shape(None, whole=True)]
+"""Places of things in a list, (n,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Face(ByValue):
+class Face(Declared):
     """A planar face: one outer border, perhaps holes, and a split into convex pieces."""
 
-    normal: Array
+    normal: UnitVector
     """Unit vector into the object, (3,)."""
-    centroid: Array
+    centroid: Point
     """Centre of area, on the plane, (3,) [m]."""
-    area: float
+    area: Annotated[float, Range(above=0.0, most=LARGEST)]
     """Area of the face without its holes [m^2]."""
-    polygon: Array
+    polygon: Polygon
     """Outer border, (k, 3) [m], counter-clockwise when `normal` points at the viewer."""
-    holes: tuple[Array, ...]
+    holes: tuple[Polygon, ...]
     """Borders of the holes, each (k, 3) [m], clockwise in the same view."""
-    pieces: tuple[Array, ...]
+    pieces: tuple[Polygon, ...]
     """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
-    spread: float = 0.0
+    spread: Annotated[float, Range(least=0.0, below=RIGHT_ANGLE)] = 0.0
     """Largest angle between the surface and the plane of a curved patch [rad]."""
-    depth: float = 0.0
+    depth: NotNegative = 0.0
     """Largest distance of the surface from the plane of a curved patch [m]."""
-    facets: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    facets: Places = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     """Indices of the triangles over a curved patch, (f,); empty for an exact face."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "facets", frozen_indices(self.facets, (None,), "facets"))
-        object.__setattr__(self, "normal", frozen_units(self.normal, (3,), "normal"))
-        object.__setattr__(self, "centroid", frozen(self.centroid, (3,), "centroid"))
-        object.__setattr__(self, "polygon", frozen(self.polygon, (None, 3), "polygon"))
-        for name in ("holes", "pieces"):
-            each = partial(frozen, shape=(None, 3), name=name)
-            loops = several(getattr(self, name), each, name, "polygons")
-            object.__setattr__(self, name, loops)
-        number(self.area, "area", above=0.0, most=LARGEST)
-        number(self.spread, "spread", least=0.0, below=RIGHT_ANGLE)
-        number(self.depth, "depth", least=0.0, most=LARGEST)
 
     def __repr__(self) -> str:
         parts = [counted(len(self.polygon), "corner"), counted(len(self.holes), "hole")]
@@ -62,39 +52,29 @@ MM = 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface(ByValue):
+class Surface(Declared):
     """What is known of an object's triangles."""
 
     closed: bool = True
     """Whether the triangles, caps included, enclose a solid. Where they do not, the mass properties
     are those of the convex hull."""
-    caps: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    caps: Places = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     """Indices of the triangles that close small holes, (c,); no finger may stand on them."""
-    holes: int = 0
+    holes: Number = 0
     """Number of holes that were closed."""
-    largest_hole_m: float = 0.0
+    largest_hole_m: NotNegative = 0.0
     """Largest distance between two corners of one closed hole [m]."""
-    volume_error: float = 0.0
+    volume_error: NotNegative = 0.0
     """Largest error of the volume if each closed hole was a half-sphere, as a share of it."""
-    dropped: float = 0.0
+    dropped: Annotated[float, Range(least=0.0, most=1.0)] = 0.0
     """Area of the parts that were left out, as a share of the whole."""
-    flatness_m: float = 0.0
+    flatness_m: NotNegative = 0.0
     """Distance from one plane that the rounding of the coordinates explains [m]; 0 where no more is
     known of them than that they are in double precision."""
     center_given: bool = False
     """Whether the centre of mass was given, and is not that of uniform density."""
     repairs: tuple[str, ...] = ()
     """What else was changed, in words."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "caps", frozen_indices(self.caps, (None,), "caps"))
-        whole(self.holes, "holes", least=0)
-        for name in ("closed", "center_given"):
-            switch(getattr(self, name), name)
-        for name in ("largest_hole_m", "volume_error", "flatness_m"):
-            number(getattr(self, name), name, least=0.0, most=LARGEST)
-        number(self.dropped, "dropped", least=0.0, most=1.0)
-        several(self.repairs, partial(text, name="repairs"), "repairs", "texts")
 
     @property
     def volume_source(self) -> Literal["surface", "capped surface", "convex hull"]:

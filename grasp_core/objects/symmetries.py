@@ -18,11 +18,12 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen
+from grasp_core.arrays import Array, Shape
+from grasp_core.declared import Declared
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import SHORTEST, flag_frame
 from grasp_core.values import FINGERS, Grasp
@@ -45,18 +46,14 @@ ORDERS = np.array(list(itertools.permutations(range(FINGERS))))
 """Ways to match the fingers of two grasps, (24, 4)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Symmetries:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Symmetries(Declared):
     """The orthogonal matrices that map an object to itself about its centre of mass."""
 
-    rotations: Array
+    rotations: Annotated[Array, Shape(None, 3, 3)]
     """Rotations, the identity first, (r, 3, 3)."""
-    reflections: Array
+    reflections: Annotated[Array, Shape(None, 3, 3)]
     """Matrices with determinant -1: reflections, and reflections that also rotate, (m, 3, 3)."""
-
-    def __post_init__(self) -> None:
-        for name in ("rotations", "reflections"):
-            object.__setattr__(self, name, frozen(getattr(self, name), (None, 3, 3), name))
 
 
 @dataclass(frozen=True, slots=True)

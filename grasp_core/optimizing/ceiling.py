@@ -21,10 +21,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, frozen_each, is_a
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Indices, frozen_each
 from grasp_core.checked import LARGEST, coefficient, number, several, whole
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.kinds import Cases
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
@@ -33,8 +34,8 @@ from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
 from grasp_core.optimizing.best.search import Searching, Stop
 from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
-from grasp_core.quality.measures import FERRARI_CANNY, Measure
-from grasp_core.settings import Cases, value_of
+from grasp_core.quality.measures import FERRARI_CANNY
+from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits
 from grasp_core.values import FINGERS, FaceQuadruple
 
@@ -47,7 +48,7 @@ SEED = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class QualityCeiling(ByValue):
+class QualityCeiling(Declared):
     """A proved bound on the quality of all contacts on four faces, clear of the edges."""
 
     proof: CutTree
@@ -64,9 +65,8 @@ class QualityCeiling(ByValue):
         Whether its polygons are those of an object's faces can only be checked with the object.
         """
         return (
-            is_a(self.proof, CutTree)
+            self.is_sound()
             and self.proof.owners is not None
-            and is_a(self.proof.measure, Measure)
             and self.proof.measure.is_usual
             and self.proof.verify()
         )

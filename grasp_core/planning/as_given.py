@@ -15,8 +15,8 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
-from grasp_core.by_value import trusted
 from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import trusted
 from grasp_core.families.free import Absence
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.standard_order import FLIP, Standard

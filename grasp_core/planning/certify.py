@@ -11,19 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
-from grasp_core.by_value import kept, trusted
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.closure.critical_friction import critical_friction, critical_frictions
 from grasp_core.closure.force_closure import closing_margins, force_closure
 from grasp_core.closure.lines import classify_each
 from grasp_core.cones.spanning import span_angles
+from grasp_core.declared import kept, trusted
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
 from grasp_core.frames import kept_angle
+from grasp_core.kinds import Family, Method
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.settings import Family, Method
 from grasp_core.values import Contact, ContactRegion, FaceQuadruple, ForceCone, Grasp, Witness, four
 
 BALANCED = 1e-6
@@ -225,6 +225,6 @@ def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> 
 
 
 def _kept_cone(cone: ForceCone) -> ForceCone:
-    """Return a force cone with the half-angle that files keep."""
+    """Return a force cone with the half-angle that degrees keep."""
     half_angle = kept_angle(cone.half_angle)
     return cone if half_angle == cone.half_angle else ForceCone(cone.axis, half_angle)

@@ -18,6 +18,7 @@ from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.families.placing import chosen_shapes
+from grasp_core.kinds import Family
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified
@@ -28,7 +29,6 @@ from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_bl
 from grasp_core.planning.reach import Reach
 from grasp_core.planning.request import PlanRequest
 from grasp_core.processes import local_processes
-from grasp_core.settings import Family
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
 BATCH, LIMITED_BATCH = 1024, 64

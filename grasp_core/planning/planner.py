@@ -18,6 +18,7 @@ from grasp_core.checked import function, whole
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
+from grasp_core.kinds import METHODS, ConeKind, Method, RankBy
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
@@ -30,7 +31,6 @@ from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import PlanRequest, check_request
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
-from grasp_core.settings import METHODS, ConeKind, Method, RankBy
 from grasp_core.values import Grasp
 
 
@@ -135,7 +135,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
-    # a value of another kind is refused by the request
+    """Return methods as a tuple, also a single one; `PlanRequest` checks them."""
     return (families,) if isinstance(families, str) else cast("tuple[Method, ...]", families)
 
 

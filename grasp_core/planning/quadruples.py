@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, frozen_copy
-from grasp_core.by_value import trusted
 from grasp_core.cones.spanning import SpanningTable
+from grasp_core.declared import trusted
 from grasp_core.families.constructions import Construction
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import Attempt, Cones

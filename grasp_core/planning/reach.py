@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.geometry.polygons import plane_frame
+from grasp_core.kinds import Quantity
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.settings import Quantity, Settings
+from grasp_core.settings import Settings
 from grasp_core.values import FaceQuadruple
 
 TOUCHING = 1e-6

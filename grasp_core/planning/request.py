@@ -5,18 +5,14 @@ from dataclasses import dataclass
 from typing import get_args
 
 from grasp_core.arrays import UNIT_SLACK
-from grasp_core.checked import (
-    SMALLEST,
-    instance,
-    number,
-)
+from grasp_core.checked import SMALLEST, number
 from grasp_core.errors import InputError
+from grasp_core.kinds import METHODS, Family, Method
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.settings import PlanSettings
-from grasp_core.settings import METHODS, Family, Method
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The three families of grasps in the paper, each with its construction."""
@@ -30,11 +26,22 @@ MOST_FACES = 1000
 take some hundred megabytes."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PlanRequest(PlanSettings):
     """What is to be planned: the settings, and the fingers that must reach their contacts."""
 
     finger: Finger | None = None
+
+    def _check_together(self) -> None:
+        if self.complete and "free" not in self.families:
+            raise InputError(
+                "complete needs the free method, which decides all faces; add free to families"
+            )
+        if self.theta_deg is not None:
+            widest = math.degrees(math.atan(self.friction))
+            where = f", the angle of friction {self.friction}, or None"
+            most = widest * (1.0 + UNIT_SLACK)
+            number(self.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)
 
     @property
     def theta(self) -> float:
@@ -56,17 +63,6 @@ def methods_for(body: Polyhedron) -> tuple[Method, ...]:
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
     """Refuse keywords out of range, and objects with too many faces for the request."""
     check_body(body)
-    if request.theta_deg is not None:
-        widest = math.degrees(math.atan(request.friction))
-        where = f", the angle of friction {request.friction}, or None"
-        most = widest * (1.0 + UNIT_SLACK)
-        number(request.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)
-    if not request.families:
-        raise InputError(f"families must be among {', '.join(METHODS)}; got none")
-    if request.complete and "free" not in request.families:
-        raise InputError(
-            "complete needs the free method, which decides all faces; add free to families"
-        )
     _check_lengths(body, request)
     _check_size(body, request)
 
@@ -77,7 +73,6 @@ def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
         size, where = 2.0 * body.radius, ", the object's size, or None"
         number(request.share_faces_m, "share_faces_m", below=size, where=where)
     if request.finger is not None:
-        instance(request.finger, Finger, "finger", "gc.Finger(radius_m, approach_m)")
         radius, approach = request.finger.radius_m, request.finger.approach_m
         number(radius, "finger.radius_m", most=body.radius, where=ITS_RADIUS)
         farthest = FARTHEST_APPROACH * body.radius

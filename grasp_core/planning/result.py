@@ -4,20 +4,22 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from textwrap import shorten
-from typing import Any, Protocol, TypeAlias
+from typing import Annotated, Any, Protocol, TypeAlias, runtime_checkable
 
-from grasp_core.by_value import ByValue, counted, summary
+from grasp_core.declared import Declared, counted, summary
+from grasp_core.files.records import UNRECORDED, Key
 from grasp_core.grasp_tables import ById, chosen, data_frame
+from grasp_core.kinds import Friction, Method, Number, Seed
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.settings import Method
-from grasp_core.values import FaceQuadruple, Grasp
+from grasp_core.values import Bounds, FaceQuadruple, Grasp, HalfAngle
 
 LONGEST_REASON = 160
 """Most characters of a reason in the `repr` of a plan, so that it takes two lines at most."""
 
 
+@runtime_checkable
 class Proof(Protocol):
     """A mathematical claim that can be re-checked without any solver."""
 
@@ -26,36 +28,36 @@ class Proof(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class MethodCounts:
+@dataclass(frozen=True, slots=True, eq=False)
+class MethodCounts(Declared):
     """Counts of how the candidates of one planning method ended.
 
     A candidate is a set of four faces; for pencils and reguli, with one of the three ways to pair
     them. Tried candidates end in one of the last six counts.
     """
 
-    tried: int = 0
+    tried: Number = 0
     """Candidates whose programs were set up."""
-    pruned: int = 0
+    pruned: Number = 0
     """Candidates skipped because a bound shows that their discs are too small, their pairs are too
     far from symmetric for a regulus, the free method is not needed on them, or they cannot enter
     the best `limit`."""
-    solved: int = 0
+    solved: Number = 0
     """Choices of one convex piece per face that were considered."""
-    infeasible: int = 0
+    infeasible: Number = 0
     """Candidates without a placement that has discs of the least radius at the planned angle, would
     enter the best if there is a limit, and exists on the surface of curved patches; for the free
     method, candidates proved to have no grasp at all."""
-    undecided: int = 0
+    undecided: Number = 0
     """Candidates with neither a grasp nor a proof of absence (free method), or with an unsolved
     program (other methods)."""
-    duplicates: int = 0
+    duplicates: Number = 0
     """Grasps found again at the same contacts, with another pairing of the fingers."""
-    found: int = 0
+    found: Number = 0
     """Grasps whose witness is of the method's family and which exact force closure certified."""
-    unreachable: int = 0
+    unreachable: Number = 0
     """Certified grasps that fingers of the given size cannot reach."""
-    rejected: int = 0
+    rejected: Number = 0
     """Placements that the witness or the exact closure test did not confirm: not 0 means a bug."""
 
 
@@ -63,30 +65,30 @@ Tally: TypeAlias = Counter[str]
 """The counts of `MethodCounts` by their names, while a search runs."""
 
 
-@dataclass(frozen=True, slots=True)
-class Outcomes:
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcomes(Declared):
     """Counts of an object's sets of four faces: with a grasp, without, open, out of reach."""
 
-    held: int
+    held: Number
     """Sets of four faces with a certified grasp."""
-    absent: int
+    absent: Number
     """Sets of four faces proved to hold no grasp, or with a face too small for a contact."""
-    open: int
+    open: Number
     """Sets of four faces with neither a grasp nor a proof: undecided or, with a limit, untried."""
-    out_of_reach: int = 0
+    out_of_reach: Number = 0
     """Sets of four faces with certified grasps that fingers of the given size cannot reach."""
 
 
-@dataclass(frozen=True, slots=True)
-class Moved:
+@dataclass(frozen=True, slots=True, eq=False)
+class Moved(Declared):
     """How optimisation changed a grasp's quality, as proved bounds (lower, upper)."""
 
     id: str
     moved_from: str
     """Id of the planned grasp; equal to `id` where the grasp was not moved."""
-    before: tuple[float, float]
-    after: tuple[float, float]
-    ceiling: float | None
+    before: Annotated[Bounds, Key("ferrari_canny_before")]
+    after: Annotated[Bounds, Key("ferrari_canny_after")]
+    ceiling: Annotated[float | None, Key("ferrari_canny_ceiling")]
     """Quality that no contacts on the same faces exceed; None where no ceiling was asked for."""
 
     @property
@@ -95,22 +97,22 @@ class Moved:
         return self.after[0] / self.before[0]
 
 
-@dataclass(frozen=True, slots=True)
-class PlanCounts:
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanCounts(Declared):
     """Counts of what the planner tried on one object."""
 
-    faces: int
-    quadruples: int
+    faces: Number
+    quadruples: Number
     """Number of sets of four faces; with `share_faces_m` also of sets with two halves of a face."""
-    spanning: int | None
+    spanning: Number | None
     """Sets whose normals positively span at the least planned angle (P3); None where they were not
     counted, as above 200 faces."""
-    families: Mapping[str, MethodCounts] = field(default_factory=dict[str, MethodCounts])
+    families: Mapping[Method, MethodCounts] = field(default_factory=dict[Method, MethodCounts])
     """Counts of each method: the three families and `free`, as far as they were asked for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Plan(ByValue, ById[Grasp], InNotebooks):
+class Plan(Declared, ById[Grasp], InNotebooks):
     """The grasps found on one object, the best first, and what was tried.
 
     A plan is a sequence of its grasps: `len(plan)`, `for grasp in plan`, `plan[0]`, and also
@@ -119,18 +121,18 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
     and `versions` is.
     """
 
-    body: Polyhedron
+    body: Annotated[Polyhedron, UNRECORDED]
     """The object."""
     grasps: tuple[Grasp, ...]
-    friction: float
-    theta: float
+    friction: Friction
+    theta: Annotated[HalfAngle, Key("theta_rad")]
     """Half-angle of the friction cones planned with, before each quadruple's own limit [rad]."""
-    seed: int
+    seed: Seed
     counts: PlanCounts
     outcomes: Outcomes
     absence: str | None = None
     """Why there is no grasp, as a sentence; None when there is one."""
-    absences: Mapping[FaceQuadruple, tuple[Proof, ...]] = field(
+    absences: Annotated[Mapping[FaceQuadruple, tuple[Proof, ...]], UNRECORDED] = field(
         default_factory=dict[FaceQuadruple, tuple[Proof, ...]]
     )
     """Face quadruples that the free method proved to hold no grasp with friction tan(theta), with
@@ -139,14 +141,20 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
     finger: Finger | None = None
     """The size of the fingers for which free straight paths to the contacts were sought; None if no
     paths were asked for."""
-    undecided: Mapping[FaceQuadruple, float] = field(default_factory=dict[FaceQuadruple, float])
+    undecided: Annotated[Mapping[FaceQuadruple, float], UNRECORDED] = field(
+        default_factory=dict[FaceQuadruple, float]
+    )
     """Face quadruples on which the free method found neither a grasp nor a proof, with the share of
     the choices of contacts that is open, where each cut counts for half."""
-    unreached: Mapping[FaceQuadruple, str] = field(default_factory=dict[FaceQuadruple, str])
+    unreached: Annotated[Mapping[FaceQuadruple, str], UNRECORDED] = field(
+        default_factory=dict[FaceQuadruple, str]
+    )
     """Face quadruples whose grasps the fingers cannot reach, with the reason."""
-    moves: tuple[Moved, ...] = ()
+    moves: Annotated[tuple[Moved, ...], Key("optimization")] = ()
     """How optimisation changed each grasp; empty if it was not asked for."""
-    seconds: Mapping[str, float] = field(default_factory=dict[str, float], compare=False)
+    seconds: Annotated[Mapping[Method, float], UNRECORDED] = field(
+        default_factory=dict[Method, float], compare=False
+    )
     """Processor time of each method [s], from its first program to its last grasp."""
     versions: Mapping[str, str] | None = field(default=None, compare=False)
     """Versions of the packages that made a plan from a file; None for those that are installed."""
@@ -184,7 +192,7 @@ class Plan(ByValue, ById[Grasp], InNotebooks):
     def to_dataframe(self) -> Any:
         """Return a `pandas.DataFrame` with a row for each grasp, indexed by id.
 
-        Columns have the names and units of `grasps.json`, see `grasp_core.grasp_tables.data_frame`.
+        Columns are named as in `grasps.json`, see `grasp_core.grasp_tables.data_frame`.
 
         Raises:
             InputError: The library pandas is not installed.

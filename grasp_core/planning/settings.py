@@ -1,19 +1,21 @@
 """Settings of plans: which grasps of an object are looked for, and how."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from grasp_core.settings import (
+from grasp_core.kinds import (
     METHODS,
     ConeKind,
     Count,
     Friction,
+    Many,
     Method,
     NotNegative,
     Quantity,
     RankBy,
     Seed,
-    Settings,
 )
+from grasp_core.settings import Settings
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -22,7 +24,7 @@ class PlanSettings(Settings):
 
     friction: Friction = 0.5
     """Coulomb coefficient at every contact."""
-    families: tuple[Method, ...] = METHODS
+    families: Annotated[tuple[Method, ...], Many()] = METHODS
     """Families of grasps to construct. `free` looks for grasps of any type on the faces that the
     other families leave over. For faces without a grasp it proves that they have none, or says that
     it is undecided."""

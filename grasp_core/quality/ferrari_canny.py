@@ -28,16 +28,17 @@ collision detection in six dimensions (also Zheng 2013 for this metric).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, are_units, is_a, is_array, is_number
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Figure, Shape
 from grasp_core.checked import number
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.compiled import compiled
+from grasp_core.declared import Declared, trusted
 from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.values import Contact, Grasp
 
@@ -54,24 +55,26 @@ CHECK_SLACK = 1e-12
 MOST_SLACK = 1e-6
 """Largest slack of a quality, however long wrenches are [N]."""
 KERNEL = "grasp_core.quality.ferrari_canny_kernel"
+UnitTwist = Annotated[Array, Shape(WRENCH, units=True)]
+"""A velocity and an angular velocity, of length one, with torques over a torque scale, (6,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FerrariCanny(ByValue):
+class FerrariCanny(Declared):
     """Bounds of a quality, with the direction and the polytope, or forces, that prove them."""
 
-    lower: float
+    lower: Figure
     """Lower bound of the quality [N]."""
-    upper: float
+    upper: Figure
     """Upper bound of the quality [N]."""
     wrenches: WrenchSet
     """The set of wrenches to whose largest inscribed ball the quality refers."""
-    direction: Array
+    direction: UnitTwist
     """Unit twist, (6,), with torques over the torque scale, in which the support is at most
     `upper`."""
     polytope: InnerPolytope | None
     """Polytope that proves `lower` if the zero wrench is inside the set; None otherwise."""
-    forces: Array | None
+    forces: Annotated[Array, Shape(None)] | None
     """Local forces, (3k,), or (4k,) with torsion, whose wrench is no longer than -`lower`, if the
     zero wrench is outside the set; None otherwise."""
 
@@ -82,9 +85,7 @@ class FerrariCanny(ByValue):
         within 1e-12 of its longest wrench, and 1e-6 N at most.
         """
         with np.errstate(all="ignore"):
-            sound = is_a(self.wrenches, WrenchSet) and self.wrenches.sound()
-            ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
-            if not (sound and ordered and are_units(self.direction, WRENCH, slack=CHECK_SLACK)):
+            if not (self.is_sound() and self.lower <= self.upper and is_unit(self.direction)):
                 return False
             slack = min(CHECK_SLACK * self.wrenches.size, MOST_SLACK)
             # (1) for the direction
@@ -97,17 +98,22 @@ class FerrariCanny(ByValue):
         if self.polytope is not None:
             return (
                 self.forces is None
-                and is_a(self.polytope, InnerPolytope)
-                and self.polytope.sound(width)
+                and self.polytope.forces.shape[1] == width
                 and are_allowed(self.polytope.forces, self.wrenches)
                 and self.polytope.proved_radius(self.wrenches) >= self.lower - slack
             )
         # (3), by the wrench of allowed forces
         return (
-            is_array(self.forces, width)
+            self.forces is not None
+            and self.forces.shape == (width,)
             and are_allowed(self.forces[None], self.wrenches)
             and float(np.linalg.norm(self.wrenches.G @ self.forces)) <= -self.lower + slack
         )
+
+
+def is_unit(direction: Array) -> bool:
+    """Return whether a vector has length one, to `CHECK_SLACK`."""
+    return abs(float(np.linalg.norm(direction)) - 1.0) <= CHECK_SLACK
 
 
 def are_allowed(forces: Array, wrenches: WrenchSet) -> bool:
@@ -171,7 +177,7 @@ def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
     )
     slack = CHECK_SLACK * wrenches.size
     if status == kernel.GROWN:
-        polytope = InnerPolytope(forces, corners, normals)
+        polytope = trusted(InnerPolytope, forces=forces, corners=corners, normals=normals)
         radius = polytope.proved_radius(wrenches)
         if radius > slack:
             upper = wrenches.support(weakest)[0]

@@ -38,14 +38,15 @@ and after the last one nothing is proved.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices, are_units, is_array, is_indices
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.declared import Declared
 
 LOST = 64.0 * float(np.finfo(np.float64).eps)
 """Error of a sum of six products, relative to the lengths of the two vectors: ten times what it
@@ -64,25 +65,18 @@ LARGEST_KEY = 2**62
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class InnerPolytope(ByValue):
+class InnerPolytope(Declared):
     """A polytope inside a wrench set whose planes bound the quality from below."""
 
-    forces: Array
+    forces: Annotated[Array, Shape("n", None)]
     """Local contact forces; their wrenches are the points of the polytope, (n, 3k)."""
-    corners: Indices
+    corners: Annotated[Indices, Shape("m", WRENCH, whole=True)]
     """Indices of the points of each simplex of the boundary, (m, 6)."""
-    normals: Array
+    normals: Annotated[Array, Shape("m", WRENCH, units=True)]
     """Outward unit normals of the simplices, (m, 6)."""
 
-    def sound(self, width: int) -> bool:
-        """Return whether the fields fit each other and forces of `width` components."""
-        count = len(self.corners) if is_indices(self.corners, None, WRENCH) else 0
-        return (
-            count > 0
-            and is_array(self.forces, None, width)
-            and len(self.forces) > 0
-            and are_units(self.normals, count, WRENCH)
-        )
+    def _is_consistent(self) -> bool:
+        return len(self.corners) > 0 and len(self.forces) > 0
 
     def proved_radius(self, wrenches: WrenchSet) -> float:
         """Return the radius if the simplices enclose zero, and minus infinity otherwise."""

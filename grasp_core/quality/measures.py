@@ -50,22 +50,24 @@ always has an answer; its multipliers are a twist of length up to `STEEP` that b
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Annotated, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array, are_units, frozen, is_a, is_array, is_number
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Figure, Shape, frozen
 from grasp_core.checked import LARGEST, SMALLEST, one_of
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, force_rows, into_cones
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
     GAP,
     FerrariCanny,
+    UnitTwist,
     are_allowed,
+    is_unit,
     wrench_set_quality,
 )
 from grasp_core.solvers.conic import ConicProgram, minimize
@@ -97,16 +99,34 @@ NONE_SHOWN = -1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Measure(ByValue):
+class Measure(Declared):
     """The set of loads whose largest resisted multiple is a measure of contacts."""
 
     name: MeasureName
-    loads: Array = field(default_factory=lambda: np.zeros((0, WRENCH)))
+    loads: Annotated[Array, Shape(None, WRENCH)] = field(
+        default_factory=lambda: np.zeros((0, WRENCH))
+    )
     """External wrenches of a task, with torques about the centre of mass over the object's radius,
     (m, 6) [N]; none for other measures."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "loads", frozen(self.loads, (None, WRENCH), "loads"))
+    def _check_together(self) -> None:
+        if self.name != "task":
+            if len(self.loads):
+                raise InputError(f"loads must be none with measure {self.name!r}; leave them out")
+            return
+        if not 0 < len(self.loads) <= MOST_LOADS:
+            raise InputError(
+                f"wrenches must be 1 to {MOST_LOADS}, got {len(self.loads)}; leave out those that "
+                "are mixtures of others"
+            )
+        sizes = np.linalg.norm(self.loads, axis=1)
+        wrong = np.flatnonzero((sizes < SMALLEST) | (sizes > LARGEST))
+        if wrong.size:
+            raise InputError(
+                f"wrenches: row {int(wrong[0])} must be from {SMALLEST:g} to {LARGEST:g} N long, "
+                f"torques over the object's radius, got {float(sizes[wrong[0]]):.6g}; leave out "
+                "wrenches that ask for nothing, and give others in N and N m"
+            )
 
     @classmethod
     def of(cls, name: str, wrenches: ArrayLike | None, radius: float) -> "Measure":
@@ -124,38 +144,13 @@ class Measure(ByValue):
                 "wrenches: expected those of the task with measure 'task', got None; give an "
                 "array of shape (m, 6), forces in N and torques in N m"
             )
-        loads = frozen(wrenches, (None, WRENCH), "wrenches") / np.repeat([1.0, radius], 3)
-        if not 0 < len(loads) <= MOST_LOADS:
-            raise InputError(
-                f"wrenches: expected 1 to {MOST_LOADS} wrenches, got {len(loads)}; leave out those "
-                "that are mixtures of others"
-            )
-        sizes = np.linalg.norm(loads, axis=1)
-        wrong = np.flatnonzero((sizes < SMALLEST) | (sizes > LARGEST))
-        if wrong.size:
-            raise InputError(
-                f"wrenches: row {int(wrong[0])} must be from {SMALLEST:g} to {LARGEST:g} N long, "
-                f"torques over the object's radius, got {float(sizes[wrong[0]]):.6g}; leave out "
-                "wrenches that ask for nothing, and give others in N and N m"
-            )
-        return cls("task", loads)
-
-    def sound(self) -> bool:
-        """Return whether this is a measure, of any origin."""
-        known = is_a(self.name, str) and self.name in get_args(MeasureName)
-        if not (known and is_array(self.loads, None, WRENCH)):
-            return False
-        if self.name != "task":
-            return len(self.loads) == 0
-        sizes = np.linalg.norm(self.loads, axis=1)
-        return 0 < len(sizes) <= MOST_LOADS and bool(
-            sizes.min() >= SMALLEST and sizes.max() <= LARGEST
-        )
+        loads = frozen(wrenches, (None, WRENCH), "wrenches")
+        return cls("task", loads / np.repeat([1.0, radius], 3))
 
     @property
     def is_usual(self) -> bool:
         """Return whether this is the Ferrari-Canny quality."""
-        return is_a(self.name, str) and self.name == "ferrari-canny"
+        return self.name == "ferrari-canny"
 
     @property
     def size(self) -> float:
@@ -193,23 +188,23 @@ FERRARI_CANNY = Measure("ferrari-canny")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ResistedLoads(ByValue):
+class ResistedLoads(Declared):
     """Bounds of the largest multiple of a set of loads that contacts resist, with their proofs."""
 
-    lower: float
+    lower: Figure
     """Multiple that is resisted; -1 where none is shown to be, not even zero, as for contacts that
     are not in force closure. There is no ball then, and there are no forces."""
-    upper: float
+    upper: Figure
     """Multiple beyond which not all loads are resisted."""
     measure: Measure
     """The loads."""
     wrenches: WrenchSet
     """The wrenches of the contacts (`l1`), with torques over the object's radius."""
-    direction: Array
+    direction: UnitTwist
     """Unit twist, (6,), with torques over the object's radius, that allows at most `upper`."""
     ball: FerrariCanny | None
     """Proof of the ball (2) for the weight, or of the one in (3) for a task."""
-    forces: Array | None
+    forces: Annotated[Array, Shape(None, None)] | None
     """Local forces, (m, 3k), for each load of a task: they resist at least `lower` times the load,
     but for rests that the ball takes by (3)."""
 
@@ -219,16 +214,13 @@ class ResistedLoads(ByValue):
         They hold to within 1e-12 of the longest wrench; a lower one of -1 claims nothing.
         """
         with np.errstate(all="ignore"):
-            sound = (
-                is_a(self.measure, Measure)
-                and self.measure.sound()
+            if not (
+                self.is_sound()
                 and not self.measure.is_usual
-                and is_a(self.wrenches, WrenchSet)
-                and self.wrenches.sound()
                 and self.wrenches.norm == "l1"
-            )
-            ordered = is_number(self.lower) and is_number(self.upper) and self.lower <= self.upper
-            if not (sound and ordered and are_units(self.direction, WRENCH, slack=CHECK_SLACK)):
+                and self.lower <= self.upper
+                and is_unit(self.direction)
+            ):
                 return False
             demand = float(self.measure.demands(self.direction[None])[0])
             # half of what the bound was raised by, so that two ways to round agree
@@ -239,19 +231,21 @@ class ResistedLoads(ByValue):
     def _proves_lower(self) -> bool:
         if self.lower == NONE_SHOWN:
             return self.ball is None and self.forces is None
-        if self.lower < 0.0 or not (isinstance(self.ball, FerrariCanny) and self.ball.verify()):
+        if self.lower < 0.0 or self.ball is None or not self.ball.verify():
             return False
         if self.measure.name == "weight":
             of_weight = self.ball.wrenches == thin(self.wrenches)
             return self.forces is None and of_weight and self.ball.lower >= self.lower
-        loads, width = self.measure.loads, self.wrenches.G.shape[1]
-        if not (self.ball.wrenches == self.wrenches and is_array(self.forces, len(loads), width)):
+        loads, forces = self.measure.loads, self.forces
+        if forces is None or forces.shape != (len(loads), self.wrenches.G.shape[1]):
+            return False
+        if self.ball.wrenches != self.wrenches:
             return False
         slack = _rounding(self.wrenches)
         sizes = np.linalg.norm(loads, axis=1)
-        shown = sizes * _without_rests(self.wrenches, loads, self.forces, self.ball)
+        shown = sizes * _without_rests(self.wrenches, loads, forces, self.ball)
         resisted = bool((shown >= self.lower * sizes - slack).all())
-        return resisted and are_allowed(self.forces, self.wrenches)
+        return resisted and are_allowed(forces, self.wrenches)
 
 
 def thin(wrenches: WrenchSet) -> WrenchSet:

@@ -17,49 +17,41 @@ joints only helps a hold.
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each, is_array
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Shape, frozen, frozen_each
 from grasp_core.checked import LARGEST, SMALLEST, instance
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Motors(ByValue):
+class Motors(Declared):
     """The joints of a hand in one pose, with the torques of their motors."""
 
-    levers: Array
+    levers: Annotated[Array, Shape("j", None)]
     """The matrix L from contact forces on the object, stacked, to joint torques, (joints, 3k) [m],
     object axes: the transposed Jacobian of the contact points by the joints."""
-    limits: Array
+    limits: Annotated[Array, Shape("j", least=SMALLEST, most=LARGEST)]
     """Largest torque of each joint, either way, (joints,) [N m]."""
-    gravity: Array
+    gravity: Annotated[Array, Shape("j")]
     """Torque of each joint that carries the weight of the links, (joints,) [N m]."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "levers", frozen(self.levers, (None, None), "levers"))
-        joints, columns = self.levers.shape
+    def _check_together(self) -> None:
+        columns = self.levers.shape[1]
         if columns % 3:
             raise InputError(
                 f"levers must have three columns for each contact, got {columns} columns"
             )
-        object.__setattr__(self, "limits", frozen(self.limits, (joints,), "limits"))
-        object.__setattr__(self, "gravity", frozen(self.gravity, (joints,), "gravity"))
-        sizes = self.limits
-        if joints and not SMALLEST <= float(sizes.min()) <= float(sizes.max()) <= LARGEST:
-            raise InputError(
-                f"limits must be torques from {SMALLEST:g} to {LARGEST:g} N m, got "
-                f"{float(sizes.min()):.6g} to {float(sizes.max()):.6g}"
-            )
-        weak = np.flatnonzero(np.abs(self.gravity) >= sizes)
+        weak = np.flatnonzero(np.abs(self.gravity) >= self.limits)
         if weak.size:
             raise InputError(
                 f"gravity of joint {int(weak[0])} asks for {abs(self.gravity[weak[0]]):.6g} N m, "
-                f"but its limit is {sizes[weak[0]]:.6g} N m: the hand cannot carry its own links; "
-                "give larger limits, or another pose"
+                f"but its limit is {self.limits[weak[0]]:.6g} N m: the hand cannot carry its own "
+                "links; give larger limits, or another pose"
             )
 
     @classmethod
@@ -115,16 +107,9 @@ class Motors(ByValue):
             )
         return cls(strong.levers, left, np.zeros(len(left)))
 
-    def sound(self, contacts: int) -> bool:
-        """Return whether the fields are those of joints for so many contacts."""
-        joints = len(self.limits) if is_array(self.limits, None) else 0
-        return (
-            is_array(self.limits, joints)
-            and is_array(self.levers, joints, 3 * contacts)
-            and is_array(self.gravity, joints)
-            and bool(((self.limits >= SMALLEST) & (self.limits <= LARGEST)).all())
-            and bool((np.abs(self.gravity) < self.limits).all())
-        )
+    def are_for(self, contacts: int) -> bool:
+        """Return whether the levers are those of so many contacts."""
+        return self.levers.shape[1] == 3 * contacts
 
     def torques(self, forces: Array) -> Array:
         """Compute the joint torques (1) under contact forces (k, 3) [N], (joints,)."""
@@ -139,10 +124,11 @@ def motors_for(motors: Motors | None, contacts: int) -> Motors:
     """Check that motors are those of so many contacts; None gives a hand without joints."""
     if motors is None:
         return Motors(np.zeros((0, 3 * contacts)), np.zeros(0), np.zeros(0))
-    instance(motors, Motors, "motors", "gc.Motors.of makes one")
-    if motors.levers.shape[-1:] != (3 * contacts,):
+    # a certificate's check takes them from anywhere
+    motors = replace(instance(motors, Motors, "motors", "gc.Motors.of makes one"))
+    if not motors.are_for(contacts):
         raise InputError(
             f"motors must have levers with three columns for each of {contacts} contacts, "
             f"{3 * contacts} in all, got an array of shape {motors.levers.shape}"
         )
-    return replace(motors)  # a certificate's check takes them from anywhere
+    return motors

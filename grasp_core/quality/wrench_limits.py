@@ -37,13 +37,12 @@ at a wrench that is locally the weakest. Torques are compared with forces throug
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_copy, is_array, is_number
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Amount, Array, Figure, Points, Shape, Wrench, frozen
 from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contacts import (
     WRENCH,
@@ -55,6 +54,7 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
 from grasp_core.closure.wrench_sets import WrenchSet, force_rows, with_torques
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import ConicProgram, minimize
@@ -215,26 +215,26 @@ def _across(one: Array, two: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WrenchLimit(ByValue):
+class WrenchLimit(Declared):
     """The largest multiple of an external wrench that contacts resist, proved from both sides."""
 
-    wrench: Array
+    wrench: Wrench
     """External wrench (force, torque), (6,) [N, N m], torque about the stated centre."""
-    limit: float
+    limit: Amount
     """Largest multiple of `wrench` that is resisted; `forces` prove it by balancing that multiple.
     """
-    upper: float
+    upper: Figure
     """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic.
     """
-    forces: Array
+    forces: Points
     """Contact forces that resist the wrench at the limit, (k, 3) [N]: in their cones, with normal
     parts up to the largest, and balanced, all to within `HELD`."""
-    facet: Array
+    facet: Annotated[Array, Shape(WRENCH)]
     """Twist y of the facet that limits the wrench, (6,), with y.wrench = -1, about the stated
     centre."""
-    motor_multipliers: Array = field(default_factory=lambda: frozen_copy(np.zeros(0)))
+    motor_multipliers: Annotated[Array, Shape(None)] = field(default_factory=lambda: np.zeros(0))
     """Multipliers m of the joints in (3), (joints,) [1/(N m)]; none where no motors are given."""
-    torques: Array | None = field(default=None, repr=False)
+    torques: Annotated[Array, Shape("k")] | None = field(default=None, repr=False)
     """Torques about the inward normals that act with `forces`, (k,) [N m]; None without torsion."""
 
     def verify(
@@ -275,14 +275,11 @@ class WrenchLimit(ByValue):
         """Return whether the fields prove both bounds for the contacts of a body."""
         soft = body.lengths is not None
         return (
-            is_array(self.wrench, WRENCH)
+            self.is_sound()
             and bool(self.wrench.any())
-            and is_array(self.facet, WRENCH)
-            and is_array(self.forces, body.count, 3)
-            and is_array(self.motor_multipliers, len(body.levers))
-            and (is_array(self.torques, body.count) if soft else self.torques is None)
-            and is_number(self.limit, least=0.0)
-            and is_number(self.upper)
+            and len(self.forces) == body.count
+            and len(self.motor_multipliers) == len(body.levers)
+            and (self.torques is not None) == soft
             and self.limit <= self.upper
             and attains(body, self)
             and bounds(body, self)

@@ -9,13 +9,16 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
-from grasp_core.arrays import Array, frozen, frozen_units
-from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST, positive
+from grasp_core.arrays import Array, Shape
+from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST
 from grasp_core.closure.contacts import contact_frictions
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.files.json_text import record_of, value_of
+from grasp_core.figures import Shown
+from grasp_core.files.json_text import object_of, value_of
+from grasp_core.files.records import Key, from_record
+from grasp_core.kinds import FrictionOrZero, Many, Quantity, Range
 from grasp_core.records.grasps_json import grasps_from_json
 
 FEWEST_CONTACTS = 2
@@ -26,6 +29,8 @@ MOST_GRASPS = 100_000
 """Largest number of grasps in one file: two hours of work for one processor."""
 LARGEST_LENGTH_M = 1e6
 """Largest length [m]: longer ones are mistakes, and their squares might overflow."""
+LONGEST_ID = 100
+"""Largest number of letters of the id of a grasp."""
 NEARLY_UNIT = 1e-3
 """How far the length of a normal may be from 1: rounding of a file with three digits."""
 UNIT_ROUNDING = 1e-15
@@ -37,70 +42,64 @@ leaves nothing of smaller differences."""
 CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
 ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]
 
-Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH_M, le=LARGEST_LENGTH_M, allow_inf_nan=False)]
-Point = tuple[Coordinate, Coordinate, Coordinate]
-Friction = Annotated[float, Field(ge=0.0, le=LARGEST_FRICTION, allow_inf_nan=False)]
-Length = Annotated[float, Field(gt=0.0, le=LARGEST_LENGTH_M, allow_inf_nan=False)]
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-
-class _GivenContact(_Strict):
-    position_m: Point
-    normal: Point
-    friction: Friction | None = None
-
-
-GivenContacts = Annotated[
-    list[_GivenContact], Field(min_length=FEWEST_CONTACTS, max_length=MOST_CONTACTS, fail_fast=True)
-]
-
-
-class _GivenGrasp(_Strict):
-    id: Annotated[str, Field(min_length=1, max_length=100)] | None = None
-    contacts: GivenContacts
-
-
-GivenGrasps = Annotated[
-    list[_GivenGrasp], Field(min_length=1, max_length=MOST_GRASPS, fail_fast=True)
-]
-
-
-class _ContactsFile(_Strict):
-    contacts: GivenContacts | None = None
-    grasps: GivenGrasps | None = None
-    friction: Friction | None = None
-    center_m: Point | None = None
-    torque_scale_m: Length | None = None
+Coordinates = Annotated[Array, Shape(3, least=-LARGEST_LENGTH_M, most=LARGEST_LENGTH_M)]
+Length = Annotated[float, Range(above=0.0, most=LARGEST_LENGTH_M)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ContactSet:
+class GivenContact(Declared):
+    """A contact in a file; its normal need not be exactly of length one."""
+
+    position_m: Coordinates
+    normal: Coordinates
+    friction: FrictionOrZero | None = None
+
+
+GivenContacts = Annotated[tuple[GivenContact, ...], Many(FEWEST_CONTACTS, MOST_CONTACTS)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenGrasp(Declared):
+    """A grasp in a file."""
+
+    contacts: GivenContacts
+    id: Annotated[str, Many(1, LONGEST_ID)] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactsFile(Declared):
+    """A contacts file: the contacts of one grasp, or several grasps."""
+
+    contacts: GivenContacts | None = None
+    grasps: Annotated[tuple[GivenGrasp, ...], Many(1, MOST_GRASPS)] | None = None
+    friction: FrictionOrZero | None = None
+    center_m: Coordinates | None = None
+    torque_scale_m: Length | None = None
+
+    def _check_together(self) -> None:
+        if (self.contacts is None) == (self.grasps is None):
+            raise InputError(
+                'the file must have either the key "contacts" (one grasp) or "grasps" (several)'
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactSet(Declared):
     """The contacts of one grasp, with the centre and the length by which torques are measured."""
 
-    id: str
-    positions: Array
+    id: Annotated[str, Shown("grasp")]
+    positions: Annotated[Array, Shape("k", 3), Key("positions_m")]
     """Contact points, (k, 3) [m], k >= 2."""
-    normals: Array
+    normals: Annotated[Array, Shape("k", 3, units=True)]
     """Unit vectors into the object, (k, 3)."""
-    friction: Array
+    friction: Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
     """Coulomb coefficients, (k,)."""
-    center: Array
+    center: Annotated[Array, Shape(3), Key("center_m")]
     """Point about which torques are taken, (3,) [m]."""
-    torque_scale: float
+    torque_scale: Annotated[Quantity, Key("torque_scale_m")]
     """Length that makes a torque comparable with a force [m]."""
     center_from: CenterSource
     torque_scale_from: ScaleSource
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "positions", frozen(self.positions, (None, 3), "positions"))
-        count = len(self.positions)
-        object.__setattr__(self, "normals", frozen_units(self.normals, (count, 3), "normals"))
-        object.__setattr__(self, "friction", contact_frictions(self.friction, count))
-        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
-        object.__setattr__(self, "torque_scale", positive(self.torque_scale, "torque_scale"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,11 +124,7 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     found = value_of(text)
     if isinstance(found, dict) and "schema" in found and "contacts" not in found:
         return _planned(text, overrides)
-    file = record_of(_ContactsFile, text, "contacts file", nulls=False)
-    if (file.contacts is None) == (file.grasps is None):
-        raise InputError(
-            'the file must have either the key "contacts" (one grasp) or "grasps" (several)'
-        )
+    file = from_record(ContactsFile, object_of(text, "contacts file", nulls=False))
     if file.contacts is not None:
         return (_contact_set(file, file.contacts, "0", "contacts", overrides),)
     listed = file.grasps or ()
@@ -171,11 +166,11 @@ def _planned(text: str, overrides: Overrides) -> tuple[ContactSet, ...]:
 
 
 def _contact_set(
-    file: _ContactsFile, contacts: list[_GivenContact], name: str, where: str, overrides: Overrides
+    file: ContactsFile, contacts: tuple[GivenContact, ...], name: str, where: str, flags: Overrides
 ) -> ContactSet:
     positions = np.array([contact.position_m for contact in contacts])
     given = file.center_m
-    center = positions.mean(axis=0) if given is None else np.array(given)
+    center = positions.mean(axis=0) if given is None else given
     extent = float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
     largest = float(max(np.abs(positions).max(), np.abs(center).max()))
     if extent <= SAME_POINT * largest:
@@ -185,7 +180,7 @@ def _contact_set(
         )
     farthest = float(np.linalg.norm(positions - center, axis=1).max())
     scale, source = _first(
-        (overrides.torque_scale, "flag"),
+        (flags.torque_scale, "flag"),
         (file.torque_scale_m, "file"),
         (farthest, "farthest contact"),
     )
@@ -194,12 +189,12 @@ def _contact_set(
             f"{where}: the contacts are {scale:.2g} m from the point about which torques are "
             f"taken, expected {SMALLEST:g} to {LARGEST:g} m; give torque_scale_m, or other units"
         )
-    inward = -1.0 if overrides.outward else 1.0
+    inward = -1.0 if flags.outward else 1.0
     return ContactSet(
         id=name,
         positions=positions,
         normals=inward * _unit_normals(contacts, where),
-        friction=_frictions(file, contacts, where, overrides.friction),
+        friction=_frictions(file, contacts, where, flags.friction),
         center=center,
         torque_scale=scale,
         center_from="mean contact" if given is None else "file",
@@ -207,7 +202,7 @@ def _contact_set(
     )
 
 
-def _unit_normals(contacts: list[_GivenContact], where: str) -> Array:
+def _unit_normals(contacts: tuple[GivenContact, ...], where: str) -> Array:
     normals = np.array([contact.normal for contact in contacts])
     lengths = np.linalg.norm(normals, axis=1)
     worst = int(np.abs(lengths - 1.0).argmax())
@@ -221,7 +216,7 @@ def _unit_normals(contacts: list[_GivenContact], where: str) -> Array:
 
 
 def _frictions(
-    file: _ContactsFile, contacts: list[_GivenContact], where: str, flag: float | None
+    file: ContactsFile, contacts: tuple[GivenContact, ...], where: str, flag: float | None
 ) -> Array:
     common = file.friction if flag is None else flag
     values = [common if contact.friction is None else contact.friction for contact in contacts]

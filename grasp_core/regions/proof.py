@@ -44,20 +44,19 @@ use for regions of reguli, for which Sudsang & Ponce (1995) have no method.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from grasp_core.arrays import (
     Array,
     Indices,
+    Shape,
     are_frictions,
     are_units,
-    frozen,
-    frozen_indices,
-    is_a,
     is_array,
 )
-from grasp_core.by_value import ByValue
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 
 TWIST = 6
@@ -73,29 +72,28 @@ between its inverse and it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TwistCover(ByValue):
+class TwistCover(Declared):
     """Cones that fill the space of twists, each with contact forces that resist all its twists.
 
     The rays of a cone are whole numbers in the coordinates of `axes`, so that dividing cones is
     exact.
     """
 
-    axes: Array
+    axes: Annotated[Array, Shape(TWIST, TWIST)]
     """Six independent twists as rows: velocity of the origin, then angular velocity, (6, 6)."""
-    codes: Indices
+    codes: Annotated[Indices, Shape("n", whole=True, most=LEAF)]
     """The tree of cones, (n,), level by level from the 64 orthants: for each cone the number of the
     edge at which it is divided, or `LEAF`."""
-    forces: Array
+    forces: Annotated[Array, Shape("m", "k", 3)]
     """Forces on the object for each cone that is not divided, in the same order, (m, k, 3)."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "axes", frozen(self.axes, (TWIST, TWIST), "axes"))
-        object.__setattr__(self, "codes", frozen_indices(self.codes, (None,), "codes"))
+    def _check_together(self) -> None:
         leaves = int(np.count_nonzero(self.codes == LEAF))
-        forces = frozen(self.forces, (leaves, None, 3), "forces", most=np.inf)  # of any size
-        object.__setattr__(self, "forces", forces)
-        if self.codes.min(initial=0) < 0 or self.codes.max(initial=0) > LEAF:
-            raise InputError(f"cover.codes must be whole numbers from 0 to {LEAF}")
+        if len(self.forces) != leaves:
+            raise InputError(
+                f"forces must be those of the {leaves} cones that are not divided, got "
+                f"{len(self.forces)}"
+            )
 
     def leaves(self) -> Iterator[tuple[slice, Array]]:
         """Yield undivided cones by levels: their slice of `forces`, and their rays, (m, 6, 6)."""
@@ -118,10 +116,12 @@ class TwistCover(ByValue):
 
         The answer is False for arguments that are not regions, normals or friction.
         """
+        if not self.is_sound():
+            return False
         k = self.forces.shape[1]
         if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
             return False
-        placed = is_a(regions, Sequence) and len(regions) == k
+        placed = isinstance(regions, list | tuple) and len(regions) == k
         placed = placed and all(is_array(each, None, 3) and len(each) > 0 for each in regions)
         largest = np.abs(self.forces).max(axis=(1, 2), initial=0.0)
         lengths = np.linalg.norm(self.axes, axis=1)

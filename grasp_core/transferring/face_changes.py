@@ -39,14 +39,16 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.by_value import counted
 from grasp_core.checked import instance, number
+from grasp_core.declared import Declared, counted
 from grasp_core.errors import InputError
+from grasp_core.files.records import Key
+from grasp_core.kinds import FaceTurn
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -57,7 +59,7 @@ from grasp_core.planning.given_contacts import (
     nearest_in,
     nearest_like,
 )
-from grasp_core.settings import FaceTurn, value_of
+from grasp_core.settings import value_of
 from grasp_core.transferring.settings import Carrying
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -136,31 +138,31 @@ def _parts(body: Polyhedron) -> tuple[FlatPart, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class FaceChange:
+class FaceChange(Declared):
     """What became of one face of the old part."""
 
     old: int
     """Number of the face on the old part."""
     new: int | None
     """Number of its successor on the changed part; None if there is none."""
-    distance: float
+    distance: Annotated[float, Key("moved_m")]
     """How far the face moved, positive outwards, at its old centroid [m]; 0.0 without successor."""
-    turn: float
+    turn: Annotated[float, Key("turned_rad")]
     """Angle between the old and the new normal [rad]; 0.0 without successor."""
-    old_area: float
+    old_area: Annotated[float, Key("old_area_m2")]
     """Area on the old part [m^2]."""
-    new_area: float
+    new_area: Annotated[float, Key("new_area_m2")]
     """Area of the successor [m^2]; 0.0 without one."""
     moved: bool
     """Whether the face is gone, or its plane is another one by more than rounding."""
     normal: Triple
     """Inward unit normal on the old part."""
-    center: Triple
+    center: Annotated[Triple, Key("center_m")]
     """Centroid on the old part [m]."""
     likely: int | None = None
     """Number of the face that it probably became although it turned too far to succeed it; None if
     it has a successor, or no face is plausible."""
-    likely_turn: float = 0.0
+    likely_turn: Annotated[float, Key("likely_turned_rad")] = 0.0
     """Angle between the normals of these two [rad]; 0.0 without such a face."""
 
     @property

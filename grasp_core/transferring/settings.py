@@ -3,8 +3,9 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from grasp_core.kinds import FaceTurn, NotNegative, Quantity
 from grasp_core.mesh_files.limits import Unit
-from grasp_core.settings import FaceTurn, NotNegative, Quantity, Settings
+from grasp_core.settings import Settings
 
 
 @dataclass(frozen=True, slots=True, repr=False)

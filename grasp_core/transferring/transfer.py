@@ -20,20 +20,22 @@ other id stays. Where a new id is taken, the later grasp gets `-2`, `-3` and so 
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, TypeAlias, get_args
+from typing import Annotated, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from grasp_core.by_value import ByValue, counted, summary
 from grasp_core.checked import coefficient, instance, several
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import Declared, counted, summary
 from grasp_core.errors import UndecidedError
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
+from grasp_core.files.records import UNRECORDED, Key, recorded
+from grasp_core.kinds import Friction, Null, OrInfinity
 from grasp_core.objects.face_pieces import piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
@@ -42,6 +44,7 @@ from grasp_core.planning.reach import Finger, reach
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
     MM,
+    SAME,
     FaceChange,
     Likeness,
     added_faces,
@@ -68,33 +71,34 @@ DRAWS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class GraspFigures:
+class GraspFigures(Declared):
     """What contacts reach at a friction."""
 
-    closure_margin: float
+    closure_margin: Annotated[float, Null(-math.inf)]
     """Proved margin of force closure; zero or negative where the contacts are not closed."""
-    critical_friction: float
+    critical_friction: OrInfinity
     """Smallest Coulomb coefficient above which the contacts are in force closure; at most the
-    friction where they are closed, and infinite where none suffices."""
+    friction where they are closed, and infinite (null in files) where none suffices."""
     ferrari_canny: tuple[float, float]
     """Proved lower and upper bound of the quality [N]; zeros where the contacts are not closed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class CarriedContact(ByValue):
+class CarriedContact(Declared):
     """What became of one contact of a grasp on the changed part."""
 
     finger: int
+    """Index of the finger."""
     old_face: int
     """Number of the face of the old part on which the contact was."""
     new_face: int | None
     """Number of the face of the changed part that it is on now; None if it has no place there."""
     contact: Contact | None
     """The contact on the changed part, with the normal of its face; None if it has no place."""
-    distance: float
+    distance: Annotated[OrInfinity, Key("moved_m")]
     """How far it moved [m]; without a place, the distance of the nearest like face, which is
-    infinite if there is none."""
-    turn: float
+    infinite (null in files) if there is none."""
+    turn: Annotated[float, Key("turned_rad")]
     """Angle between its old normal and that of the nearest like face [rad]; 0.0 if there is none.
     """
 
@@ -106,10 +110,10 @@ class CarriedContact(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class CarriedGrasp(ByValue):
+class CarriedGrasp(Declared):
     """What became of one grasp on the changed part."""
 
-    old: Grasp
+    old: Annotated[Grasp, UNRECORDED]
     """The grasp of the old part."""
     status: Change
     """`same`, `better` or `worse` by the bands of this module; `gone` if there is no grasp."""
@@ -122,8 +126,18 @@ class CarriedGrasp(ByValue):
     after: GraspFigures | None
     """What its contacts reach on the changed part; None if a contact has no place there, or if
     closure cannot be decided."""
-    grasp: Grasp | None
+    grasp: Annotated[Grasp | None, UNRECORDED]
     """The grasp of the changed part, without regions; None exactly where the status is `gone`."""
+
+    @recorded
+    def id(self) -> str:
+        """The id of the grasp of the old part."""
+        return self.old.id
+
+    @recorded
+    def new_id(self) -> str | None:
+        """The id of the grasp of the changed part; None if it is gone."""
+        return None if self.grasp is None else self.grasp.id
 
     def __repr__(self) -> str:
         now = "none" if self.grasp is None else self.grasp.id
@@ -131,19 +145,19 @@ class CarriedGrasp(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Transfer(ByValue):
+class Transfer(Declared):
     """Grasps carried over to a changed part, with what became of its faces."""
 
-    old: Polyhedron
-    new: Polyhedron
-    friction: float
-    distance: float
+    old: Annotated[Polyhedron, UNRECORDED]
+    new: Annotated[Polyhedron, UNRECORDED]
+    friction: Friction
+    distance: Annotated[float, Key("distance_m")]
     """Largest distance by which a contact was allowed to move [m]."""
-    angle: float
+    angle: Annotated[float, Key("angle_rad")]
     """Largest angle between the normals of like faces [rad]."""
     faces: tuple[FaceChange, ...]
     """What became of each face of the old part, in order."""
-    added: tuple[int, ...]
+    added: Annotated[tuple[int, ...], Key("added_faces")]
     """Faces of the changed part that succeed no old one, ascending."""
     grasps: tuple[CarriedGrasp, ...]
     """What became of each grasp, in the order in which they were given."""
@@ -156,6 +170,27 @@ class Transfer(ByValue):
     def count(self, status: Change) -> int:
         """Return the number of grasps with a status."""
         return sum(each.status == status for each in self.grasps)
+
+    @recorded
+    def bands(self) -> Mapping[str, float]:
+        """Differences that do not count: of critical frictions, and of qualities as a share."""
+        return {
+            "critical_friction": FRICTION_BAND * self.friction,
+            "ferrari_canny_share": QUALITY_BAND,
+        }
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps of each status, and of contacts that moved or were lost."""
+        contacts = [each for grasp in self.grasps for each in grasp.contacts]
+        rounding = self.old.radius * SAME  # a contact on a face that stayed is put on its plane
+        placed = [each for each in contacts if each.contact is not None]
+        return {
+            "grasps": len(self.grasps),
+            **{status: self.count(status) for status in CHANGES},
+            "contacts_moved": sum(each.distance > rounding for each in placed),
+            "contacts_lost": len(contacts) - len(placed),
+        }
 
     @property
     def faces_in_words(self) -> str:

@@ -23,8 +23,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
+from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from scenes.drawing.colours import INK, LEVELS, NIGHT, PAPER, ramp_bytes

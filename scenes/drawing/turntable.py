@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
 from grasp_core.checked import path_of
+from grasp_core.declared import ByValue
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.objects.polyhedron import Polyhedron

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, rounded, to_digits
-from grasp_core.by_value import ByValue
 from grasp_core.checked import coefficient, number
 from grasp_core.closure.contacts import contact_frames, unit_size
 from grasp_core.closure.decision import deepest_forces
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import ByValue, Declared
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import face_under
 from grasp_core.objects.polyhedron import Polyhedron
@@ -59,7 +59,7 @@ too fast."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FingerDrive(ByValue):
+class FingerDrive(Declared):
     """How one fingertip is built and driven."""
 
     radius_m: float

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.by_value import ByValue
+from grasp_core.declared import ByValue
 from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron

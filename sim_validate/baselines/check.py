@@ -10,15 +10,18 @@ from typing import Any
 from grasp_core.errors import InputError
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import arithmetic, versions
-from sim_validate.baselines.baseline import Baseline, entry_of
+from scenes.settings import FingerSettings
+from sim_validate.baselines.baseline import Baseline, Entry, How
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
-from sim_validate.baselines.settings import How, settings_of
+from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.closure.validate import Job, prepared, verdict_of
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.gate import require_faithful
+from sim_validate.engine.setup import Setup, with_planned_radius
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.processes import each, processes
 
 Report = Callable[[int, int], None]
@@ -74,18 +77,17 @@ def measured(
             executions[job.grasp.id] = found
         report(len(jobs) + done, total)
     entries = [
-        entry_of(grasp, verdicts[grasp.id], saved.body.radius, executions.get(grasp.id))
+        Entry.of(verdicts[grasp.id], executions.get(grasp.id))
         for grasp in chosen
         if grasp.id in verdicts and grasp.id not in refused
     ]
     kept = Baseline(
         grasps_file=about[0],
         limit=about[1],
-        object=saved.body.name,
-        content_sha256=saved.body.content_sha256,
+        object=AboutObject.of(saved.body),
         friction=saved.friction,
         planned_radius_m=_planned_radius(saved),
-        settings=settings_of(how),
+        settings=how,
         versions=versions(),
         arithmetic=arithmetic(),
         entries=tuple(sorted(entries, key=lambda entry: entry.id)),
@@ -107,6 +109,12 @@ def complete(found: Measured, now: Present) -> Baseline:
         raise InputError("; ".join(found.refused.values()))
     unit, scale = now.file_lengths
     return replace(found.baseline, part=now.recorded, unit=unit, scale=scale)
+
+
+def setup_for(saved: Plan, path: Path | None) -> Setup:
+    """Build the setup of grasps: with their planned fingertips, then with a settings file."""
+    setup = Setup(fingers=with_planned_radius(FingerSettings(), saved.finger))
+    return setup if path is None else setup_from_file(path, setup)
 
 
 def with_planned_fingers(how: How, before: Baseline, saved: Plan) -> How:
@@ -174,8 +182,7 @@ def _carried(now: Present) -> Carried | None:
 
 def _nothing_measured(before: Baseline, now: Present) -> Measured:
     """Return a measurement of no grasp, on the part as it is now."""
-    body = now.saved.body
-    return Measured(replace(before, entries=(), content_sha256=body.content_sha256), {}, {})
+    return Measured(replace(before, entries=(), object=AboutObject.of(now.saved.body)), {}, {})
 
 
 def demanded(done: Checked) -> Checked:

@@ -5,18 +5,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from grasp_core.files.records import record_of
 from grasp_core.planning.result import Plan
 from grasp_core.settings import extended
 from sim_validate.baselines import flags as baseline_flags
-from sim_validate.baselines.baseline import check_writable, fields_of, read_baseline, write_baseline
-from sim_validate.baselines.check import Checked, check, complete, measured, seen_from
+from sim_validate.baselines.baseline import How, check_writable, read_baseline, write_baseline
+from sim_validate.baselines.check import Checked, check, complete, measured, seen_from, setup_for
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.part import Present, present, source_of, testable
-from sim_validate.baselines.settings import How, of_settings, setup_for
 from sim_validate.closure.asked_trials import check_noise
 from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.engine.setup import Agenda
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.planning.wrenches_json import wrenches_from_file
@@ -52,7 +52,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     saved = read_grasps(path)
     now = _present(saved, path, command.baseline, command, before.scale)
     now = now.against(before)
-    how = of_settings(before.settings, str(command.baseline))
+    how = before.settings
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))
     where = seen_from(command.baseline, path)
@@ -98,28 +98,10 @@ def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
 
 
 def _show(done: Checked, reporter: Reporter) -> None:
-    told = [finding for finding in done.findings if finding.status is not Status.SAME]
-    rows = list[tuple[str, ...]]()
-    for each in told:  # reasons, and further differences beyond their bands
-        more = [text for text in each.beyond if text not in each.reasons]
-        rows.append((each.id, each.status.value, "; ".join([*each.reasons, *more])))
-    if rows:
-        title = "grasps that differ from the baseline"
-        reporter.table(title, ("grasp", "status", "why"), rows[:TABLE_ROWS])
-        say_cut(len(rows), reporter)
+    differing = [finding for finding in done.findings if finding.status is not Status.SAME]
+    reporter.records("grasps that differ from the baseline", differing)
     counts = Counter(finding.status.value for finding in done.findings)
     reporter.say(", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
     reporter.say(f"compared {done.how}")
-    listed = [_record(finding) for finding in done.findings]
+    listed = [record_of(finding) for finding in done.findings]
     reporter.document({"counts": dict(counts), "compared": done.how, "grasps": listed})
-
-
-def _record(finding: Finding) -> dict[str, object]:
-    return {
-        "id": finding.id,
-        "status": finding.status.value,
-        "reasons": list(finding.reasons),
-        "differences": list(finding.differences),
-        "before": None if finding.before is None else fields_of(finding.before),
-        "after": None if finding.after is None else fields_of(finding.after),
-    }

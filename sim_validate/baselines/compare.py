@@ -9,25 +9,23 @@ bands are wide enough for what no user would call better or worse.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import radians
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
+from grasp_core.declared import Declared
+from grasp_core.figures import Compared, Shown, Worse, compared, figure, unit_of
+from grasp_core.files.records import UNRECORDED, record_of
 from grasp_core.transferring.transfer import FRICTION_BAND
-from sim_validate.baselines.baseline import DIGITS, Baseline, Entry, ExecutionEntry
+from sim_validate.baselines.baseline import DIGITS, Baseline, Entry
 from sim_validate.engine.traces import LET_GO, Outcome
-from sim_validate.execution.verdict import may_slip
 
 DIGITS_OF_CHANGE = 2
 LEAST_DIGITS = 4
 DECISIVE = ("graspproof", "mujoco", "machine")
 ASIDE = "python"
-Rows = tuple[tuple[str, float, float, float], ...]
-"""Name, relative and absolute band, and sign of each number: of 1 a larger number is worse."""
-PREDICTED = ("load_multiple", "predicted_first_slip")
-"""Numbers of an execution that the analysis gives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +53,14 @@ class Bands:
     same_part: bool = True
     """Whether the part is the same; on another one, other negative controls may exist."""
 
+    def of(self, name: str, how: Compared, before: float) -> float:
+        """Return how far a number may be from what it was; motions by the units of their names."""
+        unit = unit_of(name)
+        if unit in ("m", "rad"):
+            return self.displacement_m if unit == "m" else self.rotation_rad
+        share = self.predicted if how.analysed else self.simulated
+        return share * abs(before) + (self.least + self.friction * how.friction)
+
 
 @dataclass(frozen=True, slots=True)
 class Difference:
@@ -68,138 +74,106 @@ class Difference:
 
 
 def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...]:
-    """List every difference between two verdicts on a grasp."""
-    critical = bands.least + bands.friction
-    rows = (
-        ("critical_friction", bands.predicted, critical, 1.0),
-        ("simulated_critical_friction", bands.simulated, critical, 1.0),
-        ("limit_n", bands.predicted, bands.least, -1.0),
-        ("simulated_limit_n", bands.simulated, bands.least, -1.0),
-        ("displacement_m", 0.0, bands.displacement_m, 1.0),
-        ("rotation_rad", 0.0, bands.rotation_rad, 1.0),
-    )
-    return (
-        *_of_wrenches(one, other),
-        *_of_controls(one, other, bands),
-        *_of_numbers(one, other, rows),
-        *_of_repeats(one, other, bands),
-        *_of_executions(one.execution, other.execution, bands),
-    )
+    """List every difference between two verdicts on a grasp, and between its executions."""
+    found = [*differing_figures(one.verdict, other.verdict, bands)]
+    if one.execution is not None and other.execution is not None:  # else the settings differ
+        ran = one.execution.ran and other.execution.ran
+        executed = differing_figures(one.execution, other.execution, bands, numbers=ran)
+        found += [replace(each, text=f"execution: {each.text}") for each in executed]
+    return tuple(found)
 
 
-def _of_wrenches(one: Entry, other: Entry) -> Iterator[Difference]:
-    lost = [name for name in other.not_held if name not in one.not_held]
-    won = [name for name in one.not_held if name not in other.not_held]
-    if one.outcome is not other.outcome:
-        at = f" at {other.not_held[0]}" if other.not_held else ""
-        text = f"{one.outcome} -> {other.outcome}{at}"
-        yield Difference(text, worse=not other.held, of_holding=True)
-    if lost:
-        yield Difference(f"no longer held: {', '.join(lost)}", worse=True, of_holding=True)
-    if won:
-        yield Difference(f"held now: {', '.join(won)}", worse=False, of_holding=True)
-    if one.wrenches != other.wrenches:
-        text = f"wrenches: {one.wrenches} -> {other.wrenches}"
-        yield Difference(text, worse=other.wrenches < one.wrenches)
-    if one.mismatches != other.mismatches:
-        more = other.mismatches - one.mismatches
-        text = f"contradictions of the analysis: {one.mismatches} -> {other.mismatches}"
-        yield Difference(text, more > 0, of_holding=abs(more) <= len(lost) + len(won))
-
-
-def _of_controls(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
-    before, after = (entry.controls - entry.controls_let_go for entry in (one, other))
-    if before != after:
-        text = f"negative controls that were not let go: {before} -> {after}"
-        yield Difference(text, worse=after > before)
-    if one.controls != other.controls:
-        text = f"negative controls: {one.controls} -> {other.controls}"
-        yield Difference(text, worse=other.controls < one.controls, counts=bands.same_part)
-
-
-def _of_numbers(
-    one: Entry | ExecutionEntry, other: Entry | ExecutionEntry, rows: Rows, aside: bool = False
+def differing_figures(
+    one: Declared, other: Declared, bands: Bands, *, numbers: bool = True
 ) -> Iterator[Difference]:
-    """Compare measured numbers; in executions None is infinite, so more than any number.
+    """Compare two records of a class as their class declares it.
 
-    What an execution measures does not count where it is put aside.
+    A part that one of them lacks has no items. Measured `numbers` are left out where only one of
+    them has any, which other figures say.
     """
-    execution = isinstance(one, ExecutionEntry)
-    for name, relative, absolute, sign in rows:
-        before, after = getattr(one, name), getattr(other, name)
-        if before == after:
+    listed = compared(type(one))
+    flips = sum(
+        len({*(each.of(one) or ())} ^ {*(each.of(other) or ())})
+        for each in listed
+        if each.compared and each.compared.items and each.compared.follows
+    )
+    for each in listed:
+        how, before, after = each.compared, each.of(one), each.of(other)
+        if each.lacking(one):
+            before = type(after)()
+        if each.lacking(other):
+            after = type(before)()
+        if how is None or how.worse is None or _same(before, after):
             continue
-        text, counts = f"{before} -> {after}", True
-        if before is None or after is None:
-            worse = (before if execution else after) is None
+        near = [close.of(record) for close in listed if close.name == how.close
+                for record in (one, other)]  # fmt: skip
+        if how.items is not None:
+            close = set[Any]() if bands.exact else {item for items in near for item in items}
+            yield from _of_items(how, before, after, close)
+        elif isinstance(before, float) or isinstance(after, float):
+            aside = bands.grey > 0.0 and any(near)
+            band = math.inf if aside else bands.of(each.name, how, before or 0.0)
+            if numbers:
+                text, worse, counts = _of_number(before, after, band, how.worse)
+                yield Difference(f"{each.called}: {text}", worse, counts, how.follows)
         else:
-            band = relative * before + absolute
-            text, worse = _figures(before, after, band), sign * (after - before) > 0.0
-            counts = abs(after - before) > band and not (aside and name not in PREDICTED)
-        said = f"execution: {name}: {text}" if execution else f"{name}: {text}"
-        holding = not execution and name in ("displacement_m", "rotation_rad")
-        yield Difference(said, worse, counts, holding)
+            count = isinstance(before, int) and not isinstance(before, bool)
+            yield Difference(
+                f"{each.called}: {_said(before)} -> {_said(after)}",
+                worse=how.worse(before, after),
+                counts=bands.same_part or not how.of_part,
+                of_holding=how.follows and not (count and abs(after - before) > flips),
+            )
 
 
-def _figures(before: float, after: float, band: float) -> str:
+def _same(before: Any, after: Any) -> bool:
+    return before == after or (_is_nan(before) and _is_nan(after))
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "none" if value is None else f"{value}"
+
+
+def _of_items(
+    how: Compared, before: Sequence[Any], after: Sequence[Any], close: set[Any]
+) -> Iterator[Difference]:
+    """Compare two lists of what went wrong; changes of `close` items alone do not count."""
+    came = [item for item in after if item not in before]
+    went = [item for item in before if item not in after]
+    for words, items, worse in zip(how.items or (), (came, went), (True, False), strict=True):
+        if items:
+            text = f"{words}: {', '.join(map(str, items))}"
+            yield Difference(text, worse, bool({*items} - close), how.follows)
+
+
+def _of_number(
+    before: float | None, after: float | None, band: float, worse: Worse
+) -> tuple[str, bool, bool]:
+    """Say how a number differs, whether that is worse, and whether it counts.
+
+    A number that is no longer measured is worse, and each change from or to infinity counts.
+    """
+    if before is None or after is None or _is_nan(before) or _is_nan(after):
+        return f"{before} -> {after}", after is None or _is_nan(after), True
+    if math.isinf(before) or math.isinf(after):
+        return f"{before} -> {after}", worse(before, after), True
+    change = _change(before, after, band)
+    return change, worse(before, after), abs(after - before) > band
+
+
+def _change(before: float, after: float, band: float) -> str:
     """Write a number before and after, to two digits of what changed, and its band."""
     change, largest = after - before, max(abs(before), abs(after))
     digits = math.ceil(math.log10(largest / abs(change))) + DIGITS_OF_CHANGE
     digits = min(max(digits, LEAST_DIGITS), DIGITS)
     share = f"{100.0 * change / before:+.2g} %, " if before > 0.0 else ""
     return f"{before:.{digits}g} -> {after:.{digits}g} ({share}band {band:.2g})"
-
-
-def _of_repeats(one: Entry, other: Entry, bands: Bands) -> Iterator[Difference]:
-    """Compare each repeat with the same repeat of the baseline, as both draw the same noise."""
-    if one.noisy_trials != other.noisy_trials:
-        text = f"repeats with noise: {one.noisy_trials} -> {other.noisy_trials}"
-        yield Difference(text, worse=other.noisy_trials < one.noisy_trials)
-        return
-    close = {*one.noisy_close, *other.noisy_close} if not bands.exact else set[int]()
-    before, after = {*one.noisy_not_held}, {*other.noisy_not_held}
-    for text, flipped, worse in (("no longer held", after - before, True),
-                                 ("held now", before - after, False)):  # fmt: skip
-        if flipped:
-            numbers = ", ".join(map(str, sorted(flipped)))
-            counts = bool(flipped - close)
-            yield Difference(f"repeats with noise {text}: {numbers}", worse, counts=counts)
-
-
-def _of_executions(
-    one: ExecutionEntry | None, other: ExecutionEntry | None, bands: Bands
-) -> Iterator[Difference]:
-    if one is None or other is None:  # then the settings differ, and nothing is comparable
-        return
-    if one.survived != other.survived:
-        said = ["survived" if each.survived else "did not survive" for each in (one, other)]
-        yield Difference(f"execution: {said[0]} -> {said[1]}", worse=not other.survived)
-    if one.reason != other.reason:
-        text = f"execution: {one.reason or 'executed'} -> {other.reason or 'executed'}"
-        yield Difference(text, worse=other.reason is not None)
-    if lost := [name for name in other.lost if name not in one.lost]:
-        yield Difference(f"execution: no longer survived: {', '.join(lost)}", worse=True)
-    if won := [name for name in one.lost if name not in other.lost]:
-        yield Difference(f"execution: survived now: {', '.join(won)}", worse=False)
-    if one.trials != other.trials:
-        text = f"execution: trials: {one.trials} -> {other.trials}"
-        yield Difference(text, worse=other.trials < one.trials)
-    before, after = (entry.controls - entry.controls_let_go for entry in (one, other))
-    if before != after:
-        text = f"execution: controls that did not slip: {before} -> {after}"
-        yield Difference(text, worse=after > before)
-    if one.trials and other.trials:
-        # how far a contact slides, once it slips, depends on rounding too much to count by itself
-        slides = any(may_slip(entry.predicted_first_slip) for entry in (one, other))
-        rows = (
-            ("load_multiple", bands.predicted, bands.least, -1.0),
-            ("predicted_first_slip", bands.predicted, bands.least, -1.0),
-            ("simulated_first_slip", bands.simulated, bands.least, -1.0),
-            ("slip_m", 0.0, bands.displacement_m, 1.0),
-            ("displacement_m", 0.0, bands.displacement_m, 1.0),
-            ("turn_rad", 0.0, bands.rotation_rad, 1.0),
-        )
-        yield from _of_numbers(one, other, rows, aside=slides and bands.grey > 0.0)
 
 
 class Status(StrEnum):
@@ -262,18 +236,28 @@ class Carried:
     gone: Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Finding(Declared):
     """How one grasp has changed since the baseline."""
 
-    id: str
-    status: Status
+    id: Annotated[str, Shown("grasp")]
+    status: Annotated[Status, Shown("status")]
     reasons: tuple[str, ...] = ()
     differences: tuple[str, ...] = ()
-    beyond: tuple[str, ...] = ()
+    beyond: Annotated[tuple[str, ...], UNRECORDED] = ()
     """Those of the differences that are beyond their bands."""
     before: Entry | None = None
     after: Entry | None = None
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """The differences beyond their bands that are no reason for the status."""
+        return tuple(text for text in self.beyond if text not in self.reasons)
+
+    @figure
+    def why(self) -> Annotated[str, Shown("why")]:
+        """The reasons, and further differences beyond their bands."""
+        return "; ".join([*self.reasons, *self.further])
 
 
 def bands_between(
@@ -330,26 +314,27 @@ def compare(
 
 
 def _is_other_part(before: Baseline, after: Baseline) -> bool:
-    return before.content_sha256 != after.content_sha256
+    return before.object.content_sha256 != after.object.content_sha256
 
 
 def _changed(before: Baseline, after: Baseline, carried: Carried | None) -> Iterator[str]:
     if carried is None and _is_other_part(before, after):
-        named = f"{before.object} -> {after.object}"
+        one, other = before.object.name, after.object.name
         again = (
-            f"{before.object} has another shape than in the baseline; write the baseline again "
+            f"{one} has another shape than in the baseline; write the baseline again "
             "with --grasp-bless if that is meant"
         )
-        yield f"the object is another one: {again if before.object == after.object else named}"
+        yield f"the object is another one: {again if one == other else f'{one} -> {other}'}"
     if before.friction != after.friction:
         yield f"friction: {before.friction} -> {after.friction}"
     if before.planned_radius_m != after.planned_radius_m:
         radii = f"{before.planned_radius_m} -> {after.planned_radius_m}"
         yield f"fingertips that were planned for: radius_m {radii}"
-    yield from _settings_changed("", dict(before.settings), dict(after.settings))
+    yield from _settings_changed("", record_of(before.settings), record_of(after.settings))
 
 
 def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
+    before, after = _by_name(before), _by_name(after)
     if isinstance(before, dict) and isinstance(after, dict):
         one, other = cast("dict[str, Any]", before), cast("dict[str, Any]", after)
         for name in sorted({*one, *other}):
@@ -357,6 +342,14 @@ def _settings_changed(where: str, before: Any, after: Any) -> Iterator[str]:
             yield from _settings_changed(inside, one.get(name), other.get(name))
     elif before != after:
         yield f"{where}: {before} -> {after}"
+
+
+def _by_name(value: Any) -> Any:
+    """Return a list of named wrenches by their names, and all else as it is."""
+    items = cast("list[Any]", value if isinstance(value, list) else [None])
+    if not all(isinstance(item, dict) for item in items):
+        return cast("Any", value)
+    return {item["name"]: item["wrench"] for item in items}
 
 
 def _gone(
@@ -384,8 +377,9 @@ def _compared(
         changed = (*changed, "the contacts are others")
     if changed:
         return Finding(one.id, Status.NOT_COMPARABLE, changed, texts, beyond, one, other)
-    brink = abs(friction - one.critical_friction) <= bands.grey * friction
-    decided = all(entry.outcome in (Outcome.HELD, *LET_GO) for entry in (one, other))
+    brink = abs(friction - one.verdict.predicted_critical_friction) <= bands.grey * friction
+    outcomes = [entry.verdict.outcome for entry in (one, other)]
+    decided = all(outcome in (Outcome.HELD, *LET_GO) for outcome in outcomes)
     grey = brink and decided and one.held != other.held
     counting = [each for each in every if each.counts and not (grey and each.of_holding)]
     if any(each.worse for each in counting):
@@ -398,7 +392,7 @@ def _compared(
         status = Status.SAME if one == other else Status.WITHIN
     reasons = tuple(each.text for each in counting if each.worse is (status is Status.REGRESSED))
     if status is Status.GREY:
-        reasons = (f"{one.outcome} -> {other.outcome}, at its critical friction",)
+        reasons = (f"{' -> '.join(outcomes)}, at its critical friction",)
     if moved is not None:
         reasons = (f"{WORDS[status]} on the changed part: {moved}", *reasons)
     return Finding(one.id, status, reasons, texts, beyond, one, other)

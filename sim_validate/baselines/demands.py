@@ -7,32 +7,25 @@ from typing import Annotated, Any
 
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
+from grasp_core.kinds import Range, Share
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
-from grasp_core.settings import (
-    RandomWrenches,
-    Range,
-    Repeats,
-    Seed,
-    Settings,
-    Share,
-    for_users,
-    named,
-)
+from grasp_core.settings import CHOSEN, Settings, for_users, named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.explain import not_survived, unstable
 from sim_validate.baselines.part import TABLE, IfChanged, Source, present, source_of
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
-from sim_validate.engine.settings import Noise
-from sim_validate.engine.setup import Agenda, NamedWrench, Setup
+from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.planning.grasps_json import read_grasps
+from sim_validate.settings.executions import ExecutionSettings
 
 FRICTION = 0.5
+TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")
+"""Settings of an agenda that a test may give by their names."""
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 
 
@@ -134,19 +127,16 @@ class Demands(Settings):
         InputError: A number is missing or out of range, or a pass rate is given without repeats.
     """
 
-    wrenches: tuple[NamedWrench, ...] = ()
-    repeats: Repeats = 0
-    noise: Noise = field(default_factory=Noise)
+    agenda: Annotated[Agenda, CHOSEN] = field(default_factory=Agenda)
+    """Which trials the grasp goes through; a test gives those of `TRIALS` by their names."""
     min_pass_rate: Share = 0.0
     """Least share of the repeats with noise in which the grasp must hold."""
     min_margin: Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)] = 0.0
     """Least difference between the friction and the critical one, both predicted and simulated."""
-    random_wrenches: RandomWrenches = 0
-    seed: Seed = 0
     setup: Setup = field(default_factory=Setup)
 
     def _check_together(self) -> None:
-        if self.min_pass_rate > 0.0 and not self.repeats:
+        if self.min_pass_rate > 0.0 and not self.agenda.repeats:
             raise InputError(
                 "min_pass_rate is a share of repeats with noise: give their number as `repeats`"
             )
@@ -154,19 +144,16 @@ class Demands(Settings):
 
 def demands_of(asked: Mapping[str, Any]) -> Demands:
     """Build the demands from the arguments of a test."""
-    return Demands(**named(asked, for_users(Demands), "assert_stable"))
+    given = named(asked, (*TRIALS, *for_users(Demands)), "assert_stable")
+    agenda = Agenda(**{name: given.pop(name) for name in TRIALS if name in given})
+    return Demands(agenda=agenda, **given)
 
 
 def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
     """Simulate a grasp, and say in what it falls short of the demands."""
-    agenda = Agenda(
-        random_wrenches=demands.random_wrenches,
-        wrenches=tuple(demands.wrenches),
-        repeats=demands.repeats,
-        noise=demands.noise,
-        seed=demands.seed,
+    verdict = validate(
+        case.body, case.grasp, case.friction, agenda=demands.agenda, setup=demands.setup
     )
-    verdict = validate(case.body, case.grasp, case.friction, agenda=agenda, setup=demands.setup)
     said, lacking = unstable(verdict), list(_lacking(verdict, demands))
     if lacking and not said:
         said = f"{verdict.id} at friction {verdict.friction}: less than is asked for"

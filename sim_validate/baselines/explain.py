@@ -1,17 +1,20 @@
 """Explains in words why a grasp is not as stable as it must be, and how to look at it."""
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from grasp_core.by_value import counted
-from sim_validate.baselines.baseline import Baseline, Entry
+from grasp_core.declared import Declared, counted
+from grasp_core.figures import NONE, Shown, cell, compared
+from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.check import Checked
-from sim_validate.baselines.compare import WORDS, Status
+from sim_validate.baselines.compare import WORDS, Finding, Status
 from sim_validate.baselines.part import Present
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.engine.setup import AXIS_NAMES, WEAKEST
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
+
+PLAIN = Shown("", infinite="infinite")
 
 
 def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
@@ -20,10 +23,9 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     verdict, how = done.measured.verdicts.get(finding.id), done.how
     executed = done.measured.executions.get(finding.id)
     lines = [f"{finding.id}: {finding.status.value}", *(f"  {why}" for why in finding.reasons)]
-    lines += [f"  {text}" for text in finding.beyond if text not in finding.reasons]
+    lines += [f"  {text}" for text in finding.further]
     lines += [f"  compared {how}"] if how and finding.after is not None else []
-    for title, entry in (("baseline", finding.before), ("now", finding.after)):
-        lines += [] if entry is None else _numbers(title, entry)
+    lines += _figures(finding)
     failed = verdict.failures[0] if verdict is not None and verdict.failures else None
     if failed is not None:
         lines.append(f"  first wrench that was not held: {in_words(failed)}")
@@ -104,28 +106,25 @@ def in_words(trial: WrenchVerdict) -> str:
     )
 
 
-def _numbers(title: str, entry: Entry) -> Iterator[str]:
-    failed = f" at {entry.not_held[0]}" if entry.not_held else ""
-    moved = entry.displacement_m
-    yield f"  {title}: {entry.outcome}{failed}" + (
-        "" if moved is None else f", moved {moved:.2g} m"
-    )
-    for name, predicted, simulated, unit in (
-        ("critical friction", entry.critical_friction, entry.simulated_critical_friction, ""),
-        ("weakest wrench", entry.limit_n, entry.simulated_limit_n, " N"),
-    ):
-        found = "not measured in simulation"
-        found = found if simulated is None else f"{simulated:.4g}{unit} simulated"
-        yield f"    {name} {predicted:.4g}{unit} predicted, {found}"
-    if entry.noisy_trials:
-        held = entry.noisy_trials - len(entry.noisy_not_held)
-        yield f"    with noise {held} of {entry.noisy_trials} held"
-    if (executed := entry.execution) is not None:
-        lost = f"lost {', '.join(executed.lost)}" if executed.lost else executed.reason
-        yield f"    executed: {'survived' if executed.survived else lost or 'no trial is possible'}"
-        slips = (executed.predicted_first_slip, executed.simulated_first_slip)
-        said = ["none" if slip is None else f"{slip:.4g} times the load" for slip in slips]
-        yield f"    first slip predicted: {said[0]}; simulated: {said[1]}"
+def _figures(finding: Finding) -> Iterator[str]:
+    """Yield a line for each figure of a grasp, in the baseline and now."""
+    entries = (finding.before, finding.after)
+    if entries == (None, None):
+        return
+    rows = [*_rows([entry and entry.verdict for entry in entries], "")]
+    rows += _rows([entry and entry.execution for entry in entries], "execution: ")
+    width = max(len(name) for name, *_ in rows)
+    for name, *cells in [("", "baseline", "now"), *rows]:
+        yield f"    {name:<{width}}" + "".join(f"{cell:>14}" for cell in cells)
+
+
+def _rows(records: Sequence[Declared | None], start: str) -> Iterator[tuple[str, ...]]:
+    """Yield what differences call each figure that a record has, and its cells in SI units."""
+    kind = next((type(record) for record in records if record is not None), None)
+    for each in () if kind is None else compared(kind):
+        cells = [cell(each.of(record), PLAIN) for record in records]
+        if {*cells} != {NONE}:
+            yield (f"{start}{each.called}", *cells)
 
 
 def not_survived(grasp: ExecutedGrasp) -> str:

@@ -254,12 +254,12 @@ class Present:
         found = replace(self, recorded_unit=before.unit)
         if part is None or part.planned_sha256 != planned.content_sha256:
             return found
-        if now.content_sha256 == before.content_sha256:
+        if now.content_sha256 == before.object.content_sha256:
             return replace(found, since=Moves())
         if self.source.file is None or self.asked.refuse:
             return found
         rule = likeness(planned, self.asked.distance_m, self.asked.angle_deg)
-        then = part.body(planned.name, before.content_sha256)
+        then = part.body(planned.name, before.object.content_sha256)
         numbers = {
             change.new: change.old
             for change in face_changes(planned, then, rule)

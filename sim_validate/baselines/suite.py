@@ -10,9 +10,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from grasp_core.errors import InputError, about
+from grasp_core.kinds import RandomWrenches, Repeats, Seed
 from grasp_core.planning.result import Plan
-from grasp_core.settings import CHOSEN, RandomWrenches, Repeats, Seed, Settings
-from sim_validate.baselines.baseline import Baseline, check_writable, read_baseline, write_baseline
+from grasp_core.settings import CHOSEN, Settings
+from sim_validate.baselines.baseline import (
+    Baseline,
+    How,
+    check_writable,
+    read_baseline,
+    write_baseline,
+)
 from sim_validate.baselines.check import (
     Checked,
     check_one,
@@ -20,6 +27,7 @@ from sim_validate.baselines.check import (
     demanded,
     measured,
     seen_from,
+    setup_for,
     with_planned_fingers,
 )
 from sim_validate.baselines.part import (
@@ -31,13 +39,12 @@ from sim_validate.baselines.part import (
     source_of,
     testable,
 )
-from sim_validate.baselines.settings import How, of_settings, setup_for
-from sim_validate.engine.settings import LimitSearch, Noise
 from sim_validate.engine.setup import Agenda
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.kit.toml_tables import read_tables
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.planning.wrenches_json import wrenches_from_file
+from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings.trials import LimitSearch, Noise
 
 ENDING = ".grasps.toml"
 GIVEN = ("limits", "random_wrenches", "repeats", "noise", "seed")
@@ -154,7 +161,7 @@ class Suite(Settings):
         if before is None:
             how = How(setup_for(self.saved, None), Agenda(seed=self.saved.seed))
         else:
-            how = of_settings(before.settings, str(self.baseline))
+            how = before.settings
         setup = how.setup if self.setup is None else setup_for(self.saved, self.setup)
         execution = how.execution if self.execution is None else self.execution
         if self.survives and execution is None:

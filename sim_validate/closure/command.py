@@ -5,19 +5,15 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
-import numpy as np
-
 from grasp_core.planning.result import Plan
-from grasp_core.values import Grasp
 from sim_validate.closure.asked_trials import prepared
 from sim_validate.closure.validate import Job, validated
-from sim_validate.closure.verdict import Verdict
-from sim_validate.closure.verdicts_json import summary, trace_arrays, verdicts_to_json
+from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut, warn_of
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.kit.writing import write_arrays
@@ -67,50 +63,27 @@ def simulate_grasps(
         return verdict.held
 
     results = reporter.counted("simulating", validated(tasks, jobs), len(tasks), "held", kept)
-    text_of = partial(verdicts_to_json, saved.body, saved.friction, gate=gate)
-    path = folder and folder / "verdicts.json"
-    verdicts, text = finished(results, len(tasks), text_of, path, reporter)
-    _show(saved.grasps, verdicts, setup, reporter)
-    good = all(verdict.good for verdict in verdicts)
-    return (Exit.GOOD if good else Exit.NEGATIVE), text
+    collect = partial(Verdicts.of, saved.body, saved.friction, gate)
+    path = folder and folder / Verdicts.FILE
+    found = finished(results, len(tasks), collect, path, reporter)
+    _show(found, setup, reporter)
+    good = all(verdict.good for verdict in found)
+    return (Exit.GOOD if good else Exit.NEGATIVE), found.text()
 
 
-def _show(
-    grasps: Sequence[Grasp], verdicts: Sequence[Verdict], setup: Setup, reporter: Reporter
-) -> None:
-    limited = bool(verdicts) and verdicts[0].agenda.limits != "none"
-    rows: list[tuple[str, ...]] = []
-    for grasp, verdict in zip(grasps[:TABLE_ROWS], verdicts, strict=False):
-        # the maximum is NaN if one is
-        worst = np.max([trial.hold.displacement_m for trial in verdict.wrenches])
-        let_go = sum(control.let_go for control in verdict.controls)
-        friction = verdict.critical_friction
-        rows.append(
-            (grasp.id, grasp.family, f"{friction.predicted:.4f}",
-             "-" if friction.simulated is None else f"{friction.simulated:.4f}",
-             *([_limit_range(verdict)] if limited else []),
-             verdict.outcome.value, f"{1e6 * worst:.2g}", f"{let_go} of {len(verdict.controls)}")
-        )  # fmt: skip
-    ends = ("outcome", "um moved", "controls let go")
-    columns = ("grasp", "family", "mu*", "in sim", *(["limits"] if limited else []), *ends)
-    reporter.table("verdicts", columns, rows)
-    say_cut(len(verdicts), reporter)
-    _show_robustness(verdicts, reporter)
-    totals = summary(verdicts)
+def _show(verdicts: Verdicts, setup: Setup, reporter: Reporter) -> None:
+    reporter.records("verdicts", verdicts.verdicts)
+    _show_robustness(verdicts.verdicts, reporter)
+    totals = verdicts.summary
     reporter.say(
         f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches, at "
         f"{100.0 * setup.hold.load_share:g} % of what they resist; {totals['controls_let_go']} of "
         f"{totals['controls']} negative controls were let go (all should), "
         f"{totals['controls_held']} held"
     )
-    warn_of(_surprises(verdicts), "verdicts.json", reporter)
+    warn_of(_surprises(verdicts.verdicts), "verdicts.json", reporter)
     if not totals["controls"]:
         reporter.warn("there were no negative controls: nothing shows that this test can fail")
-
-
-def _limit_range(verdict: Verdict) -> str:
-    shares = [trial.simulated_limit.share for trial in verdict.wrenches if trial.simulated_limit]
-    return f"{min(shares):.3f}-{max(shares):.3f}" if shares else "-"
 
 
 def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:

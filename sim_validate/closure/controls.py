@@ -11,17 +11,21 @@ balance.
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross, rounded, to_digits
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Wrench, cross, rounded, to_digits
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import Declared
 from grasp_core.errors import SolverError, UndecidedError
+from grasp_core.figures import Shown
+from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.forces.contact_forces import least_friction_forces
+from grasp_core.kinds import Friction, Many
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from sim_validate.engine.bench import Bench
@@ -41,13 +45,21 @@ TOWARD_CORNER = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Control(ByValue):
+class Control(Declared):
     """A negative control: contacts that must not hold, with the proof that they cannot."""
 
-    name: str
-    contacts: tuple[Contact, ...]
-    friction: float
+    name: Annotated[str, Shown("control")]
+    friction: Annotated[Friction, Shown("friction")]
+    """The coefficient of the control: that of the run, or 0.9 of the critical friction
+    (`low_friction`)."""
     certificate: ClosureCertificate
+    """The proof that its contacts are not in force closure."""
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts, which the certificate is about."""
+        proof = self.certificate
+        return tuple(map(Contact, proof.positions, proof.normals))
 
     def separating_wrench(self, center: Array) -> Array:
         """The wrench that the contacts provably cannot resist, (6,), with torque about `center`."""
@@ -127,7 +139,7 @@ def _refuted(
     except UndecidedError:
         return
     if not certificate.closed:
-        yield Control(name, tuple(contacts), friction, certificate)
+        yield Control(name, friction, certificate)
 
 
 SEPARATING = "separating"
@@ -147,30 +159,30 @@ class ControlLoad:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ControlTrial(ByValue):
+class ControlTrial(Declared):
     """One simulated trial of a negative control under one load."""
 
     name: str
-    wrench: Array
+    wrench: Wrench
     required_friction: float | None
     """Friction coefficient that the planned forces need; None if no forces balance the wrench."""
-    hold: HoldVerdict
-    trace: Trace | None
+    hold: Annotated[HoldVerdict, FLAT]
+    trace: Annotated[Trace | None, UNRECORDED] = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ControlVerdict(ByValue):
+class ControlVerdict(Declared):
     """How a negative control, a contact set proved not to be force-closed, ended in simulation."""
 
-    control: Control
-    tried: tuple[ControlTrial, ...]
+    control: Annotated[Control, FLAT]
+    tried: Annotated[tuple[ControlTrial, ...], Many(), Key("trials")]
 
-    @property
+    @recorded
     def held(self) -> bool:
         """Whether the control held any of the loads, which it must not."""
         return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
 
-    @property
+    @recorded
     def let_go(self) -> bool:
         """Whether the object moved in every trial, as it must."""
         return all(trial.hold.outcome in LET_GO for trial in self.tried)

@@ -9,19 +9,18 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled, state_of
 from grasp_core.cones.pyramids import inscribed_share
 from grasp_core.families.placements import KEPT
+from grasp_core.files.records import record_of
 from grasp_core.planning.planner import plan
 from grasp_core.provenance import versions
 from scenes.drawing.clips import GraphicsError, available_graphics, has_display, remedy
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import validate
-from sim_validate.closure.verdicts_json import gate_record
 from sim_validate.engine.gate import measured_gate
 from sim_validate.engine.setup import Setup
 from sim_validate.kit import command_flags
 from sim_validate.kit.compiling import EVERYTHING, compile_loops
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.fields import finite
 from sim_validate.kit.processes import available_cores
 
 LOOPS = {
@@ -50,8 +49,8 @@ def check_installation(command: command_flags.Doctor, reporter: Reporter) -> int
         "simulated controls do not": bool(verdict and verdict.controls and verdict.controls_let_go),
     }
     machine = _machine()
-    record = {"versions": versions(), "machine": machine, "gate": gate_record(gate)}
-    reporter.document(finite(record | {"checks": checks}))
+    record = {"versions": versions(), "machine": machine, "gate": record_of(gate)}
+    reporter.document(record | {"checks": checks})
     reporter.table("versions", ("what", "version"), list(versions().items()))
     cases = [
         (check.name, f"{check.value:.5g}", f"{check.least:.5g} to {check.largest:.5g}")

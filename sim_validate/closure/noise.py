@@ -36,9 +36,9 @@ from sim_validate.closure.verdict import AGREEMENT, NoisyTrial, Robustness, Wren
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.loads import PlannedLoad, loads_as_they_are
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.settings import Noise
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
+from sim_validate.settings.trials import Noise
 
 STREAM = 1
 """Number of the random stream that noise is drawn from, apart from other draws with the same
@@ -168,7 +168,7 @@ def noisy_trial(
     except UndecidedError as error:
         return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
     if not certificate.closed:  # a negative control, which must let go
-        control = Control(OPEN, case.contacts, case.friction, certificate)
+        control = Control(OPEN, case.friction, certificate)
         verdict = try_control(body, control, Agenda(), setup)
         if verdict.held:
             wrong = ("contacts that are proved not force-closed held the object",)

@@ -8,32 +8,33 @@ protocol's full length, to be looked at.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Annotated, TypeAlias
 
+from grasp_core.arrays import Wrench
 from grasp_core.closure.contacts import contacts_sha256, stacked
-from grasp_core.errors import InputError, about
-from grasp_core.files.text_files import read_text
+from grasp_core.declared import Declared
+from grasp_core.errors import InputError
+from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
+from grasp_core.kinds import OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
-from grasp_core.settings import for_users
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
 from sim_validate.closure.controls import (
     Control,
     ControlLoad,
+    ControlTrial,
+    ControlVerdict,
     control_case,
-    negative_controls,
 )
 from sim_validate.closure.noise import OPEN, disturbed, for_repeats, noisy_case
-from sim_validate.closure.setup_toml import setup_from_tables
-from sim_validate.closure.verdicts_json import verdicts_of
+from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.loads import PlannedLoad, planned_loads
 from sim_validate.engine.rig import Rig, Watched, squeezed
 from sim_validate.engine.schedules import Load
-from sim_validate.engine.settings import Noise
-from sim_validate.engine.setup import WEAKEST, Agenda, NamedWrench, Setup, drawn_names
+from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
 from sim_validate.planning.grasps_json import GRASPS, grasp_with_id, read_grasps, some
 
@@ -77,40 +78,44 @@ class Recorded:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Replayed:
+class Replayed(Declared):
     """The motion and outcome of one trial that was simulated again."""
 
-    name: str
-    load: Load
-    predicted_limit: float | None
+    name: Annotated[str, Key("wrench")]
+    load: Annotated[Load, UNRECORDED]
+    predicted_limit: OrInfinity | None
     """Largest multiple of the wrench that is resisted by analysis; None for contacts without force
     closure."""
-    required_friction: float | None
+    required_friction: OrInfinity | None
     """Friction that the planned forces need; None if no forces balance the wrench."""
     friction: float
-    hold: HoldVerdict
-    watched: Watched
-    scene: Scene
+    hold: Annotated[HoldVerdict, FLAT]
+    watched: Annotated[Watched, UNRECORDED]
+    scene: Annotated[Scene, UNRECORDED]
+
+    @recorded
+    def wrench_n_nm(self) -> Wrench:
+        """Force, then torque about the centre of mass [N, N m]."""
+        return self.load.wrench
 
 
 def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     """Read a contact set from a `verdicts.json`, or from the folder of a run."""
     path = source / VERDICTS if source.is_dir() else source
-    with about(path):
-        record = verdicts_of(read_text(path))
+    found = load_verdicts(path)
     source = wanted.grasps or path.parent / GRASPS
     if not source.is_file():
         raise InputError(
             f"{source}: this file of grasps is missing; say with --grasps where the file is"
         )
     saved = read_grasps(source)
-    if saved.body.content_sha256 != record["object"]["content_sha256"]:
+    if saved.body.content_sha256 != found.object_sha256:
         raise InputError(
             f"{source}: these grasps are on another object than the results to replay; give the "
             "right --grasps"
         )
-    saved = replace(saved, friction=record["friction"])
-    verdicts = {each["id"]: each for each in record["verdicts"]}
+    saved = replace(saved, friction=found.friction)
+    verdicts = {each.id: each for each in found}
     grasp = grasp_with_id(path, saved, wanted.grasp)
     if grasp.id not in verdicts:
         raise InputError(
@@ -119,77 +124,54 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
 
 
-def of_verdict(path: Path, saved: Plan, verdict: Mapping[str, Any], wanted: Wanted) -> Recorded:
+def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Recorded:
     """Read a contact set, and how its trials ended, from the verdict on one grasp."""
     grasp = grasp_with_id(path, saved, wanted.grasp)
-    if contacts_sha256(grasp.contacts) != verdict["contacts_sha256"]:
+    if contacts_sha256(grasp.contacts) != verdict.contacts_sha256:
         raise InputError(
             f"{path}: the contacts of {grasp.id} have changed since these results were recorded; "
             "record them again"
         )
-    setup, agenda = _asked(path, verdict)
     found = Recorded(
-        grasp.id, saved.body, grasp.contacts, saved.friction, setup, agenda,
+        grasp.id, saved.body, grasp.contacts, saved.friction, verdict.setup, verdict.agenda,
         grasp=grasp, trial=wanted.trial,
     )  # fmt: skip
     if wanted.trial is not None:
         return _in_trial(path, found, verdict, wanted.trial)
-    tried = verdict
+    trials: Sequence[WrenchVerdict | ControlTrial] = verdict.wrenches
     if wanted.control is not None:
-        found = _with_control(path, found, grasp, wanted.control)
-        tried = verdict["controls"][wanted.control]
-    return replace(found, outcomes={each["name"]: each["outcome"] for each in tried["wrenches"]})
+        control = _control(path, verdict, wanted.control)
+        trials = control.tried
+        found = replace(
+            found, name=f"{grasp.id}:{wanted.control}", contacts=control.control.contacts,
+            friction=control.control.friction, control=wanted.control, grasp=None,
+        )  # fmt: skip
+    return replace(found, outcomes={each.name: each.hold.outcome.value for each in trials})
 
 
-def _asked(path: Path, verdict: Mapping[str, Any]) -> tuple[Setup, Agenda]:
-    """Rebuild the settings and the choice of trials that a verdict was made with."""
-    settings = verdict["settings"]
-    tables = {name: settings[name] for name in for_users(Setup)}
-    setup = setup_from_tables(tables, Setup(surface=settings["surface"]), str(path))
-    ours = drawn_names(settings["random_wrenches"])
-    repeats = verdict.get("robustness")
-    agenda = Agenda(
-        random_wrenches=settings["random_wrenches"],
-        wrenches=tuple(
-            NamedWrench(each["name"], each["wrench"])
-            for each in verdict["wrenches"]
-            if each["name"] not in ours
-        ),
-        noise=Noise() if repeats is None else Noise.of_table(repeats["noise"], "noise"),
-        seed=settings["seed"],
-    )
-    return setup, agenda
+def _control(path: Path, verdict: Verdict, name: str) -> ControlVerdict:
+    """Find the verdict on a negative control of a grasp."""
+    found = next((each for each in verdict.controls if each.control.name == name), None)
+    if found is None:
+        raise InputError(
+            f"{path}: grasp {verdict.id} has no negative control {name!r}; choose from "
+            f"{some(each.control.name for each in verdict.controls)}"
+        )
+    return found
 
 
-def _in_trial(path: Path, found: Recorded, verdict: Mapping[str, Any], trial: int) -> Recorded:
+def _in_trial(path: Path, found: Recorded, verdict: Verdict, trial: int) -> Recorded:
     """Choose a repeat with noise."""
     found = replace(found, name=f"{found.name} in trial {trial}")
-    nothing: Mapping[str, Any] = {"trials": 0, "not_held": []}
-    repeats: Mapping[str, Any] = verdict.get("robustness") or nothing
-    if trial >= (trials := repeats["trials"]):
-        said = f"choose from 0 to {trials - 1}" if trials else "it was recorded without --repeats"
+    repeats = () if verdict.robustness is None else verdict.robustness.trials
+    if trial >= len(repeats):
+        said = f"choose from 0 to {len(repeats) - 1}"
+        said = said if repeats else "it was recorded without --repeats"
         raise InputError(f"{path}: the file has no repeat with noise numbered {trial}; {said}")
-    for each in repeats["not_held"]:
-        if each["trial"] == trial:
-            return replace(found, outcomes={each["wrench"]: each["outcome"]})
-    return replace(found, others=Outcome.HELD.value)
-
-
-def _with_control(path: Path, found: Recorded, grasp: Grasp, name: str) -> Recorded:
-    """Make a negative control of a grasp again."""
-    setup, body = found.setup, found.body
-    exact = replace(grasp, critical_friction=setup.critical_friction(grasp))
-    made = negative_controls(body, exact, found.friction, found.agenda.seed, setup)
-    control = next((each for each in made if each.name == name), None)
-    if control is None:
-        raise InputError(
-            f"{path}: grasp {grasp.id} has no negative control {name!r}; choose from "
-            f"{some(each.name for each in made)}"
-        )
-    return replace(
-        found, name=f"{grasp.id}:{name}", contacts=control.contacts, friction=control.friction,
-        control=name, grasp=None,
-    )  # fmt: skip
+    ended = repeats[trial]
+    if ended.outcome is Outcome.HELD:
+        return replace(found, others=Outcome.HELD.value)
+    return replace(found, outcomes={ended.wrench: ended.outcome.value})
 
 
 Loads: TypeAlias = Sequence[PlannedLoad | ControlLoad]
@@ -266,4 +248,4 @@ def _opened(
             f"{name}: expected contacts without force closure, but these are force-closed at "
             f"friction {friction}"
         )
-    return *control_case(body, Control(name, contacts, friction, certificate), setup), ()
+    return *control_case(body, Control(name, friction, certificate), setup), ()

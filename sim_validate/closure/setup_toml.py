@@ -40,9 +40,8 @@ def physics_from_file(path: Path) -> dict[str, Any]:
 
 def tables_of(setup: Setup) -> dict[str, dict[str, Any]]:
     """Write a setup as the TOML tables that would reproduce it."""
-    tables = {
+    return {
         table: {name: getattr(part, name) for name in for_users(type(part))}
         for table in for_users(Setup)
         for part in [cast("Settings", getattr(setup, table))]
     }
-    return tables | {"physics": setup.physics.record()}

@@ -22,7 +22,7 @@ from grasp_core.values import Grasp
 from scenes.mujoco.fingertips import clashes
 from sim_validate.closure.controls import ControlVerdict, negative_controls, try_control
 from sim_validate.closure.noise import for_repeats, robustness
-from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.closure.verdict import Scale, Verdict, WrenchVerdict
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import (
     Gate,
@@ -80,7 +80,7 @@ def validate(
 
 
 def tested(
-    body: Polyhedron, grasp: Grasp, friction: float, gate: Gate, agenda: Agenda, setup: Setup
+    body: Polyhedron, grasp: Grasp, friction: float, gate: Gate | None, agenda: Agenda, setup: Setup
 ) -> Verdict:
     """Test a grasp whose closure is proved, with a simulator that was checked before."""
     require_touch(body, grasp.contacts, setup)
@@ -111,10 +111,11 @@ def tested(
         wrenches=wrenches,
         controls=controls,
         robustness=repeats,
-        gate=gate,
-        scene=scene,
         setup=setup,
         agenda=agenda,
+        scale=Scale.of(scene.layout, body.radius),
+        gate=gate,
+        scene=scene,
     )
 
 

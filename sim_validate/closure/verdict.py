@@ -1,24 +1,39 @@
 """Verdicts on a grasp: on each wrench, on repeats with noise, and on all of its trials.
 
 Each sets what was predicted beside what was simulated, and says where the two contradict each
-other.
+other. They are also what `verdicts.json` holds.
 """
 
 import importlib
-from dataclasses import dataclass
-from typing import Any
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Self
 
-from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
+import numpy as np
+
+from grasp_core.arrays import Array, Shape, Wrench
+from grasp_core.checked import path_of
+from grasp_core.closure.contacts import contacts_sha256
+from grasp_core.declared import Declared
+from grasp_core.figures import Compared, Shown, figure, less, more, scalars
+from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
+from grasp_core.grasp_tables import ById, frame_of
+from grasp_core.kinds import Friction, Many, Measured, OrInfinity
 from grasp_core.notebooks import InNotebooks
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.layout import FingerDrive, Layout
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
-from sim_validate.engine.settings import Noise
-from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace
+from sim_validate.engine.setup import WEAKEST, Agenda, Setup
+from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
+from sim_validate.kit.about_object import AboutObject
+from sim_validate.settings.trials import Noise
 
 AGREEMENT = 0.02
 """Largest relative error of simulated limits and critical frictions: five times the worst that was
@@ -26,19 +41,25 @@ measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WrenchVerdict(ByValue):
+class WrenchVerdict(Declared):
     """One wrench on a grasp, predicted and simulated."""
 
     name: str
-    wrench: Array
-    predicted_limit: float
+    wrench: Wrench
+    predicted_limit: OrInfinity
     """Largest multiple of the applied wrench that the analysis says is resisted."""
-    required_friction: float
-    hold: HoldVerdict
-    simulated_limit: SimulatedLimit | None = None
-    """Where the object lets go, relative to the predicted limit; None if not measured, or not
+    required_friction: OrInfinity
+    """Least coefficient with which the planned contact forces balance the wrench."""
+    hold: Annotated[HoldVerdict, FLAT]
+    let_go_at: SimulatedLimit | None = None
+    """Where the object lets go, in shares of the predicted limit; None if not measured, or not
     found."""
-    trace: Trace | None = None
+    trace: Annotated[Trace | None, UNRECORDED] = field(default=None, compare=False)
+
+    @recorded
+    def simulated_limit(self) -> float | None:
+        """Multiple of the applied wrench at which the object lets go; None if not found."""
+        return None if self.let_go_at is None else self.let_go_at.share * self.predicted_limit
 
     @property
     def contradiction(self) -> str:
@@ -48,13 +69,13 @@ class WrenchVerdict(ByValue):
         if (outcome in LET_GO and predicted > 1.0 + AGREEMENT) or outcome is wrong:
             return (f"{self.name}: {outcome.value}, though the predicted limit is "
                     f"{predicted:.4g} times the wrench")  # fmt: skip
-        if self.simulated_limit and abs(self.simulated_limit.share - 1.0) > AGREEMENT:
-            return f"{self.name}: let go at {self.simulated_limit.share:.4g} of the predicted limit"
+        if self.let_go_at and abs(self.let_go_at.share - 1.0) > AGREEMENT:
+            return f"{self.name}: let go at {self.let_go_at.share:.4g} of the predicted limit"
         return ""
 
 
 @dataclass(frozen=True, slots=True)
-class NoisyTrial:
+class NoisyTrial(Declared):
     """The outcome of one repeat with noise."""
 
     number: int
@@ -72,23 +93,23 @@ class NoisyTrial:
 
 
 @dataclass(frozen=True, slots=True)
-class Robustness:
+class Robustness(Declared):
     """All repeats of a grasp with noise, and their statistics."""
 
     noise: Noise
-    trials: tuple[NoisyTrial, ...]
+    trials: Annotated[tuple[NoisyTrial, ...], Many()]
 
-    @property
+    @recorded
     def held(self) -> int:
         """Number of repeats in which every load held."""
         return sum(trial.outcome is Outcome.HELD for trial in self.trials)
 
-    @property
+    @recorded
     def predicted(self) -> int:
         """Number of repeats in which every load is resisted according to the analysis."""
         return sum(trial.predicted is True for trial in self.trials)
 
-    @property
+    @recorded
     def interval(self) -> tuple[float, float]:
         """The 95 % confidence interval of the share of repeats that hold."""
         return interval(self.held, len(self.trials))
@@ -114,77 +135,207 @@ ROWS = 8
 """Largest number of trials that notebooks show."""
 
 
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Scale(Declared):
+    """The sizes with which the trials of a grasp were simulated."""
+
+    grasp_size_m: float
+    """Root mean square lever of the contacts [m]; displacements are judged relative to it."""
+    object_radius_m: float
+    """Largest distance of the object's surface from its centre of mass [m]."""
+    object_mass_kg: float
+    """Mass of the object, not its own: it is chosen so that similar grasps behave alike [kg]."""
+    object_inertia_kg_m2: Annotated[Array, Shape(3, 3)]
+    fingers: FingerDrive
+
+    @classmethod
+    def of(cls, layout: Layout, radius_m: float) -> Self:
+        """Return the sizes of a scene with an object of a radius [m]."""
+        size = layout.grasp_size_m
+        return cls(size, radius_m, layout.object_kg, layout.inertia_kg_m2, layout.drive)
+
+
+def _not_held(_before: Outcome, after: Outcome) -> bool:
+    return after is not Outcome.HELD
+
+
+PREDICTED = Compared(more, analysed=True, friction=True)
+PREDICTED_FRICTION = Shown("mu*", ".4f", compared=PREDICTED)
+SIMULATED_FRICTION = Shown("in sim", ".4f", compared=Compared(more, friction=True))
+SHARES = Shown("limits", ".3f", compared=None)
+MOVED = Compared(more, follows=True)
+MICRONS_MOVED = Shown("um moved", ".2g", MICRO, compared=MOVED)
+MICRONS_LOADED = Shown("um when loaded", ".2g", MICRO, compared=None)
+ENDED = Compared(_not_held, follows=True)
+LOST = Compared(items=("no longer held", "held now"), follows=True)
+LOST_WITH_NOISE = Compared(
+    items=("repeats with noise no longer held", "repeats with noise held now"), close="noisy_close"
+)
+CONTROLS = Compared(less, "negative controls", of_part=True)
+CONTROLS_HELD = Compared(more, "negative controls that were not let go")
+CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
+"""How the figures of a verdict are shown, and compared with those of an earlier one."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Verdict(ByValue, InNotebooks):
+class Verdict(Declared, InNotebooks):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
-    id: str
+    id: Annotated[str, Shown("grasp", compared=None)]
     contacts: tuple[Contact, ...]
-    friction: float
+    friction: Friction
     critical_friction: CriticalFriction
-    wrenches: tuple[WrenchVerdict, ...]
-    controls: tuple[ControlVerdict, ...]
+    wrenches: Annotated[tuple[WrenchVerdict, ...], Compared(less)]
+    controls: Annotated[tuple[ControlVerdict, ...], CONTROLS]
     robustness: Robustness | None
     """How often the grasp holds with noise, if asked for."""
-    gate: Gate
-    scene: Scene
     setup: Setup
     agenda: Agenda
+    scale: Scale
+    gate: Annotated[Gate | None, UNRECORDED] = field(default=None, compare=False)
+    """How the simulator did on cases with known answers; a file has it once, for all verdicts."""
+    scene: Annotated[Scene | None, UNRECORDED] = field(default=None, compare=False)
+    """The scene that was simulated; None if the verdict was read from a file."""
 
-    @property
-    def predicted_critical_friction(self) -> float:
-        """The critical friction by analysis, as `SavedVerdict` names it."""
+    @recorded
+    def contacts_sha256(self) -> str:
+        """Hash of the contacts, which tells grasps of one id apart."""
+        return contacts_sha256(self.contacts)
+
+    @recorded
+    def predicted_critical_friction(self) -> Annotated[OrInfinity, PREDICTED_FRICTION]:
+        """The critical friction by analysis."""
         return self.critical_friction.predicted
 
-    @property
-    def simulated_critical_friction(self) -> float | None:
+    @recorded
+    def simulated_critical_friction(self) -> Annotated[float | None, SIMULATED_FRICTION]:
         """The one found in simulation; None if it was not measured or not found."""
         return self.critical_friction.simulated
+
+    @recorded
+    def shares_found(self) -> Annotated[tuple[float, float] | None, SHARES]:
+        """Least and largest share of predicted limits at which the object let go; None if none."""
+        found = [each.let_go_at.share for each in self.wrenches if each.let_go_at]
+        return (min(found), max(found)) if found else None
+
+    @recorded
+    def displacement_m(
+        self,
+    ) -> Annotated[Measured, MICRONS_MOVED]:
+        """Largest displacement of the object under any wrench, after friction was lowered [m]."""
+        return _largest([trial.hold.displacement_m for trial in self.wrenches])
+
+    @recorded
+    def start_displacement_m(
+        self,
+    ) -> Annotated[Measured, MICRONS_LOADED]:
+        """Largest one before that, at high friction: the fingers give way a little [m]."""
+        return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
+
+    @figure
+    def rotation_rad(self) -> Annotated[Measured, MOVED]:
+        """Largest rotation of the object in the trials that hold a wrench [rad]."""
+        return _largest([trial.hold.rotation_rad for trial in self.wrenches])
+
+    @figure
+    def limit_n(self) -> Annotated[OrInfinity, Compared(less, analysed=True)]:
+        """Largest wrench that is resisted in the weakest direction, by analysis [N].
+
+        Torques are divided by the object's radius.
+        """
+        weakest = self._weakest
+        scaled = weakest.wrench / np.array([1.0] * 3 + [self.scale.object_radius_m] * 3)
+        return weakest.predicted_limit * float(np.linalg.norm(scaled))
+
+    @figure
+    def simulated_limit_n(self) -> Annotated[float | None, Compared(less)]:
+        """The one found in simulation [N]; None if it was not measured or not found."""
+        found = self._weakest.let_go_at
+        return None if found is None else self.limit_n * found.share
+
+    @property
+    def _weakest(self) -> WrenchVerdict:
+        return next(trial for trial in self.wrenches if trial.name == WEAKEST)
 
     @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
         """The wrenches that were not held, in order."""
         return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
 
-    @property
-    def outcome(self) -> Outcome:
+    @recorded
+    def outcome(self) -> Annotated[Outcome, Shown("outcome", compared=ENDED)]:
         """`held`, or how the first wrench that was not held ended."""
         return self.failures[0].hold.outcome if self.failures else Outcome.HELD
 
-    @property
+    @recorded
     def held(self) -> bool:
         """Whether every wrench held."""
         return self.outcome is Outcome.HELD
 
-    @property
-    def controls_let_go(self) -> bool:
-        """Whether every negative control let go of the object, as it must."""
-        return all(control.let_go for control in self.controls)
+    @figure
+    def not_held(self) -> Annotated[tuple[str, ...], LOST]:
+        """Names of the wrenches that were not held, in order."""
+        return tuple(trial.name for trial in self.failures)
 
-    @property
-    def mismatches(self) -> tuple[str, ...]:
+    @recorded
+    def controls_let_go(self) -> Annotated[bool, Shown("controls let go", compared=None)]:
+        """Whether every negative control let go of the object, as it must."""
+        return not self.controls_held
+
+    @figure
+    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
+        """Names of the negative controls that did not let go of the object."""
+        return tuple(each.control.name for each in self.controls if not each.let_go)
+
+    @recorded
+    def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
         """Where simulation contradicts the analysis, one sentence each."""
         found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
         if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
             found.append(f"critical friction: {fault}")
         if self.agenda.limits != "none":
             found += [f"{trial.name}: the limit was not found near the predicted one"
-                      for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
+                      for trial in self.wrenches if trial.let_go_at is None]  # fmt: skip
         if self.robustness is not None:
             found += self.robustness.contradictions
         return tuple(found)
 
+    @figure
+    def noisy_trials(self) -> Annotated[int, Compared(less, "repeats with noise")]:
+        """Number of repeats with noise."""
+        return len(self._repeats)
+
+    @figure
+    def noisy_not_held(self) -> Annotated[tuple[int, ...], LOST_WITH_NOISE]:
+        """Numbers of the repeats with noise in which a load was not held."""
+        return tuple(trial.number for trial in self._repeats if trial.outcome is not Outcome.HELD)
+
+    @figure
+    def noisy_close(self) -> Annotated[tuple[int, ...], Compared(None, items=("", ""))]:
+        """Numbers of the repeats with a load very close to the largest that can be resisted."""
+        return tuple(trial.number for trial in self._repeats if trial.close)
+
     @property
+    def _repeats(self) -> tuple[NoisyTrial, ...]:
+        return () if self.robustness is None else self.robustness.trials
+
+    @recorded
     def good(self) -> bool:
         """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
         return self.held and self.controls_let_go and not self.mismatches
 
-    def _html(self) -> str:
+    def _html(self) -> str | None:
         """Return a picture of the scene with how the trials ended, the failed ones first."""
+        if self.scene is None:
+            return None
         from scenes.drawing.in_notebooks import card, placed
 
         title = f"{self.id}: {self.outcome.value.replace('_', ' ')}"
         return card(placed(self.scene.layout), title, _rows(self))
+
+
+def _largest(values: Sequence[float]) -> float:
+    return math.nan if any(map(math.isnan, values)) else max(values, default=0.0)
 
 
 def _disagreement(friction: CriticalFriction) -> str:
@@ -200,10 +351,92 @@ def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("trial", "outcome", "limit predicted", "simulated")]
     trials = sorted(verdict.wrenches, key=lambda trial: trial.hold.outcome is Outcome.HELD)
     for trial in trials[:ROWS]:
-        found, predicted = trial.simulated_limit, trial.predicted_limit
-        simulated = "-" if found is None else f"{found.share * predicted:.4g}"
-        rows.append((trial.name, trial.hold.outcome.value, f"{predicted:.4g}", simulated))
+        found = trial.simulated_limit
+        simulated = "-" if found is None else f"{found:.4g}"
+        predicted = f"{trial.predicted_limit:.4g}"
+        rows.append((trial.name, trial.hold.outcome.value, predicted, simulated))
     let_go = sum(control.let_go for control in verdict.controls)
     rows.append((f"{len(verdict.failures)} of {len(trials)} trials failed",))
     rows.append((f"{let_go} of {len(verdict.controls)} negative controls let go",))
     return rows + [(mismatch,) for mismatch in verdict.mismatches]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Verdicts(RecordFile, ById[Verdict]):
+    """The verdicts on an object's grasps, as `verdicts.json` holds them.
+
+    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
+
+    ITEMS = "verdicts"
+    FILE = "verdicts.json"
+    SCHEMA = 2
+
+    object: AboutObject
+    friction: Friction
+    complete: bool
+    """Whether every grasp that was asked for was tested."""
+    gate: Gate
+    """How the simulator did on cases with known answers."""
+    verdicts: tuple[Verdict, ...]
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @classmethod
+    def of(
+        cls, body: Polyhedron, friction: float, gate: Gate, verdicts: tuple[Verdict, ...], *,
+        complete: bool = True,
+    ) -> Self:  # fmt: skip
+        """Collect verdicts on the grasps of an object for a file."""
+        return cls(AboutObject.of(body), friction, complete, gate, verdicts)
+
+    @property
+    def object_sha256(self) -> str:
+        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
+        return self.object.content_sha256
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps that held, of negative controls that let go, and contradictions."""
+        controls = [control for verdict in self.verdicts for control in verdict.controls]
+        return {
+            "grasps": len(self.verdicts),
+            "grasps_held": sum(verdict.held for verdict in self.verdicts),
+            "controls": len(controls),
+            "controls_held": sum(control.held for control in controls),
+            "controls_let_go": sum(control.let_go for control in controls),
+            "mismatches": sum(len(verdict.mismatches) for verdict in self.verdicts),
+        }
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each verdict, indexed by the grasp's id.
+
+        It has a column for each figure of a verdict that is a number or a word; of the mismatches,
+        how many there are.
+
+        Raises:
+            InputError: The library pandas is not installed.
+        """
+        return frame_of([scalars(each) for each in self.verdicts], [v.id for v in self.verdicts])
+
+
+def load_verdicts(path: str | Path) -> Verdicts:
+    """Read verdicts, as `graspproof validate` and `graspproof run` write them.
+
+    Args:
+        path: A `verdicts.json`.
+
+    Raises:
+        InputError: The file is missing or invalid; the message names the file and the field.
+    """
+    return Verdicts.read(path_of(path, "path"))
+
+
+def trace_arrays(verdict: Verdict) -> dict[str, Array]:
+    """Collect the recorded motion of every contact as arrays, named by trial and quantity."""
+    fields = ("times_s", "displacements_m", "shifts_m", "rotations_rad", "slips_m", "gaps_m")
+    kept: Sequence[tuple[str, Any]] = [
+        *((trial.name, trial.trace) for trial in verdict.wrenches if trial.trace is not None),
+        *((f"{control.control.name}.{trial.name}", trial.trace)
+          for control in verdict.controls for trial in control.tried if trial.trace is not None),
+    ]  # fmt: skip
+    return {f"{name}.{field}": getattr(trace, field) for name, trace in kept for field in fields}

@@ -7,7 +7,7 @@ removed.
 """
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -20,7 +20,7 @@ from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.given_contacts import given_text
 from sim_validate.datasets.manifest import (
     MANIFEST,
-    SCHEMA,
+    QUARANTINE,
     LeftOut,
     Listed,
     Manifest,
@@ -30,8 +30,8 @@ from sim_validate.datasets.manifest import (
     write_manifest,
 )
 from sim_validate.datasets.parquet import TableFiles, pyarrow
+from sim_validate.datasets.rows import dataset_tables
 from sim_validate.datasets.staging import Finished, Staging
-from sim_validate.datasets.tables import Name
 from sim_validate.datasets.units import WorkUnit, provenance, units_of, units_sha256
 from sim_validate.datasets.workers import Engine, drive
 from sim_validate.engine.gate import require_faithful
@@ -44,7 +44,7 @@ TWIN = "the same object as"
 """First words of the reason why an object with the same mesh as another has no rows."""
 CONTACTS = "contacts.json"
 """Name of the file with the given contacts, if there are any; its normals point into the object."""
-CONFIG, QUARANTINE = "config.toml", "quarantine.jsonl"
+CONFIG = "config.toml"
 EXTRAS = ("meshes", "scenes")
 """Folders of the files that units make besides their rows."""
 OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
@@ -59,7 +59,7 @@ class Built:
     made: int
     """Number of units of work that were computed in this run."""
     quarantined: int
-    rows: dict[Name, int]
+    rows: Mapping[str, int]
 
 
 def build(
@@ -140,7 +140,7 @@ def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
                 f"{path}: this file of a finished dataset is missing or damaged (see `dataset "
                 "verify`); give another --out to make it again"
             )
-    return Built(len(units), made, manifest.quarantined, manifest.rows())
+    return Built(len(units), made, manifest.quarantined, manifest.rows)
 
 
 def _finish(
@@ -170,7 +170,6 @@ def _finish(
         units=len(units),
         units_sha256=units_sha256(units),
         quarantined=len(quarantined),
-        executed=config.execution is not None,
         groups=config.groups,
         files=(*tables, *(listed(folder, path) for path in others)),
     )
@@ -198,7 +197,7 @@ def _sorted_out(
                 object=unit.object,
                 source_sha256=unit.source_sha256,
                 friction=unit.friction,
-                given=[each.id for each in unit.given],
+                given=tuple(each.id for each in unit.given),
                 reason=found,
             )
         )
@@ -208,11 +207,12 @@ def _sorted_out(
 def _write_tables(
     config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
 ) -> list[Listed]:
-    about = {"schema": str(SCHEMA), "config_sha256": config.sha256}
-    with TableFiles(folder / DATA, about, config.tables) as files:
+    tables = dataset_tables(config.groups)
+    about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
+    with TableFiles(folder / DATA, about, tables) as files:
         for _, same in groupby(good, key=lambda each: each.object_id):
             of_object = list(same)
-            for name in config.tables:
+            for name in tables:
                 chosen = of_object[:1] if name == "objects" else of_object
                 paths = [staging.table(each.unit, name) for each in chosen]
                 files.add(name, of_object[0].split, paths)

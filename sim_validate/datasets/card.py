@@ -4,6 +4,7 @@ The Hub is a website for datasets and calls this page a card; `card.md.jinja` ho
 user's own words are escaped: in the header as quoted strings, in the text as Markdown.
 """
 
+import inspect
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -12,16 +13,10 @@ from typing import Any
 from scenes.drawing.pages import filled
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, quoted
 from sim_validate.datasets.manifest import Manifest
+from sim_validate.datasets.rows import ROWS
 from sim_validate.datasets.tables import KEYS, REFERENCES, SPLITS, Name
 
 CARD = "README.md"
-ROWS: Mapping[Name, str] = {
-    "objects": "an object; its mesh, in metres, is `meshes/OBJECT_ID.obj`",
-    "grasps": "four contacts on an object at one friction, or a negative control made from them",
-    "trials": "a grasp or control under one wrench, in simulation",
-    "executions": "a grasp in one trial of its execution, in simulation",
-}
-"""Meaning of one row of each table."""
 SIZES = (
     (10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"),
     (10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"),
@@ -40,7 +35,7 @@ ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
 
 def card_text(config: DatasetConfig, manifest: Manifest) -> str:
     """Write the README.md of a dataset."""
-    rows, tables = manifest.rows(), list(_tables(config, manifest))
+    rows, tables = manifest.rows, list(_tables(manifest))
     (of_grasps,) = (table["splits"] for table in tables if table["name"] == "grasps")
     chances = [
         f"{name} {upto - before:.0%}"
@@ -71,8 +66,8 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
     )
 
 
-def _tables(config: DatasetConfig, manifest: Manifest) -> Iterator[Mapping[str, Any]]:
-    for name, columns in config.tables.items():
+def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
+    for name, columns in manifest.tables.items():
         splits = {
             split: sum(each.rows or 0 for each in manifest.of_table(name) if each.split == split)
             for split, _ in reversed(SPLITS)
@@ -81,7 +76,7 @@ def _tables(config: DatasetConfig, manifest: Manifest) -> Iterator[Mapping[str, 
         keys = " and ".join(f"`{key}`" for key in KEYS[name])
         yield {
             "name": name,
-            "row": ROWS[name],
+            "row": inspect.getdoc(ROWS[name]),
             "splits": splits,
             "sorted_by": keys,
             "columns": columns,
@@ -92,7 +87,7 @@ def _reference(table: Name, column: str) -> str:
     """Say which row of another table a column names; empty if it names none."""
     if (target := REFERENCES.get((table, column))) is None:
         return ""
-    return f"; names a row of `{target[0]}` by its `{target[1]}`"
+    return f" Names a row of `{target[0]}` by its `{target[1]}`."
 
 
 def _as_address(text: str) -> str:

@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from grasp_core.errors import InputError
+from grasp_core.files.records import record_of
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
@@ -56,7 +57,9 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     reporter.say(splits_in_words(manifest))
     if built.quarantined:
         reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
-    reporter.document({"out": str(out), "manifest": asdict(manifest)})
+    reporter.document(
+        {"out": str(out), "manifest": {"schema": manifest.SCHEMA, **record_of(manifest)}}
+    )
     return Exit.PARTIAL if built.quarantined else Exit.GOOD
 
 

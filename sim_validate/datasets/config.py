@@ -13,21 +13,12 @@ from typing import Annotated, Any, Literal, TypeAlias, cast
 
 from grasp_core.checked import MOST_COUNT, shown
 from grasp_core.errors import InputError, about
+from grasp_core.kinds import METHODS, ConeKind, Count, Friction, Method, RandomWrenches, Range
 from grasp_core.mesh_files.limits import FaceKind, Lengths
-from grasp_core.settings import (
-    METHODS,
-    ConeKind,
-    Count,
-    Friction,
-    Method,
-    RandomWrenches,
-    Range,
-    Settings,
-    as_table,
-)
-from sim_validate.datasets.tables import Tables, dataset_tables
-from sim_validate.engine.settings import LimitSearch
-from sim_validate.execution.settings import ExecutionSettings
+from grasp_core.settings import Settings, as_table
+from sim_validate.datasets.tables import EXECUTED
+from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings.trials import LimitSearch
 
 EXECUTION = "execution"
 LEARNING = "learning"
@@ -175,16 +166,11 @@ class DatasetConfig(PlannedContent):
             )
 
     @property
-    def tables(self) -> Tables:
-        """Tables of the dataset, with their columns."""
-        return dataset_tables(executed=self.execution is not None, groups=self.groups)
-
-    @property
     def groups(self) -> dict[str, int]:
         """Groups of columns that the tables have on request, with their sizes."""
-        if self.learning is None:
-            return {}
-        return self.learning.groups(executed=self.execution is not None)
+        executed = self.execution is not None
+        asked = {} if self.learning is None else self.learning.groups(executed=executed)
+        return {**({EXECUTED: 1} if executed else {}), **asked}
 
     @property
     def sha256(self) -> str:

@@ -4,9 +4,9 @@ A cell is null where its figure does not exist for the contacts: fewer than four
 contacts that are not in force closure no witness forces.
 """
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, TypeAlias
 
@@ -21,10 +21,12 @@ from grasp_core.hands.reach import reach_with
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.values import FINGERS, Contact, Grasp
+from sim_validate.datasets.columns import figures_in
 from sim_validate.datasets.config import Learning
+from sim_validate.datasets.rows import ExecutionRow, GraspRow
 from sim_validate.execution.execute import tip_radius
-from sim_validate.execution.settings import ExecutionSettings, TrialKind
-from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
+from sim_validate.settings.executions import ExecutionSettings, TrialKind
 
 Executed: TypeAlias = ExecutedGrasp | str | None
 """An execution, the reason why it was refused, or None where none is asked for."""
@@ -48,23 +50,26 @@ def execution_cells(executed: Executed) -> dict[str, Any]:
     trials = found.trials
     return {
         "executed": True,
-        "survived": found.survived if trials else None,
         "execution_note": "; ".join(f"{each.kind}: {each.reason}" for each in found.skipped),
         "mass_kg": found.mass_kg,
-        "squeeze_n": for_fingers(found.squeeze.tolist(), [None] * 3),
+        "squeeze_n": found.squeeze,
         "load_multiple": found.load_multiple,
-        "predicted_first_slip": min((each.predicted_first_slip for each in trials), default=None),
-        "simulated_first_slip": min((each.simulated_first_slip for each in trials), default=None),
-        "predicted_loss": finite(found.least_predicted_loss) if trials else None,
+        **trial_cells(trials),
         "payload_kg": found.payload_kg,
-        "executed_trials": len(trials),
         "execution_mismatches": sum(not each.let_go for each in found.controls),
+        "execution": figures_in(GraspRow, "execution", found),
     }
 
 
-def finite(value: float) -> float | None:
-    """Return a number, or None where it is not finite."""
-    return value if math.isfinite(value) else None
+def trial_cells(trials: Sequence[ExecutionTrial]) -> dict[str, Any]:
+    """Return the cells of a grasp's row that follow from the trials of its execution."""
+    return {
+        "survived": all(each.survived for each in trials) if trials else None,
+        "predicted_first_slip": min((each.predicted_first_slip for each in trials), default=None),
+        "simulated_first_slip": min((each.simulated_first_slip for each in trials), default=None),
+        "predicted_loss": min((each.predicted_loss for each in trials), default=None),
+        "executed_trials": len(trials),
+    }
 
 
 def executed_by(
@@ -88,7 +93,7 @@ def executed_by(
 
 def execution_rows(
     name: str, executed: Executed, seeds: Sequence[int] = (), misplacements: int = 1
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[ExecutionRow]:
     """Yield a row for each trial of an execution, each misplaced one with its seed."""
     found = executed.execution if isinstance(executed, ExecutedGrasp) else None
     misplaced = 0
@@ -97,13 +102,7 @@ def execution_rows(
         if trial.kind == MISPLACED:
             seed = seeds[misplaced // misplacements] if seeds else None
             misplaced += 1
-        yield {"grasp_id": name, "trial": number, **asdict(trial), "seed": seed}
-
-
-def for_fingers(values: Iterable[Any], missing: Any) -> list[Any]:
-    """Pad a list to four fingers, as contact sets may have fewer."""
-    listed = list(values)
-    return listed + [missing] * (FINGERS - len(listed))
+        yield ExecutionRow(name, number, trial, seed)
 
 
 @cache
@@ -118,15 +117,14 @@ def hand_cells(hand: Hand, body: Polyhedron, grasp: Grasp, friction: float, seed
     cells: dict[str, Any] = {"hand_reached": found.reached, "hand_reason": found.reason}
     if not found.reached:
         return cells
-    lists = {
-        "hand_fingers": found.fingers, "hand_joints_rad": found.joints,
-        "T_object_palm_m": found.palm_pose, "hand_open_joints_rad": found.pregrasp,
-        "hand_approach": found.approach,
-    }  # fmt: skip
     contacts = found.contacts or ()
     return {
         **cells,
-        **{name: None if value is None else value.tolist() for name, value in lists.items()},
+        "hand_fingers": found.fingers,
+        "hand_joints_rad": found.joints,
+        "T_object_palm_m": found.palm_pose,
+        "hand_open_joints_rad": found.pregrasp,
+        "hand_approach": found.approach,
         "hand_points_m": [contact.position.tolist() for contact in contacts],
         "hand_normals": [contact.normal.tolist() for contact in contacts],
     }
@@ -146,23 +144,19 @@ class Figures:
         if "closure" not in self.asked.figures:
             return {}
         points, normals = stacked(contacts)
-        cells: dict[str, Any] = {}
-        if len(contacts) == FINGERS:
-            cells["span_angle_rad"] = span_angle(normals)
-        try:
-            least = smallest_singular_value(
+        angle = span_angle(normals) if len(contacts) == FINGERS else None
+        cells: dict[str, Any] = {"span_angle_rad": angle, "smallest_singular_value": None}
+        with suppress(GraspError):  # too few contacts span too little
+            cells["smallest_singular_value"] = smallest_singular_value(
                 points, center=body.center_of_mass, torque_scale=body.radius
             )
-        except GraspError:  # too few contacts span too little
-            least = math.inf
-        cells["smallest_singular_value"] = finite(least)
         return cells
 
     def of_grasp(self, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:
         """Return the figures that only grasps in force closure have."""
         cells = dict[str, Any]()
         if "closure" in self.asked.figures:
-            cells["witness_forces_n"] = grasp.witness.forces.tolist()
+            cells["witness_forces_n"] = grasp.witness.forces
         if self.asked.hand:
             cells |= hand_cells(hand_named(self.asked.hand), body, grasp, friction, self.seed)
         return cells
@@ -184,5 +178,8 @@ class Figures:
             )  # fmt: skip
         except GraspError:  # no push carries the weight in every direction, or it is unstable
             return cells
-        squeeze = for_fingers(least.grip.squeeze.tolist(), [None] * 3)
-        return {**cells, "least_push_n": least.max_push_n, "least_squeeze_n": squeeze}
+        return {
+            **cells,
+            "least_push_n": least.max_push_n,
+            "least_squeeze_n": least.grip.squeeze,
+        }

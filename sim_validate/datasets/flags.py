@@ -6,10 +6,11 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, subcommand
 
-from grasp_core.settings import Seed, Settings, Share
+from grasp_core.kinds import Count, Seed, Share
+from grasp_core.settings import Settings
 from sim_validate.datasets.config import Content, Learning, PlannedContent
 from sim_validate.datasets.tables import SplitName
-from sim_validate.kit.flag_groups import PLAIN, Count, Positive, Spoken
+from sim_validate.kit.flag_groups import PLAIN, Positive, Spoken
 from sim_validate.kit.processes import available_cores
 
 

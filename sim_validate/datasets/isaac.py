@@ -23,15 +23,14 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import Contact
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.layout import arrange
 from scenes.settings import FingerSettings
 from sim_validate.datasets.config import quoted
 from sim_validate.datasets.meshes import mesh_path, stored_body
-from sim_validate.datasets.open_dataset import Row, Selection, select
+from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.datasets.parquet import pyarrow
-from sim_validate.datasets.rows import GIVEN
+from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow
 from sim_validate.datasets.tables import SHORT, Name, SplitName
 from sim_validate.kit.writing import whole_folder, write_lines
 
@@ -84,8 +83,8 @@ def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) 
     facts, total = chosen.facts(), chosen.counts()["objects"]
     objects = grasps = 0
     for object_id, body, rows in _grasped_objects(chosen):
-        of_object = sorted(rows, key=lambda row: row["friction"])
-        for friction, same in groupby(of_object, key=lambda row: row["friction"]):
+        of_object = sorted(rows, key=lambda row: row.friction)
+        for friction, same in groupby(of_object, key=lambda row: row.friction):
             path = _new_path(folder, f"{object_id[:SHORT]}-{friction}-{body.name}")
             write_lines(path, _lines(object_id, body, list(same), facts))
         objects += 1
@@ -94,14 +93,12 @@ def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) 
     return {"objects": objects, "grasps": grasps}
 
 
-def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[Row]]]:
+def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[GraspRow]]]:
     """Yield the id of each object that has grasps, the object, and their rows."""
-    names = {row["object_id"]: row["source_name"] for row in chosen.rows("objects")}
+    names = {row.object_id: row.source_name for row in chosen.rows(ObjectRow)}
     faces = chosen.config().faces
-    planned = (
-        row for row in chosen.rows("grasps") if row["label"] in GRASPS and row["force_closed"]
-    )
-    for object_id, rows in groupby(planned, key=lambda row: row["object_id"]):
+    planned = (row for row in chosen.rows(GraspRow, force_closed=True) if row.label in GRASPS)
+    for object_id, rows in groupby(planned, key=lambda row: row.object_id):
         if object_id not in names:
             raise InputError(
                 f"{chosen.folder}: the object {object_id} has grasps, but its row is missing in "
@@ -120,34 +117,28 @@ def _new_path(folder: Path, name: str) -> Path:
 
 
 def _lines(
-    object_id: str, body: Polyhedron, rows: Sequence[Row], facts: Mapping[str, str]
+    object_id: str, body: Polyhedron, rows: Sequence[GraspRow], facts: Mapping[str, str]
 ) -> Iterator[str]:
-    radius = min(fitting_radius(body, *_places(row)) for row in rows)
+    radius = min(fitting_radius(body, row.points, row.normals) for row in rows)
     source, mesh = quoted(body.name), mesh_path(Path(), object_id).as_posix()
-    friction = rows[0]["friction"]
+    friction = rows[0].friction
     yield HEAD.format(source=source, friction=friction, radius=radius, mesh=quoted(mesh))
     yield from (f"# {name}: {quoted(text)}\n" for name, text in facts.items())
     yield "format: isaac_grasp\nformat_version: 1.0\n\n"
     yield f'object_frame: {source}\ngripper_frame: "four_fingertips"\n\ngrasps:\n'
     for row in rows:
-        points, normals = _places(row)
-        contacts = tuple(map(Contact, points, normals))
-        layout = arrange(body, contacts, friction, FingerSettings(fingertip_radius_m=radius))
-        origin = points.mean(axis=0)
-        touching = points - radius * normals - origin
-        yield f"  {quoted(row['name'])}:\n"
-        yield f"    confidence: {yaml_number(float(row['held']))}\n"
+        fingers = FingerSettings(fingertip_radius_m=radius)
+        layout = arrange(body, row.placed, friction, fingers)
+        origin = row.points.mean(axis=0)
+        touching = row.points - radius * row.normals - origin
+        yield f"  {quoted(row.name)}:\n"
+        yield f"    confidence: {yaml_number(float(bool(row.held)))}\n"
         yield f"    position: {_list(origin)}\n"
         yield f"    orientation: {{w: 1.0, xyz: {_list(np.zeros(3))}}}\n"
         yield "    cspace_position:\n"
         yield from _joint_lines(touching)
         yield "    pregrasp_cspace_position:\n"
         yield from _joint_lines(touching + layout.approach)
-
-
-def _places(row: Row) -> tuple[Array, Array]:
-    """Return positions (4, 3) [m] and normals (4, 3) of a grasp's contacts."""
-    return np.array(row["contact_points_m"]), np.array(row["contact_normals"])
 
 
 def _joint_lines(places: Array) -> Iterator[str]:

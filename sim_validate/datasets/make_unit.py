@@ -13,8 +13,9 @@ from sim_validate.closure.controls import Control, try_control
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.figures import Executed, executed_by
 from sim_validate.datasets.given_contacts import GivenGrasp
+from sim_validate.datasets.make_rows import MakingRows
 from sim_validate.datasets.meshes import mesh_path, mesh_text
-from sim_validate.datasets.rows import GIVEN, GraspRows, Rows, object_row
+from sim_validate.datasets.rows import GIVEN, Rows
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.datasets.varied import Varying, validated_with
 from sim_validate.engine.setup import Agenda, Setup
@@ -25,8 +26,6 @@ from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 class Made:
     """The rows and files of one unit of work."""
 
-    object_id: str
-    split: str
     rows: Rows
     files: Mapping[str, str]
     """Texts of the files, by their paths in the dataset's folder."""
@@ -39,20 +38,7 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
         making.judge()
     else:
         making.plan()
-    row = object_row(body, unit)
-    found = making.found
-    every: Rows = {
-        "objects": (row,), "grasps": tuple(found.grasps), "trials": tuple(found.trials),
-        "executions": tuple(found.executions),
-    }  # fmt: skip
-    rows: Rows = {
-        name: tuple(
-            {each.name: row[each.name] for each in columns if each.name in row}
-            for row in every[name]
-        )
-        for name, columns in unit.config.tables.items()
-    }
-    return Made(body.content_sha256, row["split"], rows, making.files)
+    return Made(making.found.made, making.files)
 
 
 class _Making:
@@ -60,7 +46,7 @@ class _Making:
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
         self.unit, self.body = unit, body
-        self.found = GraspRows(body, unit)
+        self.found = MakingRows(body, unit)
         path = mesh_path(Path(), body.content_sha256)
         self.files = {path.as_posix(): mesh_text(body)}
         config = unit.config
@@ -98,14 +84,14 @@ class _Making:
             self.found.add_given(given, grasp, tried, seated, executed)
             self._vary(grasp, seated.body, tried, executed)
             return
-        control = Control(GIVEN, seated.contacts, friction, grasp)
+        control = Control(GIVEN, friction, grasp)
         verdict = try_control(seated.body, control, self.agenda, Setup())
         self.found.add_open(given, verdict, seated.moved_m)
 
     def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
         asked = self.unit.config.learning
         verdict = validated_with(body, grasp, self.unit.friction, self.agenda, asked)
-        if self.unit.config.scenes:
+        if self.unit.config.scenes and verdict.scene is not None:
             self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
         return verdict
 

@@ -5,13 +5,13 @@ import json
 from pathlib import Path
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import record_of
+from grasp_core.files.json_text import object_of
+from grasp_core.files.records import from_record, record_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.records.grasps_json import surface_of_record, surface_record
-from grasp_core.records.grasps_schema import SurfaceRecord
+from grasp_core.objects.surface import Surface
 from sim_validate.kit.paths import path_inside
 
 FOLDER = "meshes"
@@ -24,7 +24,7 @@ def mesh_text(body: Polyhedron) -> str:
 
     Its first line is a comment with what is known of its surface, as in a `grasps.json`.
     """
-    said = SURFACE + json.dumps(surface_record(body.surface), sort_keys=True)
+    said = SURFACE + json.dumps(record_of(body.surface), sort_keys=True)
     points = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in body.vertices.tolist()]
     triangles = [f"f {i} {j} {k}\n" for i, j, k in (body.triangles + 1).tolist()]
     return "".join([said, "\n", *points, *triangles])
@@ -54,8 +54,7 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
     with about(path):
         if said.startswith(SURFACE):
             with about("first line"):
-                record = record_of(SurfaceRecord, said.removeprefix(SURFACE), "surface")
-                known = surface_of_record(record)
+                known = from_record(Surface, object_of(said.removeprefix(SURFACE), "surface"))
         return polyhedron_from_mesh(
             mesh.vertices, mesh.triangles, MeshChoices(faces=faces), name=name,
             source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,

@@ -5,23 +5,21 @@ object's hash, so that rows can be read grouped by object, with only one object 
 """
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from grasp_core.checked import one_of, path_of
 from grasp_core.errors import InputError
+from sim_validate.datasets.columns import RowOf, row_of
 from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
-from sim_validate.datasets.tables import KEYS, SHORT, SPLITS, Name, Tables
+from sim_validate.datasets.rows import ROWS, Rows, Tables
+from sim_validate.datasets.tables import KEYS, SHORT, SPLITS, Name
 from sim_validate.kit.paths import path_inside
-
-Row: TypeAlias = Mapping[str, Any]
-ObjectRows: TypeAlias = Mapping[Name, Sequence[Row]]
-Group: TypeAlias = tuple[str, list[Row]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,18 +43,16 @@ class Selection:
         """Number of rows of each table."""
         return {name: sum(each.rows or 0 for each in self._listed(name)) for name in self.tables}
 
-    def rows(self, name: Name) -> Iterator[dict[str, Any]]:
-        """Yield the rows of a table without holding all of them in memory."""
-        for batch in self.batches(name):
-            yield from batch.to_pylist()
-
-    def batches(self, name: Name) -> Iterator[Any]:
-        """Yield the rows of a table as Arrow's record batches."""
+    def rows(self, kind: type[RowOf], **cells: str | bool) -> Iterator[RowOf]:
+        """Yield rows of a class, or those with some cells, without holding all in memory."""
+        name: Name = next(name for name, each in ROWS.items() if each is kind)
         for each in self._listed(name):
             found = 0
             for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
+                for number, row in enumerate(batch.to_pylist(), start=found):
+                    if cells == {column: row[column] for column in cells}:
+                        yield row_of(kind, row, f"{each.path}: row {number}")
                 found += batch.num_rows
-                yield batch
             if found != each.rows:
                 raise InputError(
                     f"{each.path}: the file has {found} rows, but the manifest lists {each.rows}; "
@@ -92,7 +88,7 @@ class Selection:
         return {
             **{name: text for name, text in stated.items() if text},
             "split": self.split or "all",
-            "schema": str(manifest.schema),
+            "schema": str(manifest.SCHEMA),
             "config_sha256": manifest.config_sha256,
             **{f"version_{name}": text for name, text in sorted(manifest.versions.items())},
         }
@@ -100,9 +96,8 @@ class Selection:
 
 def select(folder: Path, split: str | None = None) -> Selection:
     """Open a dataset or one of its splits."""
-    splits = [name for name, _ in SPLITS]
     if split is not None:
-        one_of(split, splits, "split")
+        one_of(split, [name for name, _ in SPLITS], "split")
     return Selection(folder, read_manifest(folder), split)
 
 
@@ -145,22 +140,20 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     return {name: read_columns(chosen.paths(name), name, chosen.tables) for name in chosen.tables}
 
 
-def by_object(chosen: Selection) -> Iterator[ObjectRows]:
+def by_object(chosen: Selection) -> Iterator[Rows]:
     """Yield the rows of each object in turn."""
     streams = {name: _groups(chosen, name) for name in chosen.tables}
-    heads: dict[Name, Group | None] = {name: next(streams[name], None) for name in chosen.tables}
+    heads = {name: next(streams[name], None) for name in chosen.tables}
     while waiting := [head[0] for head in heads.values() if head is not None]:
         first = min(waiting)
-        rows: dict[Name, list[Row]] = {name: [] for name in chosen.tables}
-        for name, head in heads.items():
-            if head is not None and head[0] == first:
-                rows[name] = head[1]
-                heads[name] = next(streams[name], None)
-        yield rows
+        own = {name: head[1] for name, head in heads.items() if head and head[0] == first}
+        yield Rows(**own)
+        heads |= {name: next(streams[name], None) for name in own}
 
 
-def _groups(chosen: Selection, name: Name) -> Iterator[Group]:
+def _groups(chosen: Selection, name: Name) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Yield rows grouped by the part of their first key that all rows of an object share."""
     key = KEYS[name][0]
-    for beginning, rows in groupby(chosen.rows(name), key=lambda row: str(row[key])[:SHORT]):
-        yield beginning, list(rows)
+    beginnings = groupby(chosen.rows(ROWS[name]), key=lambda row: str(getattr(row, key))[:SHORT])
+    for beginning, rows in beginnings:
+        yield beginning, tuple(rows)

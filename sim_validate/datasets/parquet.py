@@ -19,10 +19,17 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
-from sim_validate.datasets.tables import KEYS, TABLES, Column, Name, Tables
+from sim_validate.datasets.columns import CellKind, Cells, Column
+from sim_validate.datasets.rows import TABLES, Tables
+from sim_validate.datasets.tables import KEYS, Name
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
-TYPES = {"text": "string", "bool": "bool_", "int": "int64", "float": "float64"}
+TYPES: Mapping[CellKind, str] = {
+    "text": "string",
+    "bool": "bool_",
+    "int": "int64",
+    "float": "float64",
+}
 MISSING: Mapping[str, float] = {"float": math.nan, "int": -1}
 """Value that stands for null in arrays, by type of column."""
 GROUP_ROWS = 20_000
@@ -56,40 +63,24 @@ def pyarrow_parquet() -> Any:
 
 
 def parquet_bytes(
-    name: Name, rows: Iterable[Mapping[str, Any]], about: Mapping[str, str],
-    tables: Tables = TABLES,
-) -> bytes:  # fmt: skip
-    """Encode the rows of one table as the bytes of a file, sorted by their keys."""
+    name: Name, rows: Sequence[Cells], about: Mapping[str, str], tables: Tables = TABLES
+) -> bytes:
+    """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
     arrow, keys = pyarrow(), KEYS[name]
-    listed = list(rows)
-    by_key = {tuple(row[key] for key in keys): row for row in listed}
-    if len(by_key) < len(listed):
+    by_key = {tuple(row[key] for key in keys): row for row in rows}
+    if len(by_key) < len(rows):
         raise InputError(f"table {name}: two rows have the same {' and '.join(keys)}")
     ordered = [row for _, row in sorted(by_key.items(), key=lambda pair: pair[0])]
     schema = schema_of(tables[name]).with_metadata(dict(sorted(about.items())))
     try:
         arrays = [
-            arrow.array([_cell(row.get(each.name)) for row in ordered], type=each.type)
-            for each in schema
+            arrow.array([row.get(each.name) for row in ordered], type=each.type) for each in schema
         ]
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
     held = io.BytesIO()
     pyarrow_parquet().write_table(arrow.Table.from_arrays(arrays, schema=schema), held, **PAGES)
     return held.getvalue()
-
-
-def as_read(
-    name: Name, rows: Iterable[Mapping[str, Any]], tables: Tables = TABLES
-) -> list[dict[str, Any]]:
-    """Return rows as a file would give them: sorted, null for numbers that are not finite."""
-    held = pyarrow().BufferReader(parquet_bytes(name, rows, {}, tables))
-    return pyarrow_parquet().ParquetFile(held).read().to_pylist()
-
-
-def read_rows(path: Path, name: Name, tables: Tables = TABLES) -> list[dict[str, Any]]:
-    """Read the rows of a file and check all of its checksums."""
-    return read_table(path, name, tables).to_pylist()
 
 
 def each_batch(path: Path, name: Name, tables: Tables = TABLES) -> Iterator[Any]:
@@ -145,12 +136,16 @@ def read_columns(paths: Sequence[Path], name: Name, tables: Tables = TABLES) -> 
     None for null. Truth values are bool where none is null. Otherwise they are 1.0, 0.0 and NaN:
     floats refuse `~` and `&`, which would give wrong answers for objects without a word.
     """
-    rows = [row for path in paths for row in read_rows(path, name, tables)]
-    return {column.name: _as_array(column, rows) for column in tables[name]}
+    read = [read_table(path, name, tables) for path in paths]
+    return {
+        column.name: _as_array(
+            column, [cell for one in read for cell in one[column.name].to_pylist()]
+        )
+        for column in tables[name]
+    }
 
 
-def _as_array(column: Column, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]:
-    values = [row[column.name] for row in rows]
+def _as_array(column: Column, values: Sequence[Any]) -> NDArray[Any]:
     if column.kind == "text":
         return np.array(values, dtype=object)
     if column.kind == "bool":
@@ -160,16 +155,9 @@ def _as_array(column: Column, rows: Sequence[Mapping[str, Any]]) -> NDArray[Any]
     missing = MISSING[column.kind]
     empty = np.full(column.shape, missing).tolist()
     filled = [empty if value is None else value for value in values]
-    found = np.array(filled, dtype=object).reshape(len(rows), *column.shape)
+    found = np.array(filled, dtype=object).reshape(len(values), *column.shape)
     found[found == None] = missing  # noqa: E711 - elementwise
     return found.astype(np.int64 if column.kind == "int" else np.float64)
-
-
-def _cell(value: Any) -> Any:
-    """Replace every number that is not finite by None."""
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_cell(part) for part in value]  # pyright: ignore[reportUnknownVariableType]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @cache

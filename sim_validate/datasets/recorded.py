@@ -5,11 +5,10 @@ from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.planning.given_contacts import seat
-from grasp_core.values import Contact
 from sim_validate.closure.replaying import Recorded, Wanted
 from sim_validate.datasets.meshes import stored_body
 from sim_validate.datasets.open_dataset import select
-from sim_validate.datasets.rows import GIVEN, NOT_TRIED
+from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow, TrialRow
 from sim_validate.datasets.varied import VARIED
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.planning.grasps_json import NAMED, some
@@ -24,35 +23,27 @@ def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
             "nor --grasps"
         )
     name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
-    row = next((row for row in chosen.rows("grasps") if row["grasp_id"] == name), None)
-    if row is None or row["outcome"] == NOT_TRIED:
-        there = some(row["grasp_id"] for row in islice(chosen.rows("grasps"), NAMED))
+    row = next(chosen.rows(GraspRow, grasp_id=name), None)
+    if row is None or not row.was_tried:
+        there = some(row.grasp_id for row in islice(chosen.rows(GraspRow), NAMED))
         raise InputError(
             f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
         )
     config = chosen.config()
-    contacts = [
-        Contact(point, normal)
-        for point, normal in zip(row["contact_points_m"], row["contact_normals"], strict=True)
-        if point[0] is not None
-    ]
-    object_id = row["object_id"]
-    objects = (each for each in chosen.rows("objects") if each["object_id"] == object_id)
-    source = next((each["source_name"] for each in objects), object_id)
-    body = stored_body(folder, object_id, source, config.faces)
-    if row["label"] in (GIVEN, VARIED):  # on curved surfaces given contacts have faces of their own
-        body = seat(body, row["contact_points_m"], row["contact_normals"]).body
+    objects = chosen.rows(ObjectRow, object_id=row.object_id)
+    source = next((each.source_name for each in objects), row.object_id)
+    body = stored_body(folder, row.object_id, source, config.faces)
+    if row.label in (GIVEN, VARIED):  # on curved surfaces given contacts have faces of their own
+        body = seat(body, row.points, row.normals).body
     return Recorded(
         name=name,
         body=body,
-        contacts=tuple(contacts),
-        friction=row["friction"],
+        contacts=row.placed,
+        friction=row.friction,
         setup=Setup(),
         agenda=Agenda(random_wrenches=config.random_wrenches, seed=config.seed),
-        control=None if row["force_closed"] else str(row["label"]),
+        control=None if row.force_closed else row.label,
         outcomes={
-            each["name"]: each["outcome"]
-            for each in chosen.rows("trials")
-            if each["grasp_id"] == name
+            each.name: each.hold.outcome.value for each in chosen.rows(TrialRow, grasp_id=name)
         },
     )

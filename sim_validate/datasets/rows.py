@@ -1,281 +1,362 @@
-"""Makes the row of an object, and chooses its split by the hash of its mesh."""
+"""Declares the rows of each table: what its columns are called, hold and mean.
 
-import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+A dataset whose configuration asks for executions has one table and some columns more, and there are
+groups of columns on request, which its manifest names. Names end in their unit. Geometry is in the
+object's own frame, in float64, with normals into the object and torques about its centre of mass. A
+value that could not be measured is null.
+"""
+
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.given_contacts import Seated
-from grasp_core.values import Contact, Grasp
-from sim_validate.closure.controls import ControlTrial, ControlVerdict
+from grasp_core.arrays import Array, Indices, Shape, Wrench
+from grasp_core.declared import Declared, rules, types
+from grasp_core.errors import InputError
+from grasp_core.files.records import FLAT
+from grasp_core.kinds import Family, Friction, Number, Range, Seed
+from grasp_core.values import FINGERS, Contact
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
-from sim_validate.datasets.figures import (
-    Executed,
-    Figures,
-    execution_cells,
-    execution_rows,
-    for_fingers,
+from sim_validate.datasets.columns import (
+    Asked,
+    Column,
+    FiguresOf,
+    Known,
+    Within,
+    cells_of,
+    columns_of,
 )
-from sim_validate.datasets.given_contacts import GivenGrasp
-from sim_validate.datasets.tables import SPLITS, Name, id_beginning
-from sim_validate.datasets.units import WorkUnit
-from sim_validate.datasets.varied import VARIED, Tried, ratio_of
-from sim_validate.engine.traces import Outcome
+from sim_validate.datasets.tables import EXECUTED, NAMES, Name, SplitName
+from sim_validate.engine.traces import HoldVerdict, Outcome
+from sim_validate.execution.verdict import Execution, ExecutionTrial
 
-Row: TypeAlias = Mapping[str, Any]
-Rows: TypeAlias = Mapping[Name, tuple[Row, ...]]
-PLANNED = "planned"
-"""Kind of the grasps that were planned for their friction."""
 GIVEN = "given"
 """Label of grasps that another tool made."""
 NOT_TRIED = "not_tried"
 """Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
 anything else about them."""
+UNIT = 1e-9
+"""Largest difference between a normal's length and one."""
+ROUNDING = 1e-6
+"""Share of any number that processors may round differently."""
+CLAIMS = (
+    "survived", "mass_kg", "squeeze_n", "load_multiple", "predicted_first_slip",
+    "simulated_first_slip", "executed_trials", "execution_mismatches",
+)  # fmt: skip
+"""Cells that only executed grasps have."""
+Row: TypeAlias = Declared
+ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
+"""A vector for each finger, (k, 3); tables have four, null after the last."""
+Lengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
+Four: TypeAlias = Annotated[Indices, Shape(FINGERS, whole=True)]
+Joints: TypeAlias = Annotated[Array, Shape("hand")]
+"""An angle for each joint of the hand."""
+Points: TypeAlias = Annotated[Array, Shape(FINGERS, 3)]
 
 
-def split_of(object_id: str, seed: int) -> str:
-    """Choose the split of an object by its hash, so that adding objects moves no other object."""
-    digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
-    share = int.from_bytes(digest[:8], "big") / 2.0**64
-    return next(name for name, upto in SPLITS if share < upto)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ObjectRow(Declared):
+    """An object; its mesh, in metres, is `meshes/OBJECT_ID.obj`."""
+
+    object_id: str
+    """SHA-256 hash of the object's mesh; identifies the object."""
+    source_name: str
+    """File name, or name of the built-in object."""
+    source_sha256: str
+    """SHA-256 hash of the mesh file or built-in mesh."""
+    split: SplitName
+    """Part of the dataset: train, validation or test."""
+    vertices: Number
+    """Number of vertices."""
+    triangles: Number
+    """Number of triangles."""
+    faces: Number
+    """Number of planar faces or patches."""
+    curved: bool
+    """Whether the faces are patches of a curved surface."""
+    volume_m3: float
+    """Volume."""
+    volume_source: Literal["surface", "capped surface", "convex hull"]
+    """What volume and centre of mass are of: the surface, the capped surface (small holes were
+    closed), or the convex hull (it is open)."""
+    radius_m: float
+    """Largest distance of a vertex from the centre of mass."""
+    center_of_mass_m: Annotated[Array, Shape(3)]
+    """Centre of mass."""
 
 
-def object_row(body: Polyhedron, unit: WorkUnit) -> Mapping[str, Any]:
-    """Make the row of a unit's object."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class GraspRow(Declared):
+    """Four contacts on an object at one friction, or a negative control made from them."""
+
+    grasp_id: str
+    """Identifies the row: made of object, friction and name."""
+    object_id: str
+    """Object of the grasp."""
+    split: SplitName
+    """Part of the dataset that the object is in."""
+    name: str
+    """The grasp's id in the planner's files: family and faces."""
+    label: str
+    """`grasp`, `given` (from elsewhere), `varied`, or the name of the negative control."""
+    control_of: str | None = None
+    """The grasp that a negative control was made from."""
+    friction: Friction
+    """Coulomb coefficient of the plan and of the trials."""
+    family: Family | None = None
+    """Family of the grasp, given by its lines of force; null for controls."""
+    faces: Four | None = None
+    """Indices of the faces or patches; null for controls."""
+    contacts: Annotated[int, Range(least=1, most=FINGERS)]
+    """Number of contacts: four, fewer for some controls."""
+    contact_points_m: ByFinger
+    """Contacts by finger; null after the last."""
+    contact_normals: ByFinger
+    """Inward unit normals; null after the last."""
+    moved_m: Known = None
+    """Largest distance by which a given contact was moved."""
+    force_closed: bool | None = None
+    """Whether it is proved to be in force closure."""
+    closure_margin: Known = None
+    """Margin of the exact test of force closure."""
+    critical_friction: Known = None
+    """Smallest coefficient with force closure."""
+    region_radius_m: Known = None
+    """Radius of the smallest contact region; 0 for points."""
+    region_kind: str | None = None
+    """How contact regions were made: cone, disc, or point for none."""
+    region_radii_m: Lengths | None = None
+    """Largest disc radius in each contact region."""
+    ferrari_canny_lower_n: Known = None
+    """Proved lower bound of Ferrari-Canny quality."""
+    ferrari_canny_upper_n: Known = None
+    """Proved upper bound of Ferrari-Canny quality."""
+    held: bool | None = None
+    """Whether the grasp held in every trial."""
+    outcome: str = NOT_TRIED
+    """`held`, or how the first trial that did not hold ended."""
+    note: str = ""
+    """Why a given grasp was not tried, else empty."""
+    trials: Number = 0
+    """Number of simulated trials."""
+    mismatches: Number = 0
+    """Number of contradictions between simulation and analysis."""
+    verdict: Annotated[
+        Mapping[str, Any],
+        FiguresOf(Verdict, told=("id", "predicted_critical_friction")),
+    ] = field(default_factory=dict[str, Any])
+    """Figures of the verdict; null for controls."""
+
+    executed: Annotated[bool, Asked(EXECUTED)] = False
+    """Whether trials were simulated; false for negative controls, and where no squeeze carries the
+    weight."""
+    survived: Annotated[bool | None, Asked(EXECUTED)] = None
+    """Whether the object survived every trial; false also where no squeeze carries the weight; null
+    where it is not known."""
+    execution_note: Annotated[str | None, Asked(EXECUTED)] = None
+    """Why a grasp was not executed, or which trials were not possible."""
+    mass_kg: Annotated[Known, Asked(EXECUTED), Within(ROUNDING)] = None
+    """Mass of the object in the execution."""
+    squeeze_n: Annotated[ByFinger | None, Asked(EXECUTED)] = None
+    """Contact forces on the object at rest, by finger."""
+    load_multiple: Annotated[Known, Asked(EXECUTED)] = None
+    """Multiple of the weight, in any direction, that the squeeze is proved to carry."""
+    predicted_first_slip: Annotated[Known, Asked(EXECUTED)] = None
+    """Least multiple of a trial's load at which a contact slips, predicted; null if none ever
+    does."""
+    simulated_first_slip: Annotated[Known, Asked(EXECUTED)] = None
+    """The same from simulated contact forces."""
+    executed_trials: Annotated[int | None, Asked(EXECUTED)] = None
+    """Number of trials of the execution."""
+    execution_mismatches: Annotated[int | None, Asked(EXECUTED)] = None
+    """Number of the execution's own negative controls that did not slip, but must."""
+    execution: Annotated[
+        Mapping[str, Any], FiguresOf(Execution, beginning="execution_"), Asked(EXECUTED)
+    ] = field(default_factory=dict[str, Any])
+    """Figures of the execution."""
+
+    kind: Annotated[str | None, Asked("kinds")] = None
+    """`planned`, `given`, the name of a negative control, or `friction_below`, .. `mass_near`."""
+    made_from: Annotated[str | None, Asked("kinds")] = None
+    """The grasp that a varied one was made from; null for others."""
+    friction_ratio: Annotated[Known, Asked("kinds")] = None
+    """Friction over critical friction; null where none is known."""
+    displaced_m: Annotated[Lengths | None, Asked("kinds")] = None
+    """Distance of each contact from that of `made_from`."""
+    region_exit_m: Annotated[Lengths | None, Asked("kinds")] = None
+    """How far the region reached in the direction of that move; null where the contact did not
+    move."""
+    mass_ratio: Annotated[Known, Asked("kinds")] = None
+    """Mass over the mass at which `made_from` is predicted to lose the object."""
+
+    span_angle_rad: Annotated[Known, Asked("closure"), Within(ROUNDING, ROUNDING)] = None
+    """Half-angle below which cones positively span."""
+    smallest_singular_value: Annotated[Known, Asked("closure"), Within(ROUNDING, ROUNDING)] = None
+    """Least singular value of the grasp map."""
+    witness_forces_n: Annotated[Points | None, Asked("closure")] = None
+    """Balanced forces on the object, normal parts sum to one."""
+
+    predicted_loss: Annotated[Known, Asked("margins")] = None
+    """Least multiple of a trial's load that loses it."""
+    payload_kg: Annotated[Known, Asked("margins"), Within(ROUNDING)] = None
+    """Mass that the squeeze is proved to carry."""
+    tip_radius_m: Annotated[Known, Asked("margins")] = None
+    """Radius of the fingertips of the execution."""
+
+    least_push_n: Annotated[Known, Asked("least_squeeze")] = None
+    """Least largest push that carries the weight any way."""
+    least_squeeze_n: Annotated[ByFinger | None, Asked("least_squeeze")] = None
+    """Contact forces at rest with that push."""
+
+    hand_reached: Annotated[bool | None, Asked("hand")] = None
+    """Whether a pose of the hand was found; null if not closed."""
+    hand_reason: Annotated[str | None, Asked("hand")] = None
+    """Why no pose was found; empty where one was."""
+    hand_fingers: Annotated[Four | None, Asked("hand")] = None
+    """Number of the hand's finger at each contact."""
+    hand_joints_rad: Annotated[Joints | None, Asked("hand")] = None
+    """Joint angles, finger by finger from the palm."""
+    T_object_palm_m: Annotated[Annotated[Array, Shape(4, 4)] | None, Asked("hand")] = None
+    """Pose of the palm in the object's frame."""
+    hand_points_m: Annotated[Points | None, Asked("hand")] = None
+    """Contacts of the fingertips."""
+    hand_normals: Annotated[Points | None, Asked("hand")] = None
+    """Inward unit normals at these."""
+    hand_open_joints_rad: Annotated[Joints | None, Asked("hand")] = None
+    """Joint angles with open fingers; null if none found."""
+    hand_approach: Annotated[Annotated[Array, Shape(3)] | None, Asked("hand")] = None
+    """Direction of the palm's straight way in; null if none."""
+
+    def _check_together(self) -> None:
+        for name in ("contact_points_m", "contact_normals"):
+            there = np.isfinite(getattr(self, name)).all(axis=1)
+            if there.sum() != self.contacts or not there[: self.contacts].all():
+                raise InputError(f"{name} must have the {self.contacts} that `contacts` says first")
+        if not (np.abs(np.linalg.norm(self.normals, axis=1) - 1.0) <= UNIT).all():
+            raise InputError("contact_normals must be unit vectors")
+        if not self.was_tried:
+            claims = (self.held, self.force_closed, self.closure_margin)
+            if self.label != GIVEN or self.trials or any(claim is not None for claim in claims):
+                raise InputError("the row claims results, although the grasp was not tried")
+        elif self.held is None or self.force_closed is None or not self.trials:
+            raise InputError("a grasp that was tried must have trials, held and force_closed")
+        elif self.force_closed and self.closure_margin is None:
+            raise InputError("closure_margin must be a number where a grasp is in force closure")
+        elif self.held != (self.outcome == Outcome.HELD.value):
+            raise InputError(f"held is {self.held}, but `outcome` is {self.outcome!r}")
+
+        self._check_execution()
+
+    def _check_execution(self) -> None:
+        """Refuse results of an execution that was not simulated; without a squeeze all is lost."""
+        claims = [name for name in CLAIMS if getattr(self, name) is not None]
+        lost = claims == ["survived"] and not self.survived and self.execution_note
+        control = self.executed and self.control_of is not None
+        if control or (claims and not self.executed and not lost):
+            raise InputError("the row claims results of an execution, although none was simulated")
+
+    @property
+    def was_tried(self) -> bool:
+        """Whether the contacts were simulated, closed or not."""
+        return self.outcome != NOT_TRIED
+
+    @property
+    def points(self) -> Array:
+        """The contacts that are there, (k, 3) [m]."""
+        return self.contact_points_m[: self.contacts]
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals at them, into the object, (k, 3)."""
+        return self.contact_normals[: self.contacts]
+
+    @property
+    def placed(self) -> tuple[Contact, ...]:
+        """The contacts that are there."""
+        return tuple(map(Contact, self.points, self.normals))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TrialRow(Declared):
+    """A grasp or control under one wrench, in simulation."""
+
+    grasp_id: str
+    """Grasp that is tried."""
+    trial: Number
+    """Number of the trial, from 0 for each grasp."""
+    name: str
+    """Name of the wrench."""
+    wrench_n_nm: Wrench
+    """Applied force, then torque."""
+    predicted_limit: Known
+    """Largest multiple of the wrench resisted, by analysis."""
+    required_friction: Known
+    """Friction that the planned contact forces need."""
+    hold: Annotated[HoldVerdict, FLAT]
+    simulated_limit: Known
+    """Multiple of the wrench that slips in simulation."""
+    verdict: Annotated[Mapping[str, Any], FiguresOf(WrenchVerdict)] = field(
+        default_factory=dict[str, Any]
+    )
+    """Other figures of the trial; null for controls."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ExecutionRow(Declared):
+    """A grasp in one trial of its execution, in simulation."""
+
+    grasp_id: str
+    """Grasp that is executed."""
+    trial: Number
+    """Number of the trial, from 0 for each grasp."""
+    tried: Annotated[ExecutionTrial, FLAT]
+    seed: Annotated[Seed | None, Asked("margins")] = None
+    """Seed that a misplaced trial was drawn by; null for others."""
+
+
+ROWS: Mapping[Name, type[Any]] = {
+    "objects": ObjectRow, "grasps": GraspRow, "trials": TrialRow, "executions": ExecutionRow,
+}  # fmt: skip
+"""The class of each table's rows."""
+Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Rows of all tables that belong together."""
+
+    objects: tuple[ObjectRow, ...] = ()
+    grasps: tuple[GraspRow, ...] = ()
+    trials: tuple[TrialRow, ...] = ()
+    executions: tuple[ExecutionRow, ...] = ()
+
+    def of(self, name: Name) -> tuple[Row, ...]:
+        """Return the rows of a table."""
+        return getattr(self, name)
+
+    def cells(self, name: Name, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
+        """Return the cells of the rows of a table."""
+        return [cells_of(row, columns) for row in self.of(name)]
+
+
+def groups_asked() -> Iterator[str]:
+    """Yield the names of all groups of columns."""
+    marks = (
+        rule for kind in ROWS.values() for each in types(kind).values() for rule in rules(each)
+    )
+    yield from dict.fromkeys(mark.group for mark in marks if isinstance(mark, Asked))
+
+
+def dataset_tables(groups: Mapping[str, int]) -> Tables:
+    """Return the tables of a dataset with their columns; groups of columns have their sizes."""
     return {
-        "object_id": body.content_sha256,
-        "source_name": Path(unit.object).name,
-        "source_sha256": unit.source_sha256,
-        "split": split_of(body.content_sha256, unit.config.seed),
-        "vertices": len(body.vertices),
-        "triangles": len(body.triangles),
-        "faces": len(body.faces),
-        "curved": body.patches is not None,
-        "volume_m3": body.volume,
-        "volume_source": body.surface.volume_source,
-        "radius_m": body.radius,
-        "center_of_mass_m": body.center_of_mass.tolist(),
+        name: columns_of(ROWS[name], groups)
+        for name in NAMES
+        if name != "executions" or EXECUTED in groups
     }
 
 
-@dataclass(slots=True)
-class GraspRows:
-    """Rows of one object at one friction, while they are made."""
-
-    body: Polyhedron
-    unit: WorkUnit
-    grasps: list[Row] = field(default_factory=list[Row])
-    trials: list[Row] = field(default_factory=list[Row])
-    executions: list[Row] = field(default_factory=list[Row])
-
-    def add(self, grasp: Grasp, verdict: Verdict, executed: Executed = None) -> None:
-        """Add the rows of a planned grasp, its negative controls, and the trials of all."""
-        about = {
-            "label": "grasp",
-            "kind": PLANNED,
-            "family": grasp.family,
-            "region_radius_m": grasp.radius,
-        }
-        self._add_closed(grasp, verdict, about, executed, self.body)
-
-    def add_given(
-        self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, seated: Seated,
-        executed: Executed = None,
-    ) -> None:  # fmt: skip
-        """Add rows of a force-closed given grasp, its negative controls, and all trials."""
-        about: dict[str, Any] = {
-            "name": given.name, "label": GIVEN, "kind": GIVEN,
-            "moved_m": seated.moved_m,
-        }  # fmt: skip
-        if self.body.patches is not None:
-            # on curved surfaces the contacts' faces are made for this grasp alone
-            about["faces"] = None
-        self._add_closed(grasp, verdict, about, executed, seated.body)
-
-    def add_varied(self, made_from: str, tried: Tried) -> None:
-        """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
-        variant, verdict = tried.variant, tried.verdict
-        name = f"{self.name(made_from)}:{variant.name}"
-        about: dict[str, Any] = {
-            "name": variant.name, "label": VARIED, "kind": variant.kind,
-            "made_from": self.name(made_from), "displaced_m": variant.displaced_m.tolist(),
-            "region_exit_m": list(variant.exits_m), "mass_ratio": variant.mass_ratio,
-            "friction": variant.friction, "control_of": None,
-            "friction_ratio": variant.friction_ratio,
-        }  # fmt: skip
-        if not isinstance(verdict, ControlVerdict):
-            assert isinstance(variant.proved, Grasp)  # noqa: S101 - only closed ones have verdicts
-            if self.body.patches is not None:
-                about["faces"] = None
-            self._add_closed(
-                variant.proved, verdict, about, tried.executed, variant.seated.body, name
-            )
-            return
-        if variant.critical_friction is not None:
-            about["critical_friction"] = variant.critical_friction
-        self._add_refuted(name, verdict, about, tried.executed)
-
-    def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
-        """Add rows of a given grasp that is not force-closed; it is a negative control."""
-        about = {
-            "name": given.name, "label": GIVEN, "kind": GIVEN, "control_of": None,
-            "moved_m": moved_m,
-        }  # fmt: skip
-        self._add_refuted(self.name(given.id), verdict, about)
-
-    def add_untried(self, given: GivenGrasp, why: str) -> None:
-        """Add the row of a given grasp that cannot be simulated."""
-        contacts = [
-            Contact(np.array(point), np.array(normal))
-            for point, normal in zip(given.points, given.normals, strict=True)
-        ]
-        self.grasps.append(
-            self._common(self.name(given.id), contacts)
-            | {
-                "name": given.name,
-                "label": GIVEN,
-                "kind": GIVEN,
-                "control_of": None,
-                "outcome": NOT_TRIED,
-                "note": why,
-                "trials": 0,
-                "mismatches": 0,
-            }
-        )
-
-    def _add_closed(
-        self, grasp: Grasp, verdict: Verdict, about: Mapping[str, Any], executed: Executed,
-        body: Polyhedron, name: str | None = None,
-    ) -> None:  # fmt: skip
-        name = self.name(grasp.id) if name is None else name
-        figures = self._figures
-        friction = verdict.critical_friction
-        self.grasps.append(
-            self._common(name, grasp.contacts, verdict.friction)
-            | {
-                "name": grasp.id,
-                "control_of": None,
-                "faces": list(grasp.faces),
-                "force_closed": True,
-                "closure_margin": grasp.closure_margin,
-                "critical_friction": grasp.critical_friction,
-                "region_kind": grasp.regions[0].kind,
-                "region_radii_m": [region.inscribed_radius for region in grasp.regions],
-                "ferrari_canny_lower_n": grasp.ferrari_canny[0],
-                "ferrari_canny_upper_n": grasp.ferrari_canny[1],
-                "held": verdict.held,
-                "outcome": verdict.outcome.value,
-                "trials": len(verdict.wrenches),
-                "mismatches": len(verdict.mismatches),
-                "simulated_critical_friction": friction.simulated,
-                "friction_ratio": ratio_of(verdict.friction, grasp.critical_friction),
-                **({} if figures is None else figures.of_grasp(body, grasp, verdict.friction)),
-                **about,
-                **self._of_executed(body, grasp.contacts, verdict.friction, executed),
-            }
-        )
-        self._add_executions(name, executed)
-        self._add_trials(name, verdict.wrenches)
-        for control in verdict.controls:
-            kind = control.control.name
-            said = {
-                "name": about.get("name", grasp.id), "label": kind, "control_of": name,
-                "kind": kind,
-            }  # fmt: skip
-            self._add_refuted(f"{name}:{kind}", control, said)
-
-    def _add_refuted(
-        self, name: str, verdict: ControlVerdict, about: Mapping[str, Any],
-        executed: Executed = None,
-    ) -> None:  # fmt: skip
-        control = verdict.control
-        first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
-        self.grasps.append(
-            self._common(name, control.contacts, control.friction)
-            | {
-                "friction": control.friction,
-                "force_closed": False,
-                "closure_margin": control.certificate.margin,
-                "held": first is None,
-                "outcome": Outcome.HELD.value if first is None else first.hold.outcome.value,
-                "trials": len(verdict.tried),
-                "mismatches": int(not verdict.let_go),
-                **about,
-                **self._of_executed(self.body, control.contacts, control.friction, executed),
-            }
-        )
-        self._add_executions(name, executed)
-        self._add_trials(name, verdict.tried)
-
-    def _add_executions(self, name: str, executed: Executed) -> None:
-        asked = self.unit.config.execution
-        if asked is not None:
-            more = () if self._figures is None else self._figures.asked.seeds
-            seeds = (asked.seed, *more)
-            self.executions += execution_rows(name, executed, seeds, asked.misplacements)
-
-    def _of_executed(
-        self, body: Polyhedron, contacts: Sequence[Contact], friction: float, executed: Executed
-    ) -> Mapping[str, Any]:
-        cells = execution_cells(executed)
-        if self._figures is None or cells.get("mass_kg") is None:
-            return cells
-        return {**cells, **self._figures.of_executed(body, contacts, friction, cells["mass_kg"])}
-
-    @property
-    def _figures(self) -> Figures | None:
-        config = self.unit.config
-        if config.learning is None:
-            return None
-        return Figures(config.learning, config.execution, config.seed)
-
-    def name(self, grasp: str) -> str:
-        """Return the name of a grasp, which no other grasp of the dataset has."""
-        return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
-
-    def _common(
-        self, name: str, contacts: Iterable[Contact], friction: float | None = None
-    ) -> dict[str, Any]:
-        listed, figures = list(contacts), self._figures
-        friction = self.unit.friction if friction is None else friction
-        unexecuted = {} if self.unit.config.execution is None else {"executed": False}
-        return {
-            **unexecuted,
-            "grasp_id": name,
-            "object_id": self.body.content_sha256,
-            "split": split_of(self.body.content_sha256, self.unit.config.seed),
-            "friction": self.unit.friction,
-            "note": "",
-            "contacts": len(listed),
-            "contact_points_m": for_fingers([c.position.tolist() for c in listed], [None] * 3),
-            "contact_normals": for_fingers([c.normal.tolist() for c in listed], [None] * 3),
-            **({} if figures is None else figures.of_contacts(self.body, listed)),
-        }
-
-    def _add_trials(
-        self, name: str, tried: Sequence[WrenchVerdict] | Sequence[ControlTrial]
-    ) -> None:
-        for number, trial in enumerate(tried):
-            hold = trial.hold
-            row: dict[str, Any] = {
-                "grasp_id": name,
-                "trial": number,
-                "name": trial.name,
-                "wrench_n_nm": trial.wrench.tolist(),
-                "required_friction": trial.required_friction,
-                "outcome": hold.outcome.value,
-                "reason": hold.reason,
-                "displacement_m": hold.displacement_m,
-                "rotation_rad": hold.rotation_rad,
-                "slip_m": for_fingers(hold.slip_m.tolist(), None),
-                "failed_after_s": hold.failed_after_s,
-            }
-            if isinstance(trial, WrenchVerdict):
-                found, predicted = trial.simulated_limit, trial.predicted_limit
-                row["predicted_limit"] = predicted
-                row["simulated_limit"] = None if found is None else found.share * predicted
-            self.trials.append(row)
+TABLES = dataset_tables({})
+"""Tables of a dataset without columns on request."""

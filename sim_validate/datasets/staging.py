@@ -5,27 +5,28 @@ subfolder is complete, and a resumed build repeats only the units that were unde
 """
 
 import hashlib
-import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
-
-from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import record_of
-from grasp_core.files.text_files import read_bytes, read_text
+from grasp_core.checked import shown
+from grasp_core.declared import FieldError
+from grasp_core.errors import InputError
+from grasp_core.files.records import RecordFile
+from grasp_core.files.text_files import read_bytes
 from sim_validate.datasets.make_unit import Made
 from sim_validate.datasets.parquet import parquet_bytes
-from sim_validate.datasets.tables import Name
+from sim_validate.datasets.rows import dataset_tables
+from sim_validate.datasets.tables import Name, SplitName
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.kit.paths import path_inside
 
-RECORD = "unit.json"
+HASH = re.compile(r"[0-9a-f]{64}")
 OTHERS = "others"
 """Subfolder for those files of a unit that are not tables."""
 UNFINISHED = "."
@@ -34,18 +35,32 @@ MOST_BYTES = 2**31
 """Largest size of one file of a unit."""
 
 
-class UnitRecord(BaseModel):
+@dataclass(frozen=True, slots=True)
+class UnitRecord(RecordFile):
     """Record of a finished unit of work: where its rows belong, or why it has none."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    FILE = "unit.json"
+    SCHEMA = 1
 
     object: str
     friction: float
-    files: dict[str, str]
+    files: Mapping[str, str]
     """SHA-256 of each file, by its path in the unit's folder."""
-    object_id: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
-    split: Literal["train", "validation", "test"] | None = None
+    object_id: str | None = None
+    """Hash of the object's mesh, in whose table its row is; None if there are no rows."""
+    split: SplitName | None = None
     reason: str | None = None
+    """Why there are no rows; None if there are."""
+
+    def _check_together(self) -> None:
+        there = (self.object_id is not None, self.split is not None, self.reason is None)
+        if len(set(there)) > 1:
+            raise InputError(
+                "expected an object_id and a split, or else a reason for having no rows; remove "
+                "the folder and build again"
+            )
+        if self.object_id is not None and not HASH.fullmatch(self.object_id):
+            raise FieldError("object_id", f"must be a SHA-256 hash, got {shown(self.object_id)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +69,7 @@ class Finished:
 
     unit: WorkUnit
     object_id: str
-    split: str
+    split: SplitName
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +92,14 @@ class Staging:
 
     def write(self, unit: WorkUnit, made: Made) -> None:
         """Keep the rows and files of a finished unit."""
-        kinds = unit.config.tables
-        tables = {_file(name): parquet_bytes(name, made.rows[name], {}, kinds) for name in kinds}
+        kinds = dataset_tables(unit.config.groups)
+        tables = {
+            _file(name): parquet_bytes(name, made.rows.cells(name, columns), {}, kinds)
+            for name, columns in kinds.items()
+        }
         others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}
-        self._put(unit, {**tables, **others}, object_id=made.object_id, split=made.split)
+        (row,) = made.rows.objects
+        self._put(unit, {**tables, **others}, object_id=row.object_id, split=row.split)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:
         """Record that a unit cannot be computed, with the reason."""
@@ -89,20 +108,14 @@ class Staging:
     def result(self, unit: WorkUnit) -> Finished | str:
         """Look up how a unit ended: with its object and split, or with a reason for no rows."""
         record = self._record(unit)
-        if record.reason is not None:
-            return record.reason
         if record.object_id is None or record.split is None:
-            raise InputError(
-                f"{self._of(unit) / RECORD}: this record names neither rows nor a reason for "
-                "having none; remove its folder and build again"
-            )
+            return record.reason or ""
         return Finished(unit, record.object_id, record.split)
 
     def done(self, unit: WorkUnit) -> bool:
         """Tell whether a unit is finished or quarantined, and all its files are as written."""
         try:
             record = self._record(unit)
-            self.result(unit)  # raises if the record says nothing
             return all(
                 _sha256(read_bytes(path_inside(self._of(unit), name), MOST_BYTES)) == sha256
                 for name, sha256 in record.files.items()
@@ -130,17 +143,14 @@ class Staging:
         return self.folder / unit.id
 
     def _record(self, unit: WorkUnit) -> UnitRecord:
-        path = self._of(unit) / RECORD
-        text = read_text(path)
-        with about(path):
-            return record_of(UnitRecord, text, RECORD)
+        return UnitRecord.read(self._of(unit) / UnitRecord.FILE)
 
     def _put(self, unit: WorkUnit, files: Mapping[str, bytes], **more: Any) -> None:
         hashes = {name: _sha256(data) for name, data in files.items()}
-        record = UnitRecord(object=unit.object, friction=unit.friction, files=hashes, **more)
+        record = UnitRecord(unit.object, unit.friction, hashes, **more)
         made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
         try:
-            for name, data in {**files, RECORD: json.dumps(record.model_dump()).encode()}.items():
+            for name, data in {**files, record.FILE: record.text().encode()}.items():
                 path = made / name
                 path.parent.mkdir(parents=True, exist_ok=True)
                 with path.open("wb") as stream:

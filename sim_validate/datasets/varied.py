@@ -46,8 +46,8 @@ from sim_validate.datasets.figures import Executed, executed_by
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.settings.executions import ExecutionSettings
 
 RATIOS = {
     "friction_below": (0.6, 0.9),
@@ -273,12 +273,12 @@ class Varying:
                 )  # fmt: skip
                 yield Tried(each, alone, self._executed(each))
 
-    def _verdict(self, variant: Variant, gate: Gate) -> Verdict | ControlVerdict:
+    def _verdict(self, variant: Variant, gate: Gate | None) -> Verdict | ControlVerdict:
         seated, friction = variant.seated, variant.friction
         if isinstance(variant.proved, Grasp):
             agenda = replace(self.agenda, controls=False, critical_friction=False)
             return tested(seated.body, variant.proved, friction, gate, agenda, Setup())
-        control = Control(VARIED, seated.contacts, friction, variant.proved)
+        control = Control(VARIED, friction, variant.proved)
         return try_control(seated.body, control, self.agenda, Setup())
 
     def _executed(self, variant: Variant) -> Executed:

@@ -8,24 +8,24 @@ the same contacts must have the same verdict and critical friction.
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from grasp_core.errors import GraspError, InputError
-from grasp_core.files.json_text import shown
 from grasp_core.files.text_files import read_text
 from grasp_core.provenance import arithmetic
-from sim_validate.datasets.build import CONFIG, CONTACTS, QUARANTINE, TWIN
+from sim_validate.datasets.build import CONFIG, CONTACTS, TWIN
+from sim_validate.datasets.columns import Cells
 from sim_validate.datasets.config import config_from_toml
 from sim_validate.datasets.given_contacts import read_given
 from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.manifest import (
     MANIFEST,
+    QUARANTINE,
     Listed,
     Manifest,
     listed,
@@ -33,9 +33,10 @@ from sim_validate.datasets.manifest import (
     read_manifest,
 )
 from sim_validate.datasets.meshes import stored_body
-from sim_validate.datasets.open_dataset import ObjectRows, Row, Selection, by_object
-from sim_validate.datasets.parquet import as_read, pyarrow
-from sim_validate.datasets.tables import KEYS, Name, Tables, id_beginning
+from sim_validate.datasets.open_dataset import Selection, by_object
+from sim_validate.datasets.parquet import pyarrow
+from sim_validate.datasets.rows import GraspRow, ObjectRow, Rows
+from sim_validate.datasets.tables import KEYS, Name, id_beginning
 from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.datasets.verify_rows import object_faults
 from sim_validate.execution.verdict import may_slip
@@ -77,8 +78,6 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
             faults += _sample_faults(folder, manifest, sample)
     except InputError as error:
         faults.append(str(error))
-    except (TypeError, KeyError, ValueError) as error:  # a cell is null that must not be
-        faults.append(f"data: a row is not as this version writes rows ({shown(str(error))})")
     return faults
 
 
@@ -131,8 +130,6 @@ def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
     if manifest.groups != config.groups:
         yield f"{MANIFEST}: `groups` is {manifest.groups}, unlike {CONFIG}"
-    if manifest.executed != (config.execution is not None):
-        yield f"{MANIFEST}: `executed` is {manifest.executed}, unlike {CONFIG}"
     lines = len(read_left_out(folder / QUARANTINE))
     if lines != manifest.quarantined:
         yield (
@@ -145,15 +142,15 @@ def _sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator
     redoing = _Redoing(folder, manifest)
     everything = Selection(folder, manifest, None)
     units = [
-        (row["object_id"], friction)
-        for row in everything.rows("objects")
+        (row.object_id, friction)
+        for row in everything.rows(ObjectRow)
         for friction in redoing.frictions(row)
     ]
     chosen = {*drawn(sorted(units), sample)}
     splits = sorted({each.split for each in manifest.files if each.split is not None})
     for split in splits:
         for rows in by_object(Selection(folder, manifest, split)):
-            for row in rows["objects"]:
+            for row in rows.objects:
                 yield from redoing.faults(row, rows, chosen)
 
 
@@ -163,6 +160,7 @@ class _Redoing:
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self._folder = folder
         self._config = config_from_toml(folder / CONFIG)
+        self._tables = manifest.tables
         same = (dict(provenance()), arithmetic())
         self._exact = (manifest.versions, manifest.arithmetic) == same
         self._given = read_given(folder / CONTACTS) if self._config.contacts else ()
@@ -173,47 +171,43 @@ class _Redoing:
                 gone = self._left_out.setdefault((each.source_sha256, each.friction), set())
                 gone.update(each.given)
 
-    def frictions(self, row: Mapping[str, Any]) -> list[float]:
+    def frictions(self, row: ObjectRow) -> list[float]:
         """List the frictions at which an object has rows, perhaps without a grasp."""
         return [f for f in self._config.frictions if not self._all_left_out(row, f)]
 
-    def faults(
-        self, row: Mapping[str, Any], rows: ObjectRows, chosen: Set[tuple[str, float]]
-    ) -> Iterator[str]:
+    def faults(self, row: ObjectRow, rows: Rows, chosen: Set[tuple[str, float]]) -> Iterator[str]:
         """Yield sentences on what is wrong with an object at the chosen frictions."""
         for friction in self._config.frictions:
-            stored = _of_unit(rows, row["object_id"], friction)
-            where = f"{row['source_name']} at friction {friction}"
+            stored = _of_unit(rows, row.object_id, friction)
+            where = f"{row.source_name} at friction {friction}"
             if self._all_left_out(row, friction):
-                if stored["grasps"]:
+                if stored.grasps:
                     yield f"{where}: {QUARANTINE} lists this object as left out, but it has rows"
-            elif (row["object_id"], friction) in chosen:
+            elif (row.object_id, friction) in chosen:
                 found = islice(self._unit_faults(row, friction, stored), MOST_NAMED)
                 yield from (f"{where}: {fault}" for fault in found)
 
-    def _all_left_out(self, row: Mapping[str, Any], friction: float) -> bool:
-        gone = self._left_out.get((row["source_sha256"], friction))
+    def _all_left_out(self, row: ObjectRow, friction: float) -> bool:
+        gone = self._left_out.get((row.source_sha256, friction))
         return gone is not None and len(gone) == len(self._given)
 
-    def _unit_faults(
-        self, row: Mapping[str, Any], friction: float, stored: ObjectRows
-    ) -> Iterator[str]:
-        name, source = row["source_name"], row["source_sha256"]
+    def _unit_faults(self, row: ObjectRow, friction: float, stored: Rows) -> Iterator[str]:
+        name, source = row.source_name, row.source_sha256
         gone = self._left_out.get((source, friction), set())
         given = tuple(each for each in self._given if each.id not in gone)
         try:
-            body = stored_body(self._folder, row["object_id"], name, self._config.faces)
+            body = stored_body(self._folder, row.object_id, name, self._config.faces)
             made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
         except GraspError as error:
             yield f"the grasps cannot be computed again ({error})"
             return
-        tables = self._config.tables
-        now: ObjectRows = {each: as_read(each, made.rows[each], tables) for each in tables}
         if not self._exact:
-            yield from _loose_differences(stored, now)
+            yield from _loose_differences(stored, made.rows)
             return
-        for table in tables:
-            yield from _differences(table, tables, stored[table], now[table])
+        for table, columns in self._tables.items():
+            yield from _differences(
+                table, stored.cells(table, columns), made.rows.cells(table, columns)
+            )
         for path, text in made.files.items():
             if read_text(self._folder / path) != text:
                 yield f"{path}: the file differs from what is computed again"
@@ -228,22 +222,17 @@ def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str,
     return sorted(units, key=place)[: math.ceil(sample.share * len(units))]
 
 
-def _of_unit(rows: ObjectRows, object_id: str, friction: float) -> ObjectRows:
+def _of_unit(rows: Rows, object_id: str, friction: float) -> Rows:
     beginning = id_beginning(object_id, friction)
-    return {
-        name: [
-            row
-            for row in of_table
-            if (row["object_id"] == object_id if name == "objects"
-                else row["grasp_id"].startswith(beginning))
-        ]
-        for name, of_table in rows.items()
-    }  # fmt: skip
+    return Rows(
+        tuple(row for row in rows.objects if row.object_id == object_id),
+        tuple(row for row in rows.grasps if row.grasp_id.startswith(beginning)),
+        tuple(row for row in rows.trials if row.grasp_id.startswith(beginning)),
+        tuple(row for row in rows.executions if row.grasp_id.startswith(beginning)),
+    )
 
 
-def _differences(
-    name: Name, tables: Tables, stored: Sequence[Row], made: Sequence[Row]
-) -> Iterator[str]:
+def _differences(name: Name, stored: Sequence[Cells], made: Sequence[Cells]) -> Iterator[str]:
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
     yield from (
@@ -255,43 +244,40 @@ def _differences(
         for key in after.keys() - before.keys()
     )
     for key in before.keys() & after.keys():
-        for column in tables[name]:
-            one, other = before[key][column.name], after[key][column.name]
-            if one != other:
-                yield f"{name}: {key}: {column.name} is {one}, but {other} when computed again"
+        for column, one in before[key].items():
+            if one != (other := after[key][column]):
+                yield f"{name}: {key}: {column} is {one}, but {other} when computed again"
 
 
-def _loose_differences(stored: ObjectRows, made: ObjectRows) -> Iterator[str]:
+def _loose_differences(stored: Rows, made: Rows) -> Iterator[str]:
     """Yield differences beyond rounding, which may choose other, equally good grasps."""
-    before = {row["grasp_id"]: row for row in stored["grasps"] if row["control_of"] is None}
-    after = {row["grasp_id"]: row for row in made["grasps"] if row["control_of"] is None}
-    counts = [Counter(row["family"] for row in rows.values()) for rows in (before, after)]
+    before, after = (
+        {row.grasp_id: row for row in rows.grasps if row.control_of is None}
+        for rows in (stored, made)
+    )
+    counts = [Counter(row.family for row in rows.values()) for rows in (before, after)]
     if counts[0] != counts[1]:
         yield f"grasps: {dict(counts[0])} by family, but {dict(counts[1])} when computed again"
     for name in sorted(before.keys() & after.keys()):
-        one, other = before[name], after[name]
-        points = [np.array(row["contact_points_m"], dtype=np.float64) for row in (one, other)]
-        if not np.allclose(*points, rtol=OTHER_ROUNDING, atol=0.0):
-            continue  # the best contacts are not unique
-        if one["held"] != other["held"] or one["force_closed"] != other["force_closed"]:
-            yield (
-                f"grasps: {name}: outcome is {one['outcome']}, but {other['outcome']} when "
-                "computed again"
-            )
-        if said := loose_difference(one, other):
-            yield f"grasps: {name}: {said}"
-        frictions = [float(row["critical_friction"] or 0.0) for row in (one, other)]
-        if not np.isclose(*frictions, rtol=OTHER_ROUNDING, atol=0.0):
-            yield f"grasps: {name}: critical friction {frictions[0]}, done again {frictions[1]}"
+        yield from (
+            f"grasps: {name}: {said}" for said in loose_differences(before[name], after[name])
+        )
 
 
-def loose_difference(one: Row, other: Row) -> str:
-    """Say how survival differs where numbers were rounded otherwise; empty if it does not.
+def loose_differences(one: GraspRow, other: GraspRow) -> Iterator[str]:
+    """Yield how rows differ where numbers were rounded otherwise.
 
-    A grasp whose contacts slip may be kept or lost by a hair, so it does not count.
+    A grasp whose contacts slip may be kept or lost by a hair, so its survival does not count.
     """
-    slips = [row.get("predicted_first_slip") for row in (one, other)]
-    survived = [row.get("survived") for row in (one, other)]
-    if survived[0] == survived[1] or any(map(may_slip, slips)):
-        return ""
-    return f"survived is {survived[0]}, but {survived[1]} when executed again"
+    if one.contacts != other.contacts or not np.allclose(
+        one.points, other.points, rtol=OTHER_ROUNDING, atol=0.0
+    ):
+        return  # the best contacts are not unique
+    if (one.held, one.force_closed) != (other.held, other.force_closed):
+        yield f"outcome is {one.outcome}, but {other.outcome} when computed again"
+    slips = any(map(may_slip, (one.predicted_first_slip, other.predicted_first_slip)))
+    if one.survived != other.survived and not slips:
+        yield f"survived is {one.survived}, but {other.survived} when executed again"
+    frictions = [row.critical_friction or 0.0 for row in (one, other)]
+    if not np.isclose(*frictions, rtol=OTHER_ROUNDING, atol=0.0):
+        yield f"critical friction {frictions[0]}, done again {frictions[1]}"

@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.declared import Declared
 from grasp_core.errors import UnfaithfulError
+from grasp_core.files.records import recorded
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
@@ -98,13 +100,13 @@ MOST_KNOWN = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Gate:
+class Gate(Declared):
     """The results of checking a version of MuJoCo on cases with known answers."""
 
     checks: tuple[Check, ...]
     mujoco: str
 
-    @property
+    @recorded
     def passed(self) -> bool:
         """Whether all checks passed."""
         return all(check.passed for check in self.checks)

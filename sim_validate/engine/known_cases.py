@@ -39,6 +39,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frictions, stacked
+from grasp_core.declared import Declared
+from grasp_core.kinds import Measured, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
@@ -64,15 +66,15 @@ PUSH = 0.6
 """Normal force of the fingers on the box, relative to the largest normal force allowed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Check:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Check(Declared):
     """One figure measured in simulation, and the interval in which it must lie."""
 
     name: str
-    value: float
+    value: Measured
     """The measured figure, or NaN if it could not be measured."""
     least: float
-    largest: float
+    largest: OrInfinity
 
     @property
     def passed(self) -> bool:

@@ -26,16 +26,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.declared import Declared
 from grasp_core.errors import NoForcesError, SolverError, UndecidedError
 from grasp_core.forces.contact_forces import even_forces
+from grasp_core.kinds import OrInfinity
 from scenes.mujoco.layout import SQUEEZE
 from scenes.settings import HARD, Softness
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.schedules import Load
-from sim_validate.engine.settings import FrictionProtocol
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Trace, holds
+from sim_validate.settings.trials import FrictionProtocol
 
 LATER = 8.0
 """Displacement at the second reading of a ramp, relative to the first; 8 = 2 cubed."""
@@ -46,7 +48,7 @@ HELD, SLID, UNKNOWN = 1, 0, -1
 
 
 @dataclass(frozen=True, slots=True)
-class SimulatedLimit:
+class SimulatedLimit(Declared):
     """Two shares of a wrench's predicted limit: the object holds the first and not the second."""
 
     lower: float
@@ -151,10 +153,11 @@ hide a force imbalance of five times as much, in largest normal forces."""
 
 
 @dataclass(frozen=True, slots=True)
-class CriticalFriction:
+class CriticalFriction(Declared):
     """The critical friction that the analysis predicts, and the one that simulation finds."""
 
-    predicted: float
+    predicted: OrInfinity
+    """The critical friction by analysis."""
     simulated: float | None = None
     """The middle of the bracket. It is zero if the object stays even at `least_friction`, and None
     if nothing was measured or the object does not begin to slip near the prediction."""

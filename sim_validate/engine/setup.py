@@ -8,20 +8,22 @@ from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen, to_digits
-from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST, SMALLEST, text
+from grasp_core.arrays import Wrench, frozen_copy, to_digits
+from grasp_core.checked import LARGEST, SMALLEST
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
+from grasp_core.files.records import UNRECORDED
+from grasp_core.kinds import Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.settings import CHOSEN, Range, Seed
+from grasp_core.settings import CHOSEN
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, build_scene
 from scenes.settings import FingerSettings, PhysicsSettings, ScaledScene
-from sim_validate.engine.settings import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.settings.trials import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
@@ -48,9 +50,13 @@ class Setup(ScaledScene):
     hold: HoldProtocol = field(default_factory=HoldProtocol)
     limit: LimitProtocol = field(default_factory=LimitProtocol)
     friction: FrictionProtocol = field(default_factory=FrictionProtocol)
-    threads: Annotated[int, Range(least=1, most=MOST_THREADS), CHOSEN] = 1
+    threads: Annotated[int, Range(least=1, most=MOST_THREADS), CHOSEN, UNRECORDED] = field(
+        default=1, compare=False
+    )
     """Number of threads that the simulator uses; results do not depend on it."""
-    timeout_s: Annotated[float, Range(above=0.0, most=math.inf), CHOSEN] = math.inf
+    timeout_s: Annotated[float, Range(above=0.0, most=math.inf), CHOSEN, UNRECORDED] = field(
+        default=math.inf, compare=False
+    )
     """Time after which the trials of one contact set are stopped [s]."""
 
     def _check_together(self) -> None:
@@ -85,17 +91,15 @@ class Setup(ScaledScene):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class NamedWrench(ByValue):
+class NamedWrench(Declared):
     """An external wrench with a name that the user gives it."""
 
     name: str
-    wrench: Array
+    wrench: Wrench
     """Force, then torque about the centre of mass, in the object's frame, (6,) [N, N m]."""
 
-    def __post_init__(self) -> None:
-        text(self.name, "name")
-        given = frozen(self.wrench, (6,), "wrench")
-        object.__setattr__(self, "wrench", frozen(to_digits(given), (6,), "wrench"))
+    def _check_together(self) -> None:
+        object.__setattr__(self, "wrench", frozen_copy(to_digits(self.wrench)))
         size = float(np.abs(self.wrench).max())
         if not SMALLEST <= size <= LARGEST:
             raise InputError(
@@ -122,7 +126,7 @@ class Agenda(ChosenTrials):
     critical_friction: bool = True
     """Whether to find the critical friction in simulation."""
     controls: bool = True
-    keep_traces: bool = False
+    keep_traces: Annotated[bool, UNRECORDED] = field(default=False, compare=False)
     seed: Seed = 0
     """Seed of the random wrenches, of noise, and of how contacts are moved to make a negative
     control (contacts that must fail)."""

@@ -9,16 +9,21 @@ position [m] and a quaternion.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Shape, cross
 from grasp_core.closure.contacts import normal_and_tangential
+from grasp_core.declared import Declared
+from grasp_core.figures import Shown
+from grasp_core.kinds import Measured
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.layout import Layout
 from sim_validate.engine.bench import Health, Motion
-from sim_validate.engine.settings import HoldProtocol
+from sim_validate.settings.trials import HoldProtocol
+
+MICRO = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,19 +163,22 @@ it is held."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HoldVerdict(ByValue):
+class HoldVerdict(Declared):
     """The outcome of a trial, with the figures that led to it."""
 
-    outcome: Outcome
+    outcome: Annotated[Outcome, Shown("outcome")]
+    """`held`, or how the object was lost."""
     reason: str
-    displacement_m: float
+    """What happened; empty if the object was held."""
+    displacement_m: Annotated[Measured, Shown("um moved", ".2g", MICRO)]
     """Largest displacement while the object had to be held [m]: motion of the point between the
     contacts plus grasp size times rotation."""
-    start_displacement_m: float
+    start_displacement_m: Measured
     """Displacement before friction was lowered, while the object was loaded [m]."""
-    rotation_rad: float
-    slip_m: Array
-    """Largest tangential motion of each fingertip over its face [m]."""
+    rotation_rad: Measured
+    """Largest rotation of the object while it had to be held [rad]."""
+    slip_m: Annotated[Array, Shape(None, nan=True)]
+    """Largest tangential motion of each fingertip over its face, (k,) [m]."""
     failed_after_s: float | None
     """When a threshold was first crossed [s], from the moment friction was lowered; None if
     never."""

@@ -11,7 +11,7 @@ multiple where contacts slip before, and stiffer fingertips where the object mov
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,8 +25,9 @@ from scenes.mujoco.held import HeldLayout, gravity_of
 from scenes.mujoco.held_mjcf import HeldScene
 from sim_validate.execution import paths
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import trials_of
+from sim_validate.execution.verdict import Enough
+from sim_validate.settings.executions import ExecutionSettings
 
 CLEAR = 1.1
 """Predicted loss of the trials that is asked for: predictions beyond a slip are not exact."""
@@ -38,40 +39,6 @@ FIRM = 1e4
 """Stiffness at which no squeeze makes a grip unstable, in loads over the object's radius."""
 UP = 1.005
 """Factor by which numbers are at least what they were when they are rounded to three digits."""
-
-
-@dataclass(frozen=True, slots=True)
-class Enough:
-    """The least push that is proved to carry what the trials ask, or the reason why none is."""
-
-    load_multiple: float
-    """Multiple of the weight, in any direction, that the squeeze with this push is certified for;
-    where there is none, the multiple that the trials ask."""
-    push_n: float | None = None
-    """Largest normal force of a finger, `push_n` of the settings [N]; None where none is enough."""
-    stiffness_n_per_m: float | None = None
-    """Stiffness of the fingertips for it: that which was used, or the least that is enough."""
-    predicted_loss: float | None = None
-    """Least multiple of a trial's load at which the object is then lost, predicted."""
-    reason: str | None = None
-
-    def __post_init__(self) -> None:
-        missing = (self.push_n, self.stiffness_n_per_m, self.predicted_loss).count(None)
-        if missing != (0 if self.reason is None else 3):
-            raise InputError(
-                "expected a push with its stiffness and predicted loss, or a reason why there is "
-                f"none, got {self!r}"
-            )
-
-    def __str__(self) -> str:
-        carried = f"{self.load_multiple:.3g} times the weight in any direction"
-        if self.push_n is None:
-            return f"no push is found to be enough for {carried}: {self.reason}"
-        return (
-            f"pushes of {self.push_n:g} N with a stiffness of {self.stiffness_n_per_m:g} N/m are "
-            f"proved to be enough for {carried}, and predicted to lose the object at "
-            f"{self.predicted_loss:.3g} times the loads of the trials"
-        )
 
 
 class NoSqueezeError(NoForcesError):

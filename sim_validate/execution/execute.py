@@ -47,10 +47,10 @@ from sim_validate.execution.enough import Choose, NoSqueezeError, SceneOf, found
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive, parted
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
 from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.settings.executions import ExecutionSettings
 
 FINE_S = 1.25e-4
 """Length of steps that confirm a loss, at most [s]."""

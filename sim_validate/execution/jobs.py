@@ -18,10 +18,10 @@ from scenes.settings import PhysicsSettings
 from sim_validate.execution.bench import HeldBench, facing
 from sim_validate.execution.execute import chosen_squeeze, execute, held_scene, run_trials
 from sim_validate.execution.predictions import held_dynamics
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
+from sim_validate.settings.executions import ExecutionSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
         )  # fmt: skip
     except NoForcesError as error:
         return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
-    return ExecutedGrasp(*about, found, enough=found.enough)
+    return ExecutedGrasp(*about, found)
 
 
 def physics_of(job: ExecutionJob) -> PhysicsSettings | None:

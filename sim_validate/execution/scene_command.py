@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
@@ -19,12 +19,12 @@ from scenes.settings import ScaledScene
 from sim_validate.engine.setup import Setup, with_planned_radius
 from sim_validate.execution.asked_executions import holding
 from sim_validate.execution.execute import chosen_squeeze, held_scene
-from sim_validate.execution.settings import ExecutionSettings, Holding
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.result_folders import alone_in
 from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
+from sim_validate.settings.executions import ExecutionSettings, Holding
 
 TextOf = Callable[[Grasp], str]
 

@@ -29,7 +29,8 @@ from scenes.mujoco.held import TOUCH, HeldLayout, rotations
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Pose, Table, joined
-from sim_validate.execution.settings import ExecutionSettings, TrialKind
+from sim_validate.execution.verdict import Skipped
+from sim_validate.settings.executions import ExecutionSettings, TrialKind
 
 MET = 1e-7
 """Distance from the surface at which a fingertip has met it, in object radii."""
@@ -186,14 +187,6 @@ class Trial:
     """Whether the load keeps turning, so that small slips add up."""
     expected: Drive | None = None
     """What the prediction is for, if not for the drive itself."""
-
-
-@dataclass(frozen=True, slots=True)
-class Skipped:
-    """A kind of trial that was asked for and left out, and why."""
-
-    kind: TrialKind
-    reason: str
 
 
 def trials_of(

@@ -1,18 +1,27 @@
-"""What an execution found: each trial with its outcome and prediction, and whether all survived."""
+"""What an execution found: each trial with its outcome and prediction, and whether all survived.
+
+These are also what `executions.json` holds.
+"""
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
 
-from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Shape
+from grasp_core.checked import path_of
+from grasp_core.declared import Declared, FieldError
 from grasp_core.errors import InputError
+from grasp_core.figures import Compared, Shown, cell, figure, less, more, scalars
+from grasp_core.files.records import FLAT, UNRECORDED, Key, RecordFile, recorded
+from grasp_core.grasp_tables import ById, frame_of
+from grasp_core.kinds import Friction, OrInfinity, Quantity
+from grasp_core.provenance import versions
 from grasp_core.solvers.ties import first_best
-from scenes.settings import PhysicsSettings
-from sim_validate.execution.enough import Enough
-from sim_validate.execution.settings import ExecutionSettings, TrialKind
-from sim_validate.execution.trials import Skipped
+from scenes.mujoco.physics import PhysicsSettings
+from sim_validate.kit.about_object import AboutObject
+from sim_validate.settings.executions import ExecutionSettings, TrialKind
 
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]
 """What became of the object: no contact slipped, one did and it was kept, it was lost, or the
@@ -23,39 +32,55 @@ CLEAR_OF_SLIP = 1.05
 """Predicted first slip from which on no contact slips, however processors round."""
 
 
-@dataclass(frozen=True, slots=True)
-class ExecutionTrial:
+FEWEST_CONTACTS = 2
+MULTIPLE = ".2f"
+"""How multiples of loads are shown."""
+MILLI, DEGREES = 1e3, math.degrees(1.0)
+UNKNOWN = "-"
+"""What stands for a motion that the simulator could not follow."""
+LOSSES = Compared(items=("no longer survived", "survived now"))
+CONTROLS_HELD = Compared(more, "controls that did not slip")
+PREDICTED, SIMULATED = Compared(less, analysed=True), Compared(less, close="slips")
+MOVED = Compared(more, close="slips")
+"""How figures are compared with those of an earlier execution."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ExecutionTrial(Declared):
     """One trial of an execution, simulated and predicted."""
 
     kind: TrialKind
     """`weight`, `lift`, `shake`, `stop`, `knock` or `misplaced`."""
-    name: str
+    name: Annotated[str, Shown("trial")]
     """The kind with its direction or number."""
-    survived: bool
+    survived: Annotated[bool, Shown("survived")]
     """Whether the object was kept, and moved no farther than the settings allow."""
-    fate: Fate
-    slip_m: float
+    fate: Annotated[Fate, Shown("fate")]
+    """What became of the object: `stuck`, `slipped`, `dropped` or `diverged`. If it was kept, and
+    the trial was not survived, it moved or turned too far."""
+    slip_m: Annotated[OrInfinity, Shown("mm slid", ".3g", MILLI, UNKNOWN)]
     """Farthest that a point of contact slid on the object [m]; infinite where the simulator
     diverged, as the next two are."""
-    displacement_m: float
+    displacement_m: Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, UNKNOWN)]
     """Largest displacement of the centre of mass against the palm [m]."""
-    turn_rad: float
+    turn_rad: Annotated[OrInfinity, Shown("deg turned", ".3g", DEGREES, UNKNOWN)]
     """Largest turn against the palm [rad]."""
-    predicted_first_slip: float
-    """Multiple of the trial's load at which the first contact slips, predicted; for `misplaced`,
-    that of the weight in the planned place."""
-    predicted_loss: float
+    predicted_first_slip: Annotated[OrInfinity, Shown("slip predicted", MULTIPLE)]
+    """Multiple of the trial's load at which the first contact slips, predicted: above one none
+    does; for `misplaced`, that of the weight in the planned place."""
+    predicted_loss: Annotated[OrInfinity, Shown("loss predicted", MULTIPLE)]
     """Multiple of the trial's load at which the object is lost, predicted: it moves or turns
     farther than the settings allow, or nothing balances the load; for `misplaced`, that of the
     weight in the planned place."""
-    simulated_first_slip: float
+    simulated_first_slip: Annotated[OrInfinity, Shown("slip simulated", MULTIPLE)]
     """Multiple of the trial's load at which the first contact slips, from the simulated contact
-    forces: one or less if a contact slipped, else how far away slip stayed."""
-    step_s: float
+    forces: one or less if a contact slipped, which is the share of the weight that had come, else
+    how far away slip stayed. A slip under a load that follows the whole weight shows as one."""
+    step_s: Quantity
     """Length of the shortest steps that the simulator took: a loss with steps of the usual length
     counts only if short steps find it as well [s]."""
 
-    def __post_init__(self) -> None:
+    def _check_together(self) -> None:
         unknown = [math.isinf(each) for each in (self.slip_m, self.displacement_m, self.turn_rad)]
         if unknown != [self.fate == "diverged"] * 3:
             raise InputError(
@@ -72,46 +97,153 @@ class ExecutionTrial:
         return self.fate == "dropped"
 
 
-@dataclass(frozen=True, slots=True)
-class ExecutionControl:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ExecutionControl(Declared):
     """A trial that must slip: the least load that does so, on a grip weaker than certified."""
 
-    name: str
+    name: Annotated[str, Shown("control")]
     """What is weaker than certified: friction, squeeze, or a finger that does not push."""
-    let_go: bool
-    first_slip: float
+    let_go: Annotated[bool, Shown("let go")]
+    """Whether a contact slipped, as it must."""
+    first_slip: Annotated[OrInfinity, Shown("first slip", MULTIPLE)]
+    """Multiple of the load at which a contact slipped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Execution(ByValue):
+class Skipped(Declared):
+    """A kind of trial that was asked for and left out, and why."""
+
+    kind: TrialKind
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Enough(Declared):
+    """The least push that is proved to carry what the trials ask, or the reason why none is."""
+
+    load_multiple: float
+    """Multiple of the weight, in any direction, that the squeeze with this push is certified for;
+    where there is none, the multiple that the trials ask."""
+    push_n: Quantity | None = None
+    """Largest normal force of a finger, `push_n` of the settings [N]; None where none is enough."""
+    stiffness_n_per_m: Quantity | None = None
+    """Stiffness of the fingertips for it: that which was used, or the least that is enough."""
+    predicted_loss: OrInfinity | None = None
+    """Least multiple of a trial's load at which the object is then lost, predicted."""
+    reason: str | None = None
+    """Why no push is found to be enough; None where one is."""
+
+    def _check_together(self) -> None:
+        if self.push_n is not None and self.predicted_loss is None:
+            object.__setattr__(self, "predicted_loss", math.inf)  # null in files
+        missing = (self.push_n, self.stiffness_n_per_m, self.predicted_loss).count(None)
+        if missing != (0 if self.reason is None else 3):
+            raise InputError(
+                "expected a push with its stiffness and predicted loss, or a reason why there is "
+                f"none, got {self!r}"
+            )
+
+    def __str__(self) -> str:
+        carried = f"{self.load_multiple:.3g} times the weight in any direction"
+        if self.push_n is None:
+            return f"no push is found to be enough for {carried}: {self.reason}"
+        return (
+            f"pushes of {self.push_n:g} N with a stiffness of {self.stiffness_n_per_m:g} N/m are "
+            f"proved to be enough for {carried}, and predicted to lose the object at "
+            f"{self.predicted_loss:.3g} times the loads of the trials"
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Execution(Declared):
     """The trials of one grasp, executed with one squeeze that was never replanned."""
 
-    mass_kg: float
-    squeeze: Array
+    mass_kg: Quantity
+    """Mass of the object [kg]."""
+    squeeze: Annotated[Array, Shape("k", 3), Key("squeeze_n")]
     """Contact forces at rest, on the object, (k, 3) [N]."""
-    load_multiple: float
-    """Multiple of the object's weight, in any direction, that the squeeze is certified for."""
-    trials: tuple[ExecutionTrial, ...]
+    load_multiple: Annotated[float, Shown("load", ".3g", compared=PREDICTED)]
+    """Multiple of the object's weight, in any direction, that the squeeze is certified for; this
+    less one is the acceleration [g] that the palm may slowly come to."""
+    trials: Annotated[tuple[ExecutionTrial, ...], Compared(less)]
+    """How each trial ended."""
     controls: tuple[ExecutionControl, ...]
+    """How each negative control ended."""
     skipped: tuple[Skipped, ...]
     """Kinds of trials that were asked for and left out, with the reasons."""
     physics: PhysicsSettings | None = None
     """Settings of the simulator, where they are known."""
-    tip_radius_m: Array | None = None
+    tip_radius_m: Annotated[Array, Shape("k")] | None = None
     """Radii of the fingertips that were used, (k,) [m], where they are known."""
-    enough: Enough | None = None
+    enough: Annotated[Enough | None, UNRECORDED] = None
     """The push, and stiffness, that would be enough for the trials; None where all were survived,
     or it was not asked for."""
+
+    def _check_together(self) -> None:
+        if len(self.squeeze) < FEWEST_CONTACTS:
+            raise FieldError("squeeze", "must have a force for each contact, at least two, got "
+                             f"{len(self.squeeze)}")  # fmt: skip
+
+    @recorded
+    def payload_kg(self) -> Annotated[float, Shown("payload kg", ".3g", compared=None)]:
+        """Largest mass that the squeeze is certified to carry slowly, in any direction [kg]."""
+        return self.load_multiple * self.mass_kg
+
+    @recorded
+    def predicted_first_slip(
+        self,
+    ) -> Annotated[OrInfinity, Shown("slip", MULTIPLE, compared=PREDICTED)]:
+        """Least multiple of a trial's load at which a contact slips, predicted."""
+        return min((trial.predicted_first_slip for trial in self.trials), default=math.inf)
+
+    @recorded
+    def simulated_first_slip(
+        self,
+    ) -> Annotated[OrInfinity, Shown("in sim", MULTIPLE, compared=SIMULATED)]:
+        """The same in simulation; one also stands for a slip once the whole weight had come."""
+        return min((trial.simulated_first_slip for trial in self.trials), default=math.inf)
+
+    @recorded
+    def displacement_m(
+        self,
+    ) -> Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, UNKNOWN, compared=MOVED)]:
+        """Largest displacement of the centre of mass against the palm in any trial [m]."""
+        return max((trial.displacement_m for trial in self.trials), default=0.0)
+
+    @recorded
+    def lost(self) -> Annotated[tuple[str, ...], Shown("lost", compared=LOSSES)]:
+        """Trials that the object did not survive, by name."""
+        return tuple(trial.name for trial in self.trials if not trial.survived)
+
+    @recorded
+    def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
+        """Negative controls that did not slip, as they must, by name."""
+        return tuple(control.name for control in self.controls if not control.let_go)
+
+    @figure
+    def slips(self) -> Annotated[bool, Compared(None)]:
+        """Whether a contact may slip by prediction: how far it then slides depends on rounding."""
+        return self.predicted_first_slip < CLEAR_OF_SLIP
+
+    @figure
+    def slip_m(self) -> Annotated[OrInfinity, MOVED]:
+        """Farthest that a point of contact slid on the object in any trial [m]."""
+        return max((trial.slip_m for trial in self.trials), default=0.0)
+
+    @figure
+    def turn_rad(self) -> Annotated[OrInfinity, MOVED]:
+        """Largest turn of the object against the palm in any trial [rad]."""
+        return max((trial.turn_rad for trial in self.trials), default=0.0)
 
     @property
     def survived(self) -> bool:
         """Whether the object survived every trial, of at least one."""
-        return bool(self.trials) and all(trial.survived for trial in self.trials)
+        return bool(self.trials) and not self.lost
 
     @property
     def controls_let_go(self) -> bool:
         """Whether every control slipped, as it must."""
-        return all(control.let_go for control in self.controls)
+        return not self.controls_held
 
     @property
     def least_predicted_loss(self) -> float:
@@ -121,11 +253,6 @@ class Execution(ByValue):
         meet when an object is misplaced: for those trials it is that of the weight where planned.
         """
         return min((trial.predicted_loss for trial in self.trials), default=0.0)
-
-    @property
-    def payload_kg(self) -> float:
-        """Largest mass that the squeeze is certified to carry slowly, in any direction [kg]."""
-        return self.load_multiple * self.mass_kg
 
     def of_kind(self, kind: str) -> tuple[ExecutionTrial, ...]:
         """Return the trials of a kind."""
@@ -137,44 +264,134 @@ class Execution(ByValue):
         return sum(trial.survived for trial in own), len(own)
 
 
+def _failed(_before: str | None, after: str | None) -> bool:
+    return after is not None
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ExecutedGrasp(ByValue):
+class ExecutedGrasp(Declared):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
 
-    id: str
+    id: Annotated[str, Shown("grasp", compared=None)]
     family: str
     """Construction of the contacts; empty where a hand executed them."""
     contacts_sha256: str
     """Hash of the contacts, which tells grasps of one id apart."""
-    execution: Execution | None
+    execution: Annotated[Execution | None, FLAT]
     """Trials and negative controls; None where no squeeze carries the weight."""
-    reason: str | None = None
+    reason: Annotated[str | None, Compared(_failed)] = None
     """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
     enough: Enough | None = None
     """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
 
-    @property
-    def survived(self) -> bool:
+    def _check_together(self) -> None:
+        if (self.execution is None) == (self.reason is None):
+            raise InputError(
+                f"grasp {self.id}: expected an execution, or a reason why there is none, got "
+                f"{'neither' if self.reason is None else 'both'}"
+            )
+        if self.execution is not None:  # it says the same, though a file says it once
+            known = self.execution.enough or self.enough
+            object.__setattr__(self, "enough", known)
+            if self.execution.enough != known:
+                object.__setattr__(self, "execution", replace(self.execution, enough=known))
+        if self.survived and self.enough is not None:
+            raise FieldError("enough", "must be None (null), as every trial was survived")
+
+    @recorded
+    def survived(self) -> Annotated[bool, Shown("survived", compared=Compared(less))]:
         """Whether the object survived every trial, of at least one."""
         return self.execution is not None and self.execution.survived
+
+    @recorded
+    def controls_let_go(self) -> bool:
+        """Whether every negative control slipped, as it must; True where there is none."""
+        return self.execution is None or self.execution.controls_let_go
+
+    @recorded
+    def least_predicted_loss(
+        self,
+    ) -> Annotated[OrInfinity, Shown("least loss", MULTIPLE, compared=None)]:
+        """Least multiple of a trial's load at which the object is lost, predicted.
+
+        It is the number to choose by, but does not see where fingers meet a misplaced object. It is
+        0 where no squeeze holds the object, or no trial is possible.
+        """
+        return 0.0 if self.execution is None else self.execution.least_predicted_loss
 
     @property
     def trials(self) -> tuple[ExecutionTrial, ...]:
         """The trials of the execution; empty where no squeeze holds the object."""
         return () if self.execution is None else self.execution.trials
 
-    @property
-    def least_predicted_loss(self) -> float:
-        """Least multiple of a trial's load at which the object is lost, predicted.
 
-        It is 0 where no squeeze holds the object, or no trial is possible.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Executions(RecordFile, ById[ExecutedGrasp]):
+    """The executions of an object's grasps, as `executions.json` holds them.
+
+    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
+
+    FILE = "executions.json"
+    SCHEMA = 2
+
+    object: AboutObject
+    friction: Friction
+    """Coulomb coefficient that was simulated."""
+    complete: bool
+    """Whether every grasp that was asked for was executed."""
+    settings: ExecutionSettings
+    """How they were executed, with the impulse of a knock that was used."""
+    grasps: Annotated[tuple[ExecutedGrasp, ...], Key("executions")]
+    """What the execution of each grasp found."""
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    def _check_together(self) -> None:
+        object.__setattr__(self, "settings", self.settings.used)
+
+    @property
+    def object_sha256(self) -> str:
+        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
+        return self.object.content_sha256
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps, trials and negative controls, and how they ended."""
+        found = [grasp.execution for grasp in self.grasps if grasp.execution is not None]
+        trials = sum(len(each.trials) for each in found)
+        controls = sum(len(each.controls) for each in found)
+        return {
+            "grasps": len(self.grasps),
+            "grasps_survived": sum(grasp.survived for grasp in self.grasps),
+            "grasps_without_squeeze": len(self.grasps) - len(found),
+            "trials": trials,
+            "trials_survived": trials - sum(len(each.lost) for each in found),
+            "controls": controls,
+            "controls_let_go": controls - sum(len(each.controls_held) for each in found),
+        }
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each grasp, indexed by its id.
+
+        It has a column for each figure of an execution that is a number or a word; of trials and
+        controls, how many there are. Figures are NaN where no squeeze holds the object.
+
+        Raises:
+            InputError: The library pandas is not installed.
         """
-        return 0.0 if self.execution is None else self.execution.least_predicted_loss
+        return frame_of([scalars(each) for each in self.grasps], [each.id for each in self.grasps])
 
-    @property
-    def controls_let_go(self) -> bool:
-        """Whether every negative control slipped, as it must; True where there is none."""
-        return self.execution is None or self.execution.controls_let_go
+
+def load_executions(path: str | Path) -> Executions:
+    """Read executions, as `graspproof execute` and `graspproof run --execute` write them.
+
+    Args:
+        path: An `executions.json`.
+
+    Raises:
+        InputError: The file is missing or invalid; the message names the file and the field.
+    """
+    return Executions.read(path_of(path, "path"))
 
 
 def best_executed(grasps: Iterable[ExecutedGrasp]) -> ExecutedGrasp | None:
@@ -226,8 +443,7 @@ def losses_in_words(found: Execution, settings: ExecutionSettings | None = None)
 
 def loss_in_words(found: Execution) -> str:
     """Say how many trials were lost, and which push would be enough, where that was asked for."""
-    lost = sum(not trial.survived for trial in found.trials)
-    said = f"lost in {lost} of {len(found.trials)} trials"
+    said = f"lost in {len(found.lost)} of {len(found.trials)} trials"
     if found.least_predicted_loss >= 1.0:
         said += ", none of which was predicted, so it may not be for want of push"
     return said if found.enough is None else f"{said}; {found.enough}"
@@ -236,11 +452,35 @@ def loss_in_words(found: Execution) -> str:
 def held_controls_in_words(found: Execution) -> list[str]:
     """Say which negative controls did not slip, and what follows."""
     return [
-        f"control {control.name} did not slip, though it must: the simulator is not faithful, so "
-        "its other outcomes do not count"
-        for control in found.controls
-        if not control.let_go
+        f"control {name} did not slip, though it must: the simulator is not faithful, so its other "
+        "outcomes do not count"
+        for name in found.controls_held
     ]
+
+
+def totals_in_words(found: Executions) -> list[str]:
+    """Say how many grasps survived, and which of them is best."""
+    counts, mass_kg = found.summary, found.settings.mass_kg
+    none = counts["grasps_without_squeeze"]
+    said = [
+        f"{counts['grasps_survived']} of {counts['grasps']} grasps survived every trial with "
+        f"{mass_kg:.4g} kg at friction {found.friction:g}; {counts['trials_survived']} of "
+        f"{counts['trials']} trials were survived; {counts['controls_let_go']} of "
+        f"{counts['controls']} negative controls let go (all should)"
+        + (f"; no squeeze holds the object in {none} of them" if none else "")
+    ]
+    if (best := best_executed(found)) is not None and best.execution is not None:
+        said.append(
+            f"best for this: {best.id}, predicted to be lost at "
+            f"{multiple_in_words(best.least_predicted_loss)} times the loads of its hardest trial; "
+            f"its squeeze carries {best.execution.payload_kg:.3g} kg in any direction"
+        )
+    return said
+
+
+def multiple_in_words(multiple: float) -> str:
+    """Write the multiple of a load at which something happens."""
+    return cell(multiple, Shown("", MULTIPLE))
 
 
 def may_slip(predicted_first_slip: float | None) -> bool:

@@ -22,26 +22,28 @@ src/task/eval_func/base.py, src/util/hand_util.py, and its assets/hand, with MuJ
 import io
 import math
 import pickle
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Annotated, Any, TypeAlias, cast
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen, real_array, to_digits
-from grasp_core.by_value import ByValue, summary
+from grasp_core.arrays import Array, Shape, to_digits
 from grasp_core.checked import coefficient, instance, number, path_of, positive, text
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown, text_of
+from grasp_core.files.records import Key, from_record, keys, record_of
 from grasp_core.files.text_files import read_bytes, write_parts, write_text
 from grasp_core.hands.collisions import tip_gaps
 from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
+from grasp_core.kinds import Many, Quantity
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
@@ -53,8 +55,6 @@ FREE = 7
 """Numbers of a pose: position and quaternion."""
 UNIT = 1e-3
 """How far the length of a quaternion may be from 1: records have numbers of single precision."""
-WANTED = ("obj_path", "obj_scale", "obj_pose", "pregrasp_qpos", "grasp_qpos", "squeeze_qpos")
-"""Fields that a record must have, in the order of those of `DexRecord`."""
 MOST_BYTES = 16 * 2**20
 """Largest size of a file: a record has some thousand bytes."""
 DENSITY = 1000.0
@@ -73,48 +73,45 @@ FEWEST = 3
 """Fewest fingertips that can hold an object without torsion."""
 
 
+class _Rooted:
+    """The rule that numbers begin with the pose of a root."""
+
+    def holds(self, numbers: Array) -> bool:
+        """Return whether the quaternion has length one."""
+        return abs(float(np.linalg.norm(numbers[3:FREE])) - 1.0) <= UNIT
+
+    def __str__(self) -> str:
+        """Return what is asked for in words."""
+        return "with a quaternion (w, x, y, z) of length 1 in numbers 3 to 6"
+
+
+Configuration = Annotated[Array, Shape("n"), Many(FREE + 1), _Rooted()]
+"""Pose of the hand's root, then angles of at least one joint, (7 + j,) [m, rad]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class DexRecord(ByValue):
+class DexRecord(Declared):
     """A grasp of a hand as DexGraspBench records it."""
 
-    object_path: str
+    object_path: Annotated[str, Key("obj_path")]
     """Folder of the object, as the record names it."""
-    object_scale: float
+    object_scale: Annotated[Quantity, Key("obj_scale")]
     """Factor on the lengths of the object's mesh."""
-    object_pose: Array
+    object_pose: Annotated[Array, Shape(FREE), _Rooted(), Key("obj_pose")]
     """Position and quaternion (w, x, y, z) of the object, (7,)."""
-    pregrasp: Array
+    pregrasp: Annotated[Configuration, Key("pregrasp_qpos")]
     """Pose of the hand's root, then joint angles, (7 + j,) [m, rad]."""
-    grasp: Array
+    grasp: Annotated[Configuration, Key("grasp_qpos")]
     """Pose of the root and joint angles where the hand touches, (7 + j,) [m, rad]."""
-    squeeze: Array
+    squeeze: Annotated[Configuration, Key("squeeze_qpos")]
     """Pose of the root and joint angles that servos are told to squeeze with, (7 + j,) [m, rad]."""
-
-    def __post_init__(self) -> None:
-        text(self.object_path, "object_path")
-        positive(self.object_scale, "object_scale")
-        object.__setattr__(self, "object_pose", _pose(self.object_pose, "object_pose", FREE))
-        size = len(frozen(self.grasp, (None,), "grasp"))
-        if size <= FREE:
-            raise InputError(
-                f"grasp must be a pose of {FREE} numbers and at least one joint, got {size} numbers"
-            )
-        for name in ("pregrasp", "grasp", "squeeze"):
-            object.__setattr__(self, name, _pose(getattr(self, name), name, size))
 
     def __repr__(self) -> str:
         return summary("DexRecord", self.object_path, joints=len(self.grasp) - FREE)
 
 
-def _pose(given: Any, name: str, size: int) -> Array:
-    found = frozen(given, (size,), name)
-    length = float(np.linalg.norm(found[3:FREE]))
-    if abs(length - 1.0) > UNIT:
-        raise InputError(
-            f"{name} must have a quaternion (w, x, y, z) of length 1 in numbers 3 to 6, got "
-            f"{length:.6g}"
-        )
-    return found
+WANTED = keys(DexRecord)
+"""Fields that a record must have."""
 
 
 def load_dex_record(path: str | Path) -> DexRecord:
@@ -220,27 +217,18 @@ def _record(found: Any) -> DexRecord:
             "what they are)"
         )
     fields = cast("Mapping[str, Any]", found)
-    for name in WANTED:
-        if name not in fields:
-            raise InputError(
-                f"the dictionary has no {name}; records have {', '.join(WANTED)}. Records of arms "
-                "(approach_qpos alone), and batches, are not read"
-            )
-    scale = _numbers(fields, "obj_scale")
-    if scale.size != 1:
-        raise InputError(f"obj_scale: expected one number, got {scale.size}")
-    arrays = (_numbers(fields, name) for name in WANTED[2:])
-    return DexRecord(fields["obj_path"], float(scale.item()), *arrays)
+    if missing := [name for name in WANTED if name not in fields]:
+        raise InputError(
+            f"the dictionary has no {missing[0]}; records have {', '.join(WANTED)}. Records of "
+            "arms (approach_qpos alone), and batches, are not read"
+        )
+    return from_record(DexRecord, {name: _plain(fields[name]) for name in WANTED})
 
 
-def _numbers(fields: Mapping[str, Any], name: str) -> Array:
-    """Return a field's numbers: an array, one number, or a list of numbers."""
-    found: Any = fields[name]
-    found = found.values if isinstance(found, _Numbers) else found
-    every = cast("Sequence[Any]", found if isinstance(found, list | tuple) else [found])
-    if not (isinstance(found, np.ndarray) or all(isinstance(each, int | float) for each in every)):
-        raise InputError(f"{name}: expected an array of numbers, got something else")
-    return real_array(cast("Any", found), name)
+def _plain(found: Any) -> Any:
+    """Return the numbers of an array, and a number for an array without axes."""
+    values: Any = found.values if isinstance(found, _Numbers) else found
+    return values.item() if getattr(values, "size", None) == 1 else values
 
 
 def write_dex_record(record: DexRecord, path: str | Path) -> Path:
@@ -253,11 +241,11 @@ def write_dex_record(record: DexRecord, path: str | Path) -> Path:
         InputError: `record` is no record, or `path` no path.
     """
     instance(record, DexRecord, "record")
-    arrays = (record.object_pose, record.pregrasp, record.grasp, record.squeeze)
-    values = (record.object_path, record.object_scale, *map(np.array, arrays))
-    fields = np.array(dict(zip(WANTED, values, strict=True)), dtype=object)
+    written: Mapping[str, Any] = record_of(record)
+    fields = {key: value if isinstance(value, str | float) else np.array(value)
+              for key, value in written.items()}  # fmt: skip
     held = io.BytesIO()
-    np.save(held, fields, allow_pickle=True)
+    np.save(held, np.array(fields, dtype=object), allow_pickle=True)
     return write_parts(path_of(path, "path"), [held.getvalue()])
 
 
@@ -466,7 +454,7 @@ def reach_of_record(
         said = f"the contacts of {len(touching)} fingertips are proved not to be in force closure"
         return found("no closure", said, 1, 0.0, open_choices=(proof,))
     return found(
-        "", "", 1, 0.0, np.array(touching), joints, palm, contacts, proof,
+        "", "", 1, 0.0, np.array(touching), joints, palm, proof,
         pregrasp=record.pregrasp[FREE:], used=np.arange(len(touching)),
     )  # fmt: skip
 

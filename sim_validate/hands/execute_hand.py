@@ -20,9 +20,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
 from scenes.mujoco.held_mjcf import HeldScene
 from sim_validate.execution.execute import asked_settings, executed, surface_reach
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.hands.validate_hand import MOST_PUSH_N
+from sim_validate.settings.executions import ExecutionSettings
 
 
 def execute_hand(
@@ -114,4 +114,4 @@ def executed_by_hand(
         found = execute_hand(hand, body, reach, friction, settings)
     except (InputError, NoForcesError) as error:
         return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
-    return ExecutedGrasp(*about, found, enough=found.enough)
+    return ExecutedGrasp(*about, found)

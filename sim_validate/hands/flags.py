@@ -9,7 +9,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from grasp_core.settings import (
+from grasp_core.kinds import (
     Count,
     Direction,
     Friction,

@@ -2,13 +2,13 @@
 
 import math
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
+from grasp_core.files.records import record_of
 from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.named_hands import HANDS
 from scenes.hand_files.loading import load_hand
 from sim_validate.hands import flags as hand_flags
-from sim_validate.hands.hand_model import model_record
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
 
@@ -27,8 +27,7 @@ def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
 def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
     """Show fingers, joints and fingertips of a hand."""
     hand = asked_hand(command)
-    told = {"torque_source": hand.torque_source, "sources": list(hand.sources)}
-    reporter.document({"name": hand.name, **model_record(hand), **told})
+    reporter.document(record_of(hand))
     fingers = [
         (
             f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}",

@@ -8,12 +8,16 @@ had been changed, and the proof says that no other commands would do better.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, rounded, to_digits
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Shape, rounded, to_digits
 from grasp_core.checked import SMALLEST
+from grasp_core.declared import Declared
+from grasp_core.figures import Shown
+from grasp_core.files.records import Key
+from grasp_core.kinds import Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import WrenchLimit, limit_of
@@ -34,15 +38,21 @@ FRICTIONS = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandControl(ByValue):
+class HandControl(Declared):
     """A load that a hand provably cannot hold, after one thing has been changed."""
 
-    name: str  # `overloaded`, `weak_motors`, `dead_motor` or `low_friction`
-    explanation: str  # what was changed, as a sentence
-    friction: float  # Coulomb coefficient at every contact
-    limits: Array  # largest torque of each joint, (joints,) [N m]
-    share: float  # what is applied, over the limit before the change
-    proof: WrenchLimit  # of what is applied after the change: `upper` is below one
+    name: Annotated[str, Shown("control")]
+    """`overloaded`, `weak_motors`, `dead_motor` or `low_friction`."""
+    explanation: str
+    """What was changed, as a sentence."""
+    friction: Friction
+    """Coulomb coefficient at every contact."""
+    limits: Annotated[Array, Shape(None), Key("torque_limits_n_m")]
+    """Largest torque of each joint, (joints,) [N m]."""
+    share: float
+    """What is applied, over the limit before the change."""
+    proof: WrenchLimit
+    """Proof about what is applied after the change: `upper` is below one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

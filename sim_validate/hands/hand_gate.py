@@ -27,7 +27,6 @@ from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import limit_of
-from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.hand_scene import HandScene, build_hand_scene, limited
 from sim_validate.engine.bench import Bench
@@ -95,10 +94,9 @@ def hinged_hand() -> Hand:
 
 def stance(friction: float) -> HandReach:
     """Return the pose in which it holds the cube, with its proof at a friction."""
-    contacts = tuple(Contact(HALF * out, -out) for out in OUTWARD)
-    proof = force_closure([c.position for c in contacts], [c.normal for c in contacts], friction)
+    proof = force_closure(HALF * OUTWARD, -OUTWARD, friction)
     return HandReach(
-        "known hand", "cube", "", "", 1, 0.0, np.arange(4), np.zeros(4), np.eye(4), contacts, proof
+        "known hand", "cube", "", "", 1, 0.0, np.arange(4), np.zeros(4), np.eye(4), proof
     )
 
 

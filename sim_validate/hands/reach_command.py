@@ -5,59 +5,73 @@ poses are written as records of DexGraspBench.
 """
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
-from operator import call
 from pathlib import Path
 from typing import TypeAlias
 
-from grasp_core.by_value import counted
+from grasp_core.closure.contacts import contacts_sha256
+from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
-from grasp_core.execution.carried_mass import HandPayload
-from grasp_core.files.text_files import write_text
+from grasp_core.figures import NONE, meanings, table
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
+from grasp_core.values import Grasp
 from sim_validate.engine.setup import Agenda
-from sim_validate.execution.verdict import (
-    ExecutedGrasp,
-    Execution,
-    held_controls_in_words,
-    loss_in_words,
-)
+from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
 from sim_validate.hands.execute_hand import executed_by_hand, hand_execution_settings
 from sim_validate.hands.hand_command import asked_hand
-from sim_validate.hands.reaches_json import (
-    AskedRecord,
-    HandTrials,
-    reaches_summary,
-    reaches_to_json,
-)
+from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
 from sim_validate.kit import processes
+from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.result_folders import REACHES, alone_in, remove_results
+from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.planning.grasps_json import GRASPS
+from sim_validate.settings.executions import ExecutionSettings
 
-ABSENT = "-"
 HELD = Agenda(critical_friction=False)
 """What hands hold: the usual wrenches, with controls."""
-PAYLOAD = "payload kg"
-HELD_COLUMNS = ("grasp", "weakest wrench N", "held", "controls let go")
-EXECUTED_COLUMNS = ("grasp", "survived", "least predicted loss", PAYLOAD, "controls let go")
-
-
 Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, str]]
 """Judges a hand in its poses by another test; gives the exit code and the text of its results."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReachJob:
+    """What is asked of a hand in each grasp, as it is sent to a worker process."""
+
+    hand: Hand
+    body: Polyhedron
+    friction: float
+    asked: ReachSettings
+    simulated: bool = False
+    """Whether the hand is also to hold test wrenches with its motors."""
+    execution: ExecutionSettings | None = None
+    """Settings with which it is also to execute the grasp."""
+
+    def __call__(self, grasp: Grasp) -> ReachedGrasp:
+        """Look for a pose in a grasp, and try it as asked."""
+        hand, body, friction = self.hand, self.body, self.friction
+        reach = reach_with(hand, body, grasp, friction, **asdict(self.asked))
+        found = partial(ReachedGrasp, reach, contacts_sha256(grasp.contacts))
+        if not reach.reached:
+            return found()
+        held = executed = None
+        if self.simulated:
+            held = validate_hand(hand, body, reach, friction, agenda=HELD)
+        if self.execution is not None:
+            executed = executed_by_hand(hand, body, reach, friction, self.execution)
+        return found(carried(hand, body, reach, friction), held, executed)
 
 
 def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | None = None) -> int:
@@ -70,80 +84,61 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
     if chosen is None:
         return Exit.NONE
     with alone_in(command.out):
-        found, tried, text = _reach(command, hand, chosen, reporter)
-        _show(hand, found, tried.payloads, reporter)
+        found = _reach(command, hand, chosen, reporter)
+        _show(found, reporter)
+        poses = [each.reach for each in found if each.reach.reached]
         if command.dexgraspbench is not None:
-            write_records(command.dexgraspbench, hand, chosen.body, found, reporter)
-        judged = Exit.GOOD
-        if judge is not None:
-            judged, text = judge(chosen, hand, found)
+            write_records(command.dexgraspbench, hand, chosen.body, poses, reporter)
+        judged, text = (Exit.GOOD, found.text()) if judge is None else judge(chosen, hand, poses)
     reporter.text(text)
-    show_simulated(tried.verdicts, reporter)
-    show_executed(tried.executions, reporter)
-    if any(one.reached for one in found):
+    show_simulated([each.simulated for each in found if each.simulated is not None], reporter)
+    show_executed([each.executed for each in found if each.executed is not None], reporter)
+    if poses:
         say_where_to_look(command, reporter)
-    good = all(one.reached for one in found) and all(one.good for one in tried.verdicts.values())
-    good &= all(one.survived and one.controls_let_go for one in tried.executions.values())
-    return judged if good else Exit.NEGATIVE
+    return judged if all(each.good for each in found) else Exit.NEGATIVE
 
 
 def _reach(
     command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter
-) -> tuple[list[HandReach], HandTrials, str]:
+) -> Reaches:  # fmt: skip
     if command.out is not None:
         remove_results(command.out, "reaches")
-    asked: AskedRecord = {
-        "regions": not command.contacts_only, "table_down": command.table,
-        "clearance_m": command.clearance_m, "starts": command.starts, "seed": command.seed,
-    }  # fmt: skip
-    look = partial(reach_with, hand, saved.body, friction=saved.friction, **asked)
-    if command.mass_kg is not None:
-        asked["execution"] = asdict(hand_execution_settings(command.mass_kg).used)
-    found, tried = list[HandReach](), HandTrials()
+    job = ReachJob(
+        hand, saved.body, saved.friction,
+        ReachSettings(
+            not command.contacts_only, command.table, command.clearance_m, command.starts,
+            command.seed,
+        ),
+        simulated=command.simulate and not command.protocol,  # not those of other tools
+        execution=None if command.mass_kg is None else hand_execution_settings(command.mass_kg),
+    )  # fmt: skip
     if saved.grasps and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
-    try:
-        results, count = processes.each(look, saved.grasps, jobs=command.jobs), len(saved.grasps)
-        for one in reporter.counted("reaching", results, count, "reached", lambda one: one.reached):
-            found.append(one)
-        stood = [one for one in found if one.reached]
-        tried.payloads.update(carried(hand, saved, stood))
-        _try(command, hand, saved, stood, tried, reporter)
-    finally:
-        stands = sum(one.reached for one in found)
-        held = len(tried.verdicts) == stands or not tries_ours(command)
-        lifted = len(tried.executions) == stands or command.mass_kg is None
-        complete = len(found) == len(saved.grasps) and held and lifted
-        text = reaches_to_json(
-            hand, saved.body, saved.friction, asked, found, complete=complete,
-            grasps=saved.grasps, tried=tried,
-        )  # fmt: skip
-        if command.out is not None and found:
-            path = write_text(command.out / REACHES, text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    return found, tried, text
+    results, count = processes.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
+    shown = reporter.counted("reaching", results, count, "reached", lambda each: each.reach.reached)
+    path = command.out and command.out / Reaches.FILE
+    return finished(shown, count, partial(_collected, job), path, reporter)
 
 
-def _show(
-    hand: Hand, found: Sequence[HandReach], payloads: Mapping[str, HandPayload], reporter: Reporter
-) -> None:
-    shown = found[:TABLE_ROWS]
-    columns = ("grasp", "reached", "fingers", "starts", "opens", "straight way in")
-    rows = [_row(hand, each) for each in shown]
-    if payloads:
-        columns = (*columns, PAYLOAD)
-        masses = (payloads.get(each.grasp) for each in shown)
-        cells = (ABSENT if mass is None else f"{mass.lower:.3g}" for mass in masses)
-        rows = [(*row, cell) for row, cell in zip(rows, cells, strict=True)]
-    reporter.table(f"grasps with the hand {hand.name}", columns, rows)
+def _collected(job: ReachJob, found: tuple[ReachedGrasp, ...], *, complete: bool) -> Reaches:
+    settings = None if job.execution is None else job.execution.used
+    about_object = AboutObject.of(job.body)
+    return Reaches(about_object, job.friction, complete, job.hand, job.asked, settings, found)
+
+
+def _show(found: Reaches, reporter: Reporter) -> None:
+    shown = found.reaches[:TABLE_ROWS]
+    columns, rows = table(shown, ReachedGrasp)
+    names = [" ".join(found.finger_names(each.reach)) or NONE for each in shown]
+    reporter.table(
+        f"grasps with the hand {found.hand.name}", (*columns, "fingers"),
+        [(*row, name) for row, name in zip(rows, names, strict=True)],
+    )  # fmt: skip
     say_cut(len(found), reporter)
-    if payloads:
-        reporter.say(
-            f"{PAYLOAD}: the largest mass that the motors hold whichever way the hand is turned, "
-            "their links included, with forces chosen anew for each orientation"
-        )
-    counts = reaches_summary(found, complete=True)
+    if any(each.payload for each in found):
+        reporter.say(f"payload kg: {meanings(ReachedGrasp)['payload_kg']}")
+    counts = found.summary
     said = f"{counts['reached']} of {counts['grasps']} grasps were reached"
     if counts["collision"] + counts["limit"] + counts["not_found"]:
         said += (
@@ -153,12 +148,11 @@ def _show(
     reporter.say(said)
     if unclosed := counts["no_closure"]:
         reporter.say(
-            f"{unclosed} have no {len(hand.fingers)} contacts that are in force closure alone, "
-            "which is proved; more friction may help, and other grasps"
+            f"{unclosed} have no {len(found.hand.fingers)} contacts that are in force closure "
+            "alone, which is proved; more friction may help, and other grasps"
         )
-    for each in shown:
-        if not each.reached:
-            reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
+    for each in (one.reach for one in shown if not one.reach.reached):
+        reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
 
 
 def say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
@@ -172,31 +166,18 @@ def say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
     reporter.say(f"see the hand in the grasps: graspproof report {shlex.quote(str(out))}")
 
 
-def _row(hand: Hand, each: HandReach) -> tuple[str, ...]:
-    if each.fingers is None:
-        return (each.grasp, "no", ABSENT, str(each.starts), ABSENT, ABSENT)
-    names = " ".join(hand.fingers[int(finger)].name for finger in each.fingers)
-    yes = ("yes" if value is not None else "no" for value in (each.pregrasp, each.approach))
-    return (each.grasp, "yes", names, str(each.starts), *yes)
+def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
+    """Find the largest mass in any orientation.
 
-
-def carried(hand: Hand, saved: Plan, found: Sequence[HandReach]) -> dict[str, HandPayload]:
-    """Find the largest mass in any orientation, by the ids of the grasps that are reached.
-
-    There is none for a hand whose motors or links are not known well enough, and for grasps in
+    There is none for a hand whose motors or links are not known well enough, and for a grasp in
     which motors cannot carry their links.
     """
     unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
     if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
-        return {}
-    payloads = dict[str, HandPayload]()
-    for reach in found:
-        # a figure beside the poses, which are there without it
-        with suppress(InputError, SolverError):
-            payloads[reach.grasp] = hand_payload(
-                hand, saved.body, reach, saved.friction, max_push_n=MOST_PUSH_N
-            )
-    return payloads
+        return None
+    with suppress(InputError, SolverError):  # a figure beside the pose, which is there without it
+        return CarriedMass.of(hand_payload(hand, body, reach, friction, max_push_n=MOST_PUSH_N))
+    return None
 
 
 def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
@@ -220,52 +201,12 @@ def with_motors(hand: Hand, command: hand_flags.Reach) -> Hand:
     return hand
 
 
-def tries_ours(command: hand_flags.Reach) -> bool:
-    """Return whether the hand goes through our own trials, not through those of other tools."""
-    return command.simulate and not command.protocol
-
-
-def _try(
-    command: hand_flags.Reach, hand: Hand, saved: Plan, found: Sequence[HandReach],
-    tried: HandTrials, reporter: Reporter,
-) -> None:  # fmt: skip
-    """Simulate and execute what the hand reaches; what is entered by then outlasts an interrupt."""
-    if tries_ours(command):
-        held = [
-            partial(validate_hand, hand, saved.body, reach, saved.friction, agenda=HELD)
-            for reach in found
-        ]
-        verdicts, count = processes.each(call, held, jobs=command.jobs), len(held)
-        for one in reporter.counted("simulating", verdicts, count, "held", lambda one: one.good):
-            tried.verdicts[one.grasp] = one
-    if command.mass_kg is not None:
-        settings = hand_execution_settings(command.mass_kg)
-        executed = [
-            partial(executed_by_hand, hand, saved.body, reach, saved.friction, settings)
-            for reach in found
-        ]
-        results, count = processes.each(call, executed, jobs=command.jobs), len(executed)
-        for one in reporter.counted(
-            "executing", results, count, "survived", lambda one: one.survived
-        ):
-            tried.executions[one.id] = one
-
-
-def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> None:
+def show_simulated(verdicts: Sequence[HandVerdict], reporter: Reporter) -> None:
     """Show what the hand held, the strongest grasp first."""
     if not verdicts:
         return
-    ranked = sorted(verdicts.values(), key=lambda verdict: -verdict.weakest_n)
-    rows = [
-        (
-            each.grasp, f"{each.weakest_n:.3g}",
-            "yes" if each.held else f"{len(each.failures)} of {len(each.wrenches)} not",
-            f"{sum(one.let_go for one in each.controls)} of {len(each.controls)}",
-        )
-        for each in ranked[:TABLE_ROWS]
-    ]  # fmt: skip
-    reporter.table("what the hand holds with its motors, the strongest first", HELD_COLUMNS, rows)
-    say_cut(len(ranked), reporter)
+    ranked = sorted(verdicts, key=lambda verdict: -verdict.weakest_n)
+    reporter.records("what the hand holds with its motors, the strongest first", ranked)
     held = sum(verdict.held for verdict in ranked)
     controls = [control for verdict in ranked for control in verdict.controls]
     let_go = sum(control.let_go for control in controls)
@@ -278,19 +219,17 @@ def show_simulated(verdicts: Mapping[str, HandVerdict], reporter: Reporter) -> N
             reporter.warn(f"{verdict.grasp}: {sentence}")
 
 
-def show_executed(results: Mapping[str, ExecutedGrasp], reporter: Reporter) -> None:
+def show_executed(results: Sequence[ExecutedGrasp], reporter: Reporter) -> None:
     """Show how the executions ended, those that are farthest from a loss first."""
     if not results:
         return
-    ranked = sorted(results.values(), key=lambda each: -each.least_predicted_loss)
-    rows = [_executed_row(each.id, each.execution) for each in ranked[:TABLE_ROWS]]
-    reporter.table("grasps executed with the hand", EXECUTED_COLUMNS, rows)
-    say_cut(len(ranked), reporter)
+    ranked = sorted(results, key=lambda each: -each.least_predicted_loss)
+    reporter.records("grasps executed with the hand", ranked)
     survived = sum(each.survived for each in ranked)
     reporter.say(f"{survived} of {len(ranked)} grasps survived every trial with the hand")
     for each in ranked:
         if each.execution is None:
-            reporter.warn(f"{each.id}: {each.reason}")
+            reporter.warn(f"{each.id}: not tried: {each.reason}")
             continue
         for sentence in held_controls_in_words(each.execution):
             reporter.warn(f"{each.id}: {sentence}")
@@ -298,19 +237,8 @@ def show_executed(results: Mapping[str, ExecutedGrasp], reporter: Reporter) -> N
             reporter.warn(f"{each.id}: {loss_in_words(each.execution)}")
 
 
-def _executed_row(grasp: str, found: Execution | None) -> tuple[str, ...]:
-    if found is None:
-        return grasp, "not tried", ABSENT, ABSENT, ABSENT
-    kept = sum(trial.survived for trial in found.trials)
-    let_go = sum(control.let_go for control in found.controls)
-    return (
-        grasp, f"{kept} of {len(found.trials)}", f"{found.least_predicted_loss:.3g}",
-        f"{found.payload_kg:.3g}", f"{let_go} of {len(found.controls)}",
-    )  # fmt: skip
-
-
 def write_records(
-    folder: Path, hand: Hand, body: Polyhedron, found: Sequence[HandReach], reporter: Reporter
+    folder: Path, hand: Hand, body: Polyhedron, poses: Sequence[HandReach], reporter: Reporter
 ) -> None:
     """Write a record for each grasp that is reached, and the object if it is convex."""
     place = folder / "object"
@@ -321,8 +249,7 @@ def write_records(
             f"{body.name} is not convex: let MeshProcess write {place} from its mesh, as "
             "DexGraspBench simulates convex pieces"
         )
-    reached = [each for each in found if each.reached]
-    for each in reached:
+    for each in poses:
         record = dex_record(hand, each, str(place.resolve()))
         write_dex_record(record, folder / "graspdata" / f"{each.grasp}.npy")
-    reporter.say(f"wrote {counted(len(reached), 'record')} of DexGraspBench to {folder}")
+    reporter.say(f"wrote {counted(len(poses), 'record')} of DexGraspBench to {folder}")

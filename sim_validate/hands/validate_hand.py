@@ -7,16 +7,20 @@ limits are found in simulation too. Controls are the same hand with one thing ch
 makes it let go.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import instance
 from grasp_core.closure.force_closure import force_closure
+from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
+from grasp_core.figures import Shown
+from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
+from grasp_core.kinds import Friction, Quantity
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, limited
 from scenes.settings import FingerSettings
@@ -40,72 +44,84 @@ give, so that they are what limits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandControlVerdict(ByValue):
+class HandControlVerdict(Declared):
     """How a negative control of a hand ended in simulation."""
 
-    control: HandControl
-    hold: HoldVerdict
+    control: Annotated[HandControl, FLAT]
+    hold: Annotated[HoldVerdict, FLAT]
 
-    @property
+    @recorded
     def let_go(self) -> bool:
-        """Return whether the object moved, as it must."""
+        """Whether the object moved, as it must."""
         return self.hold.outcome in LET_GO
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandVerdict(ByValue):
+class HandVerdict(Declared):
     """The result of simulating a hand in a grasp: what it held, and whether that was predicted."""
 
     hand: str
     """Name of the hand."""
-    grasp: str
+    grasp: Annotated[str, Key("id"), Shown("grasp")]
     """Id of the grasp."""
-    friction: float
+    friction: Friction
+    radius_m: Quantity
+    """Radius of the object, over which torques count in the size of a wrench."""
     wrenches: tuple[WrenchVerdict, ...]
     controls: tuple[HandControlVerdict, ...]
-    checks: tuple[Check, ...]
-    """Cases with known answers on which the simulator was checked first."""
-    scene: HandScene
     setup: Setup
     agenda: Agenda
+    checks: Annotated[tuple[Check, ...], UNRECORDED] = field(default=(), compare=False)
+    """Cases with known answers on which the simulator was checked first."""
+    scene: Annotated[HandScene | None, UNRECORDED] = field(default=None, compare=False)
+    """The scene that was simulated; None if the verdict was read from a file."""
+
+    def _check_together(self) -> None:
+        if WEAKEST not in {trial.name for trial in self.wrenches}:
+            raise InputError(f"wrenches must have one that is named {WEAKEST!r}, got none")
 
     @property
     def failures(self) -> tuple[WrenchVerdict, ...]:
-        """Return the wrenches that were not held, in order."""
+        """The wrenches that were not held, in order."""
         return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
 
-    @property
-    def held(self) -> bool:
-        """Return whether every wrench held."""
-        return not self.failures
+    @recorded
+    def weakest_n(self) -> Annotated[float, Shown("weakest wrench N", ".3g")]:
+        """Size of the weakest wrench that was found, at its predicted limit, torques over radius.
 
-    @property
-    def weakest_n(self) -> float:
-        """Return the size of the weakest wrench that was found, at its predicted limit [N].
-
-        Torques count over the object's radius.
+        It is what contacts and motors resist by the analysis.
         """
         trial = next(each for each in self.wrenches if each.name == WEAKEST)
-        scale = np.array([1.0] * 3 + [self.scene.layout.radius_m] * 3)
+        scale = np.array([1.0] * 3 + [self.radius_m] * 3)
         return trial.predicted_limit * float(np.linalg.norm(trial.wrench / scale))
 
-    @property
-    def controls_let_go(self) -> bool:
-        """Return whether every negative control let go of the object, as it must."""
+    @recorded
+    def held(self) -> Annotated[bool, Shown("held")]:
+        """Whether every wrench held, at 80 % of what contacts and motors resist by the analysis."""
+        return not self.failures
+
+    @recorded
+    def not_held(self) -> Annotated[tuple[str, ...], Shown("not held")]:
+        """Names of the wrenches that were not held."""
+        return tuple(trial.name for trial in self.failures)
+
+    @recorded
+    def controls_let_go(self) -> Annotated[bool, Shown("controls let go")]:
+        """Whether every negative control let go of the object, as it must."""
         return all(control.let_go for control in self.controls)
 
-    @property
+    @recorded
     def mismatches(self) -> tuple[str, ...]:
-        """Return where simulation contradicts the analysis, one sentence each."""
+        """Where simulation contradicts the analysis, one sentence each."""
         found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
         if self.agenda.limits != "none":
             found += [f"{trial.name}: the limit was not found near the predicted one"
                       for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
         return tuple(found)
 
-    @property
+    @recorded
     def good(self) -> bool:
-        """Return whether wrenches held, controls let go, and nothing was contradicted."""
+        """Whether wrenches held, controls let go, and nothing was contradicted."""
         return self.held and self.controls_let_go and not self.mismatches
 
     def __repr__(self) -> str:
@@ -166,7 +182,16 @@ def validate_hand(
             for control in hand_controls(case, weakest, names)
         )
     return HandVerdict(
-        hand.name, reach.grasp, friction, wrenches, tried, checks, scene, setup, agenda
+        hand.name,
+        reach.grasp,
+        friction,
+        layout.radius_m,
+        wrenches,
+        tried,
+        setup,
+        agenda,
+        checks,
+        scene,
     )
 
 

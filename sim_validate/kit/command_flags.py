@@ -8,13 +8,12 @@ from typing import Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.checked import MOST_COUNT
-from grasp_core.mesh_files.limits import Lengths, MeshLimits
-from grasp_core.settings import (
-    AnyFriction,
+from grasp_core.kinds import (
     Count,
     Edges,
     Ending,
     Friction,
+    FrictionOrZero,
     Gap,
     MaxCones,
     Quantity,
@@ -24,9 +23,9 @@ from grasp_core.settings import (
     TimeLimit,
     Vector,
 )
+from grasp_core.mesh_files.limits import Lengths, MeshLimits
 from grasp_core.transferring.settings import Carrying
 from scenes.settings import ScaledScene
-from sim_validate.execution.settings import ChosenExecution, Holding
 from sim_validate.kit.flag_groups import (
     PLAIN,
     Jobs,
@@ -40,6 +39,7 @@ from sim_validate.kit.flag_groups import (
     Wrench,
 )
 from sim_validate.kit.processes import available_cores
+from sim_validate.settings.executions import ChosenExecution, Holding
 
 PICTURES, CLIPS, PAGES = (".svg", ".png"), (".gif", ".webp"), (".html", ".htm")
 RUN_LIMIT = 100
@@ -266,7 +266,7 @@ class Analyze(Spoken):
 
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
-    friction: AnyFriction | None = None
+    friction: FrictionOrZero | None = None
     """Coulomb coefficient of contacts that have none of their own; if not given, the one in the
     file."""
     torque_scale_m: Quantity | None = None

@@ -16,10 +16,10 @@ import numpy as np
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import is_kept
+from grasp_core.kinds import Family
 from grasp_core.planning.planner import plan
 from grasp_core.processes import local_processes
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.settings import Family
 from grasp_core.solvers.nearest_point import least_distance
 from scenes.example_objects import example_object
 

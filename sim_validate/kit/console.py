@@ -16,11 +16,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from grasp_core.figures import table
 from grasp_core.files.json_text import text_of
+from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
 from sim_validate.kit import interrupts
 
 Result = TypeVar("Result")
+File = TypeVar("File", bound=RecordFile)
 PLAIN_EVERY_S = 5.0
 """Time between two lines of progress if the output is no terminal [s]."""
 EARLIEST = 0.02
@@ -96,6 +99,12 @@ class Reporter:
             for row in rows:
                 table.add_row(*(Text(printable(row[place])) for place in part))
             console.print(table)
+
+    def records(self, title: str, records: Sequence[object]) -> None:
+        """Print the figures of records of one class as a table."""
+        if records:
+            self.table(title, *table(records[:TABLE_ROWS], type(records[0])))
+            say_cut(len(records), self)
 
     def counted(
         self, title: str, results: Iterable[Result], total: int, word: str,
@@ -178,13 +187,31 @@ class Steps:
 
 
 def finished(
+    results: Iterable[Result], total: int, collect: Callable[..., File], path: Path | None,
+    reporter: Reporter,
+) -> File:  # fmt: skip
+    """Collect results in the record of a file, and write it even if the work is interrupted.
+
+    Without a result nothing is written.
+    """
+    done = list[Result]()
+    try:
+        for result in results:
+            done.append(result)
+    finally:
+        complete = len(done) == total
+        found = collect(tuple(done), complete=complete)
+        if path and done:
+            write_text(path, found.text())
+            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+    return found
+
+
+def finished_text(
     results: Iterable[Result], total: int, text_of: Callable[..., str], path: Path | None,
     reporter: Reporter,
 ) -> tuple[list[Result], str]:  # fmt: skip
-    """Collect results, and write the text about them even if the work is interrupted.
-
-    Gives them and the text. A path gets it where there is a result.
-    """
+    """Collect results, and write the text about them even if the work is interrupted."""
     done = list[Result]()
     try:
         for result in results:

@@ -9,21 +9,13 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
+from grasp_core.kinds import Cases, Count, Direction, Quantity, Range, Size, Vector
 from grasp_core.mesh_files.limits import Lengths, MeshChoices
 from grasp_core.planning.settings import PlanSettings
-from grasp_core.settings import (
-    Cases,
-    Count,
-    Direction,
-    Quantity,
-    Range,
-    Settings,
-    Size,
-    Vector,
-)
+from grasp_core.settings import Settings
 from scenes.settings import ScaledScene
-from sim_validate.engine.settings import ChosenTrials
 from sim_validate.kit.processes import available_cores
+from sim_validate.settings.trials import ChosenTrials
 
 Positive = Annotated[float, Range(above=0.0)]
 NotNegative = Annotated[float, Range(least=0.0)]

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from tyro.conf import OmitArgPrefixes, UseAppendAction
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
-from grasp_core.settings import Vector, types
+from grasp_core.kinds import Vector
+from grasp_core.settings import types
 from sim_validate.kit.flag_groups import PLAIN
 
 REGISTRY: Any = ConstructorRegistry()

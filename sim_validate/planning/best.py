@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from grasp_core.arrays import Array
-from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.best_grasp import best_grasp
@@ -12,11 +11,10 @@ from grasp_core.optimizing.best.proof_file import write_proof
 from grasp_core.optimizing.best.result import BestGrasp, GapAt, measured
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter
+from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.planning.best_json import Rated, best_to_document
+from sim_validate.planning.best_json import PROOF, Best, Rated
 
-FILE, PROOF = "best.json", "best-proof.npz"
 STEPS = 100
 WHY = {
     "gap": "the gap asked for is reached",
@@ -56,44 +54,32 @@ def search_best(
 def write_best(
     body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp], folder: Path | None,
     reporter: Reporter,
-) -> list[Rated]:  # fmt: skip
-    """Write result and proof, and return the planned grasps with bounds of the same measure."""
+) -> Best:  # fmt: skip
+    """Write result and proof, and return them with the planned grasps by the same measure."""
     measure, friction = best.proof.measure, best.proof.friction
     bounds = [grasp.ferrari_canny for grasp in planned]
     if not measure.is_usual:
         found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
         bounds = [(each.lower, each.upper) for each in found]
-    compared = list(map(Rated, planned, bounds))
-    document = best_to_document(body, best, compared, PROOF if folder else None)
+    rated = (Rated.of(each, ends, best.bound) for each, ends in zip(planned, bounds, strict=True))
+    record = Best.of(body, best, rated, PROOF if folder else None)
     if folder:
         write_proof(folder / PROOF, best.proof)
-        write_text(folder / FILE, text_of(document))
-        reporter.say(f"wrote {folder / FILE} and {folder / PROOF}")
-    reporter.document(document)
-    return compared
+        write_text(folder / Best.FILE, record.text())
+        reporter.say(f"wrote {folder / Best.FILE} and {folder / PROOF}")
+    reporter.text(record.text())
+    return record
 
 
-def show_best(best: BestGrasp, planned: Sequence[Rated], reporter: Reporter) -> int:
+def show_best(found: Best, reporter: Reporter) -> int:
     """Show the best grasp, the bound, and how much of the possible each planned grasp reaches."""
-    last = best.history[-1]
-    word, unit = UNITS[best.measure]
+    word, unit = UNITS[found.measure]
     reporter.say(
-        f"best grasp {best.grasp.id}: {word} {best.quality.lower:.4f}{unit}; no four contacts "
-        f"{1e3 * best.clearance:.3g} mm from edges exceed {best.bound:.4f}{unit} (gap "
-        f"{100.0 * best.gap:.2f} %); {WHY[best.ended]}, after {last.nodes} nodes"
+        f"best grasp {found.grasp.id}: {word} {found.quality[0]:.4f}{unit}; no four contacts "
+        f"{1e3 * found.clearance_m:.3g} mm from edges exceed {found.bound:.4f}{unit} (gap "
+        f"{100.0 * found.gap:.2f} %); {WHY[found.ended]}, after {found.history[-1].nodes} nodes"
     )
-    first = (best.quality.lower, best.quality.upper)
-    if best.proof.measure.is_usual:
-        first = best.grasp.ferrari_canny
-    rows = [
-        (each.grasp.id, each.grasp.family, f"{each.quality[0]:.4f}",
-         f"{100.0 * each.quality[0] / best.bound:.1f}")
-        for each in (Rated(best.grasp, first), *planned)[:TABLE_ROWS]
-    ]  # fmt: skip
-    reporter.table(
-        "the possible, and what grasps reach of it",
-        ("grasp", "family", f"{word}{unit}", "of the bound %"), rows,
-    )  # fmt: skip
-    if best.ended == "interrupt":
+    reporter.records(f"the possible, and what {word}{unit} grasps reach of it", found.rated)
+    if found.ended == "interrupt":
         return Exit.INTERRUPTED
-    return Exit.GOOD if best.ended == "gap" else Exit.PARTIAL
+    return Exit.GOOD if found.ended == "gap" else Exit.PARTIAL

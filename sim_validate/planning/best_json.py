@@ -1,148 +1,132 @@
-"""Writes and reads `best.json`: the best grasp of an object, and the bound on all others."""
+"""Holds the best grasp of an object, and the bound on all others, as `best.json` has them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field
-from typing_extensions import TypedDict
 
+from grasp_core.arrays import Array, Shape, Wrench
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.files.json_text import record_of
+from grasp_core.figures import Shown
+from grasp_core.files.records import RecordFile, recorded
+from grasp_core.kinds import Family, Friction, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt
 from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
-from grasp_core.values import FINGERS, Grasp
-from sim_validate.kit.fields import Count, Finite, ObjectRecord, Positive, Triple
+from grasp_core.values import FINGERS, FaceQuadruple, Grasp
+from sim_validate.kit.about_object import AboutObject
 
-if TYPE_CHECKING:  # reports need no search
-    from grasp_core.optimizing.best.result import BestGrasp
-
-SCHEMA = 1
-Bounds = tuple[Finite, Finite]
-FourTriples = tuple[Triple, Triple, Triple, Triple]
-
-
-class BestGraspRecord(TypedDict):
-    """Fields about the best grasp that was found."""
-
-    id: str
-    faces: Annotated[list[int], Field(min_length=FINGERS, max_length=FINGERS)]
-    positions_m: FourTriples
-    normals: FourTriples
-
-
-class LoadRecord(TypedDict):
-    """Fields about a wrench of a task."""
-
-    force_n: Triple
-    torque_n_m: Triple
-
-
-class StepRecord(TypedDict):
-    """Fields about one step by which the gap closed."""
-
-    seconds: Finite
-    quality: Finite
-    bound: Finite
-    nodes: Count
-
-
-class PlannedRecord(TypedDict):
-    """Fields about a planned grasp beside the best one."""
-
-    id: str
-    quality: Bounds
-    share_of_bound: Finite
-
-
-class BestFile(TypedDict):
-    """The content of `best.json`; what the measure says and its unit are in docs/best-grasp.md."""
-
-    schema: Literal[1]
-    measure: MeasureName
-    wrenches: list[LoadRecord]
-    """The wrenches of a task; none for another measure."""
-    object: ObjectRecord
-    friction: Positive
-    clearance_m: Positive
-    grasp: BestGraspRecord
-    quality: Bounds
-    bound: Positive
-    gap: Annotated[float, Field(ge=0.0, le=1.0)]
-    ended: Literal["gap", "time", "interrupt", "undivided"]
-    proof: str | None
-    proof_nodes: Count
-    history: list[StepRecord]
-    planned: list[PlannedRecord]
-    versions: dict[str, str]
+PROOF = "best-proof.npz"
+MEASURES: Mapping[MeasureName, tuple[str, str]] = {
+    "ferrari-canny": ("Ferrari-Canny quality", " N"),
+    "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
+    "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
+}
+"""What each measure says of a grasp, and its unit."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rated:
-    """A planned grasp beside the best one."""
+class Rated(Declared):
+    """A grasp beside the bound that no grasp exceeds."""
 
-    grasp: Grasp
+    id: Annotated[str, Shown("grasp")]
+    family: Annotated[Family, Shown("family")]
+    quality: Annotated[tuple[float, float], Shown("measure", ".4f")]
+    """Proved lower and upper bound of what the measure says of the grasp."""
+    share_of_bound: Annotated[float, Shown("of the bound %", ".1f", 100.0)]
+    """Share of the bound that the lower one reaches."""
+
+    @classmethod
+    def of(cls, grasp: Grasp, quality: tuple[float, float], bound: float) -> Self:
+        """Set a grasp beside a bound."""
+        return cls(grasp.id, grasp.family, quality, quality[0] / bound)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Placed(Declared):
+    """Where the fingers of the best grasp stand."""
+
+    id: str
+    family: Family
+    faces: FaceQuadruple
+    positions_m: Annotated[Array, Shape(FINGERS, 3)]
+    normals: Annotated[Array, Shape(FINGERS, 3, units=True)]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Best(RecordFile):
+    """The best grasp of an object by one measure, with the proved bound on all others."""
+
+    FILE = "best.json"
+    SCHEMA = 2
+
+    object: AboutObject
+    friction: Friction
+    measure: MeasureName
+    wrenches: tuple[Wrench, ...]
+    """The wrenches of a task, force before torque [N, N m]; none for another measure."""
+    clearance_m: Quantity
+    """Distance of contacts from the edges of faces [m]."""
+    grasp: Placed
     quality: tuple[float, float]
-    """Bounds of its measure."""
+    """Proved lower and upper bound of what the measure says of the grasp."""
+    bound: Annotated[float, Range(above=0.0)]
+    """What no four contacts exceed that are as far from edges."""
+    ended: Ended
+    proof: str | None
+    """Name of the proof's file; None if it was not kept."""
+    proof_nodes: Number
+    """Number of cases of the proof."""
+    history: tuple[GapAt, ...]
+    planned: tuple[Rated, ...]
+    """The planned grasps, which may be nearer to edges."""
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
-
-def best_to_document(
-    body: Polyhedron, best: "BestGrasp", planned: Sequence[Rated], proof: str | None
-) -> dict[str, object]:
-    """Build the JSON document of a search for the best grasp."""
-    grasp, quality, measure = best.grasp, best.quality, best.proof.measure
-    loads = () if measure.is_usual else measure.loads * np.repeat([1.0, body.radius], 3)
-    return {
-        "schema": SCHEMA,
-        "measure": measure.name,
-        "wrenches": [
-            {"force_n": load[:3].tolist(), "torque_n_m": load[3:].tolist()} for load in loads
-        ],
-        "object": {"name": body.name, "content_sha256": body.content_sha256},
-        "friction": best.proof.friction,
-        "clearance_m": best.clearance,
-        "grasp": {
-            "id": grasp.id,
-            "faces": list(grasp.faces),
-            "positions_m": grasp.positions.tolist(),
-            "normals": grasp.normals.tolist(),
-        },
-        "quality": [quality.lower, quality.upper],
-        "bound": best.bound,
-        "gap": best.gap,
-        "ended": best.ended,
-        "proof": proof,
-        "proof_nodes": len(best.proof.deeds),
-        "history": [
-            {"seconds": now.seconds, "quality": now.quality, "bound": now.bound, "nodes": now.nodes}
-            for now in best.history
-        ],
-        "planned": [
-            {
-                "id": each.grasp.id,
-                "quality": list(each.quality),
-                "share_of_bound": each.quality[0] / best.bound,
-            }
-            for each in planned
-        ],
-        "versions": versions(),
-    }
-
-
-def best_of(text: str) -> BestFile:
-    """Read the text of a `best.json`."""
-    found = record_of(BestFile, text, "best.json", schema=SCHEMA)
-    name, quality, bound = found["grasp"]["id"], found["quality"][0], found["bound"]
-    if quality > bound:
-        raise InputError(
-            f"bound: expected at least the quality {quality:g} of {name}, got {bound:g}"
+    @classmethod
+    def of(
+        cls, body: Polyhedron, best: BestGrasp, planned: Iterable[Rated], proof: str | None
+    ) -> Self:
+        """Record what a search has found."""
+        grasp, measure = best.grasp, best.proof.measure
+        loads = () if measure.is_usual else measure.loads * np.repeat([1.0, body.radius], 3)
+        return cls(
+            object=AboutObject.of(body),
+            friction=best.proof.friction,
+            measure=measure.name,
+            wrenches=tuple(loads),
+            clearance_m=best.clearance,
+            grasp=Placed(grasp.id, grasp.family, grasp.faces, grasp.positions, grasp.normals),
+            quality=(best.quality.lower, best.quality.upper),
+            bound=best.bound,
+            ended=best.ended,
+            proof=proof,
+            proof_nodes=len(best.proof.deeds),
+            history=best.history,
+            planned=tuple(planned),
         )
-    return found
 
+    def _check_together(self) -> None:
+        if self.quality[0] > self.bound:
+            raise InputError(
+                f"bound: expected at least the quality {self.quality[0]:g} of {self.grasp.id}, got "
+                f"{self.bound:g}"
+            )
 
-def shares_of_bound(best: BestFile) -> dict[str, float]:
-    """Return how much of the bound each compared grasp reaches, by id."""
-    shares = {each["id"]: each["quality"][0] / best["bound"] for each in best["planned"]}
-    return {**shares, best["grasp"]["id"]: best["quality"][0] / best["bound"]}
+    @recorded
+    def gap(self) -> float:
+        """Share of the bound that the grasp does not reach."""
+        return 1.0 - self.quality[0] / self.bound
+
+    @property
+    def rated(self) -> tuple[Rated, ...]:
+        """The best grasp, then the planned ones, beside the bound."""
+        share = self.quality[0] / self.bound
+        return (Rated(self.grasp.id, self.grasp.family, self.quality, share), *self.planned)
+
+    @property
+    def shares(self) -> Mapping[str, float]:
+        """How much of the bound each of these grasps reaches, by id."""
+        return {each.id: each.share_of_bound for each in reversed(self.rated)}

@@ -3,23 +3,31 @@
 A question that cannot be decided leaves a reason; all other questions are still answered.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.closure.critical_friction import critical_friction_interval
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.closure.friction_interval import FrictionInterval
 from grasp_core.closure.wrench_sets import Norm
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedError
+from grasp_core.figures import Shown
+from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.forces.contact_forces import contact_forces
-from grasp_core.quality.ferrari_canny import ferrari_canny
+from grasp_core.kinds import Count, Null, OrInfinity, Quantity
+from grasp_core.provenance import versions
+from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
-from grasp_core.quality.wrench_limits import WrenchLimit, axis_wrenches, wrench_limits
+from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
 from grasp_core.records.contacts_json import ContactSet
 from grasp_core.solvers.ties import first_best
 
@@ -29,7 +37,10 @@ takes ten seconds."""
 
 Answer = TypeVar("Answer")
 Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
-Wrench = tuple[float, float, float, float, float, float]
+Forces = Annotated[Array, Shape(None, 3)]
+Margin = Annotated[float, Null(-math.inf)]
+Bounds = tuple[float, float]
+"""Proved lower and upper bound."""
 
 
 class Outcome(StrEnum):
@@ -41,80 +52,96 @@ class Outcome(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class Question(Declared):
     """Which questions to answer about contacts, with their settings."""
 
-    max_normal_force: float
+    max_normal_force_n: Quantity
     """Largest normal force of each contact [N]."""
-    wrenches: tuple[Wrench, ...] = ()
+    wrenches: tuple[tuple[float, float, float, float, float, float], ...] = ()
     """External wrenches (force, torque) [N, N m], torque about each grasp's centre."""
-    edges: int = 8
+    edges: Count = 8
     """Number of edges of the pyramids that stand for friction cones in metrics defined by them."""
 
 
-@dataclass(frozen=True, slots=True)
-class Bounds:
-    """Lower and upper bound of a quality [N], and whether plain arithmetic proved them."""
-
-    lower: float
-    upper: float
-    verified: bool
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Resisted:
+class Resisted(Declared):
     """The largest multiple of a wrench that is resisted, and forces that balance the wrench."""
 
-    limit: WrenchLimit
-    forces: Array | None
+    wrench: Wrench
+    limit: OrInfinity
+    """Largest multiple that is resisted."""
+    upper: OrInfinity
+    """Multiple above which the wrench is not resisted."""
+    least_norm_forces_n: Forces | None = None
     """The balancing forces of least norm, in pyramids inscribed in the friction cones, (k, 3) [N];
-    None if there are none, which may happen for a limit just above 1."""
+    None if there are none, which may happen for a limit just above 1, or if none were asked for."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Analysis:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Analysis(Declared):
     """Results about one grasp; None stands for a result that could not be decided."""
 
-    contacts: ContactSet
-    certificate: ClosureCertificate | None
-    """The certificate of force closure, checked again in plain arithmetic."""
-    friction_interval: FrictionInterval | None
-    """Interval of the least common friction for closure, checked again in rational arithmetic."""
-    l1: Bounds | None
-    linf: Bounds | None
-    min_weight: float | None
-    hull_volume: float | None
-    smallest_singular_value: float
-    weakest_axis: WrenchLimit | None
+    contacts: Annotated[ContactSet, FLAT]
+    closed: Annotated[bool | None, Shown("closed")]
+    """Whether the contacts are in force closure, by a certificate that was checked again."""
+    closure_margin: Annotated[Margin | None, Shown("margin")]
+    """Proved margin of force closure; None also if it is below -1e6."""
+    forces: Forces | None
+    """Balancing forces that prove closure."""
+    separating_wrench: Wrench | None
+    """Wrench that proves that there is no closure, with its torque about the grasp's centre."""
+    critical_friction: Annotated[OrInfinity | None, Shown("mu*", ".4f")]
+    """Common coefficient that suffices for closure; infinite if none does."""
+    critical_friction_interval: tuple[OrInfinity, OrInfinity] | None
+    """Ends between which it is proved to lie, checked again in rational arithmetic."""
+    ferrari_canny_l1_n: Annotated[Bounds | None, Shown("l1 N")]
+    ferrari_canny_linf_n: Annotated[Bounds | None, Shown("linf N")]
+    verified: Mapping[str, bool]
+    """Whether plain arithmetic has confirmed closure and the bounds of both qualities, by name."""
+    min_weight: Annotated[OrInfinity | None, Shown("min-weight")]
+    hull_volume: Annotated[float | None, Shown("hull volume")]
+    smallest_singular_value: Annotated[float, Shown("singular value")]
+    weakest_axis_wrench: Resisted | None
     """The wrench along an axis that is resisted least, and its limit."""
-    everywhere: float | None
+    resisted_in_every_direction_n: Annotated[float | None, Shown("every direction N")]
     """Multiple up to which the grasp resists every wrench of unit size."""
     wrenches: tuple[Resisted | None, ...]
     """Results about the wrenches, in the order in which they were asked about."""
-    undecided: dict[str, str]
+    undecided: Mapping[str, str]
     """Reasons why questions could not be decided, by the name of the question."""
 
-    @property
+    @recorded
     def outcome(self) -> Outcome:
         """The answer about force closure."""
-        if self.certificate is None:
+        if self.closed is None:
             return Outcome.UNDECIDED
-        return Outcome.CLOSED if self.certificate.closed else Outcome.OPEN
+        return Outcome.CLOSED if self.closed else Outcome.OPEN
 
-    @property
-    def critical_friction(self) -> float | None:
-        """Common coefficient that suffices for closure; infinite if none does."""
-        found = self.friction_interval
-        return None if found is None else found.critical_friction
+    @recorded
+    def weakest_axis(self) -> Annotated[OrInfinity | None, Shown("weakest axis")]:
+        """Largest multiple that is resisted of the wrench along the weakest axis."""
+        return None if self.weakest_axis_wrench is None else self.weakest_axis_wrench.limit
 
-    @property
-    def separating_wrench(self) -> Array | None:
-        """The certificate's wrench with its torque about the grasp's centre, (6,)."""
-        wrench = None if self.certificate is None else self.certificate.separating_wrench
-        if wrench is None:
-            return None
-        about = wrench[:3] + np.cross(wrench[3:], self.contacts.center)
-        return np.concatenate([about, wrench[3:]])
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Analyses(RecordFile):
+    """The analyses of all grasps of a contacts file."""
+
+    FILE = "document of analyses"
+    SCHEMA = 1
+
+    source: str
+    """Path of the file."""
+    question: Annotated[Question, FLAT]
+    grasps: tuple[Analysis, ...]
+    complete: bool
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps, and of grasps of each outcome."""
+        counts = Counter(each.outcome for each in self.grasps)
+        return {"grasps": len(self.grasps)} | {each.value: counts[each] for each in Outcome}
 
 
 def check_edges(sets: Iterable[ContactSet], edges: int) -> None:
@@ -133,15 +160,26 @@ def analyze(contacts: ContactSet, question: Question) -> Analysis:
     given = contacts.positions, contacts.normals, contacts.friction
     edges, center, scale = question.edges, contacts.center, contacts.torque_scale
     ask = _Asking()
-    linf = ask("ferrari_canny_linf", lambda: _bounds(contacts, "linf"))
+    l1 = ask("ferrari_canny_l1", lambda: _quality(contacts, "l1"))
+    linf = ask("ferrari_canny_linf", lambda: _quality(contacts, "linf"))
+    proof = ask("closure", lambda: _checked(force_closure(*given)))
+    interval = ask("critical_friction", lambda: _checked(critical_friction_interval(*given[:2])))
+    bounds = [None if found is None else (found.lower, found.upper) for found in (l1, linf)]
     return Analysis(
         contacts=contacts,
-        certificate=ask("closure", lambda: _checked(force_closure(*given))),
-        friction_interval=ask(
-            "critical_friction", lambda: _checked(critical_friction_interval(*given[:2]))
-        ),
-        l1=ask("ferrari_canny_l1", lambda: _bounds(contacts, "l1")),
-        linf=linf,
+        closed=None if proof is None else proof.closed,
+        closure_margin=None if proof is None else proof.margin,
+        forces=None if proof is None else proof.forces,
+        separating_wrench=_about_center(proof, center),
+        critical_friction=None if interval is None else interval.critical_friction,
+        critical_friction_interval=None if interval is None else (interval.lower, interval.upper),
+        ferrari_canny_l1_n=bounds[0],
+        ferrari_canny_linf_n=bounds[1],
+        verified={
+            "closure": proof is not None,
+            "ferrari_canny_l1_n": l1 is not None and l1.verify(),
+            "ferrari_canny_linf_n": linf is not None and linf.verify(),
+        },
         min_weight=ask("min_weight", lambda: min_weight(*given, edges=edges)),
         hull_volume=ask(
             "hull_volume",
@@ -150,8 +188,10 @@ def analyze(contacts: ContactSet, question: Question) -> Analysis:
         smallest_singular_value=smallest_singular_value(
             contacts.positions, center=center, torque_scale=scale
         ),
-        weakest_axis=ask("weakest_axis_wrench", lambda: _weakest_axis(contacts, question)),
-        everywhere=None if linf is None else max(linf.lower, 0.0) * question.max_normal_force,
+        weakest_axis_wrench=ask("weakest_axis_wrench", lambda: _weakest_axis(contacts, question)),
+        resisted_in_every_direction_n=(
+            None if linf is None else max(linf.lower, 0.0) * question.max_normal_force_n
+        ),
         wrenches=tuple(
             ask(f"wrenches[{i}]", lambda load=load: _resisted(contacts, load, question))
             for i, load in enumerate(question.wrenches)
@@ -182,33 +222,43 @@ def _checked(certificate: Checked) -> Checked:
     return certificate
 
 
-def _bounds(contacts: ContactSet, norm: Norm) -> Bounds:
-    found = ferrari_canny(
+def _about_center(proof: ClosureCertificate | None, center: Array) -> Array | None:
+    """Return a certificate's separating wrench with its torque about a grasp's centre, (6,)."""
+    wrench = None if proof is None else proof.separating_wrench
+    if wrench is None:
+        return None
+    return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
+
+
+def _quality(contacts: ContactSet, norm: Norm) -> FerrariCanny:
+    return ferrari_canny(
         contacts.positions, contacts.normals, contacts.friction,
         center=contacts.center, torque_scale=contacts.torque_scale, norm=norm,
     )  # fmt: skip
-    return Bounds(found.lower, found.upper, found.verify())
 
 
-def _weakest_axis(contacts: ContactSet, question: Question) -> WrenchLimit:
-    limits = wrench_limits(
-        contacts.positions, contacts.normals, contacts.friction,
-        axis_wrenches(contacts.torque_scale),
-        max_normal_force=question.max_normal_force, center=contacts.center,
+def _limits(contacts: ContactSet, wrenches: ArrayLike, question: Question) -> list[Resisted]:
+    found = wrench_limits(
+        contacts.positions, contacts.normals, contacts.friction, wrenches,
+        max_normal_force=question.max_normal_force_n, center=contacts.center,
     )  # fmt: skip
+    return [Resisted(each.wrench, each.limit, each.upper) for each in found]
+
+
+def _weakest_axis(contacts: ContactSet, question: Question) -> Resisted:
+    limits = _limits(contacts, axis_wrenches(contacts.torque_scale), question)
     return limits[first_best([-found.limit for found in limits])]
 
 
-def _resisted(contacts: ContactSet, wrench: Wrench, question: Question) -> Resisted:
-    given = contacts.positions, contacts.normals, contacts.friction
-    limit = wrench_limits(
-        *given, [wrench], max_normal_force=question.max_normal_force, center=contacts.center
-    )[0]
+def _resisted(contacts: ContactSet, wrench: ArrayLike, question: Question) -> Resisted:
+    (limit,) = _limits(contacts, np.array([wrench]), question)
     if limit.upper < 1.0:
-        return Resisted(limit, None)
+        return limit
     try:
-        limits = 0.0, question.max_normal_force
-        forces = contact_forces(*given, wrench, normal_force=limits, center=contacts.center)
+        forces = contact_forces(
+            contacts.positions, contacts.normals, contacts.friction, wrench,
+            normal_force=(0.0, question.max_normal_force_n), center=contacts.center,
+        )  # fmt: skip
     except NoForcesError:
-        forces = None
-    return Resisted(limit, forces)
+        return limit
+    return replace(limit, least_norm_forces_n=forces)

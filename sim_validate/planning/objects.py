@@ -2,18 +2,20 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
-from grasp_core.by_value import vector
+from grasp_core.arrays import Point, UnitVector
 from grasp_core.cones.spanning import count_spanning
+from grasp_core.declared import vector
+from grasp_core.figures import Shown
+from grasp_core.files.records import record_of
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
-from grasp_core.records.grasps_json import surface_record
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.kit import command_flags
@@ -23,11 +25,22 @@ from sim_validate.planning.asked_objects import load_object
 
 MM, CM3 = 1e3, 1e6
 MM2 = 1e6
-COLUMNS = ("face", "where it is", "area mm^2")
 ALONG = 1e-4
 """Largest angle from an axis at which a face counts as facing along it [rad]."""
 NOTHING_MM = 1e-6
 """Coordinate that is written as zero [mm]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ListedFace:
+    """A face in a list."""
+
+    number: Annotated[int, Shown("face")]
+    place: Annotated[str, Shown("where it is")]
+    area_m2: Annotated[float, Shown("area mm^2", ".5g", MM2)]
+    normal: UnitVector
+    """Into the object."""
+    center_m: Point
 
 
 def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
@@ -36,6 +49,10 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
     spanning = (
         count_spanning(body.normals, LEAST_SPAN_ANGLE) if len(body.faces) <= MAX_FACES else None
     )
+    faces = [
+        ListedFace(number, _place(face), face.area, face.normal, face.centroid)
+        for number, face in enumerate(body.faces)
+    ]
     facts: dict[str, Any] = {
         "name": body.name,
         "vertices": len(body.vertices),
@@ -47,20 +64,11 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
         "largest_spread_deg": math.degrees(max((face.spread for face in body.faces), default=0.0)),
         "largest_depth_m": max((face.depth for face in body.faces), default=0.0),
         "volume_m3": body.volume,
-        "surface": surface_record(body.surface) | {"volume_source": body.surface.volume_source},
+        "surface": record_of(body.surface) | {"volume_source": body.surface.volume_source},
         "radius_m": body.radius,
         "center_of_mass_m": body.center_of_mass.tolist(),
         "spanning_quadruples": spanning,
-        "face_list": [
-            {
-                "number": number,
-                "normal": face.normal.tolist(),  # into the object
-                "area_m2": face.area,
-                "center_m": face.centroid.tolist(),
-                "place": _place(face),
-            }
-            for number, face in enumerate(body.faces)
-        ],
+        "face_list": list(map(record_of, faces)),
         "content_sha256": body.content_sha256,
         "notes": list(body.notes),
     }
@@ -71,11 +79,7 @@ def inspect_object(command: command_flags.Inspect, reporter: Reporter) -> int:
     for sentence in _sentences(body, facts):
         reporter.say(f"  {sentence}")
     if body.patches is None and len(body.faces) <= MOST_NUMBERED:
-        rows = [
-            (str(number), _place(face), f"{MM2 * face.area:.5g}")
-            for number, face in enumerate(body.faces)
-        ]
-        reporter.table("faces, by the numbers in ids of grasps", COLUMNS, rows)
+        reporter.records("faces, by the numbers in ids of grasps", faces)
     if command.picture is not None:
         reporter.say(f"wrote {command.picture}")
     else:

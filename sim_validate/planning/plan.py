@@ -6,8 +6,9 @@ What only --optimize, --regions and --best need is imported where they ask for i
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.files.text_files import write_text
+from grasp_core.kinds import METHODS
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.planning.request import methods_for
@@ -22,21 +24,22 @@ from grasp_core.planning.result import Moved, Plan
 from grasp_core.planning.selection import carried
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
-from grasp_core.settings import METHODS, types
+from grasp_core.settings import types
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags, flag_groups
 from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
+from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best.result import BestGrasp
-    from sim_validate.planning.best_json import Rated
-    from sim_validate.planning.certifying import Found
 
-"""Column of what grasps carry, by the rank that orders them."""
+SAME_CONTACTS = 0.01
+"""Distance below which two optimized contacts count as the same [object radii]; searches for one
+optimum end some thousandths from it."""
 
 
 def plan_object(
@@ -58,16 +61,62 @@ def plan_object(
             jobs=jobs,
         )
     if planning.optimize and found.grasps:
-        from sim_validate.planning.improving import improved
-
-        with reporter.progress("optimising") as steps:
-            found = improved(
-                body, found, finger_radius=planning.finger_radius_m, parts=planning.ceiling,
-                jobs=jobs, progress=steps.update,
-            )  # fmt: skip
+        found = improved(body, found, planning, jobs, reporter)
         if left_out := len(found.moves) - len(found):
             reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")
     return found
+
+
+def improved(
+    body: Polyhedron, found: Plan, planning: flag_groups.Planning, jobs: int, reporter: Reporter
+) -> Plan:
+    """Move the contacts of each grasp to raise its quality; return the new plan, best first.
+
+    The plan keeps only one of several grasps that end at the same contacts.
+    """
+    improve = partial(
+        _improve, body, found.friction, planning.finger_radius_m, found.seed, planning.ceiling
+    )
+    results = each(improve, found.grasps, jobs=jobs)
+    done = list(
+        reporter.counted(
+            "optimising", results, len(found.grasps), "raised", lambda pair: pair[1].gain > 1.0
+        )
+    )
+    done.sort(key=lambda pair: -pair[0].ferrari_canny[0])
+    kept: list[Grasp] = []
+    for grasp, _ in done:
+        if not any(_same_contacts(grasp, other, SAME_CONTACTS * body.radius) for other in kept):
+            kept.append(grasp)
+    return replace(found, grasps=tuple(kept), moves=tuple(moved for _, moved in done))
+
+
+def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
+    """Tell whether two grasps touch the same faces at the same points, in any order."""
+    order, other = np.argsort(one.faces), np.argsort(two.faces)
+    faces = np.array_equal(np.array(one.faces)[order], np.array(two.faces)[other])
+    return faces and float(np.abs(one.positions[order] - two.positions[other]).max()) <= slack
+
+
+def _improve(
+    body: Polyhedron, friction: float, finger_radius: float | None, seed: int, parts: int | None,
+    grasp: Grasp,
+) -> tuple[Grasp, Moved]:  # fmt: skip
+    from grasp_core.optimizing.better_contacts import optimize_contacts
+    from grasp_core.optimizing.ceiling import quality_ceiling
+
+    found = optimize_contacts(body, grasp, friction, finger_radius=finger_radius, seed=seed)
+    ceiling = None
+    if parts is not None:
+        ceiling = quality_ceiling(
+            body, grasp.faces, friction, known=found.after.lower,
+            finger_radius=found.clearances, parts=parts,
+        ).upper  # fmt: skip
+    before, after = found.before, found.after
+    moved = Moved(
+        found.grasp.id, grasp.id, (before.lower, before.upper), (after.lower, after.upper), ceiling
+    )
+    return found.grasp, moved
 
 
 def with_regions(
@@ -77,23 +126,18 @@ def with_regions(
     """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
     if not (planning.regions and found.grasps):
         return found
-    from sim_validate.planning.certifying import Asked, certified, wider
-    from sim_validate.planning.regions_json import write_regions
+    from grasp_core.regions.certify_regions import CONES
+    from sim_validate.planning.regions import certified, wider
+    from sim_validate.planning.regions_json import Certifying
 
-    asked = Asked(found.friction, clearance=planning.edge_clearance_m)
-    grasps = list[Grasp]()
-
-    def kept(each: "Iterator[Found]") -> "Iterator[Found]":
-        for grasp, proved in each:
-            grasps.append(wider(grasp, proved))
-            yield grasp, proved
-
-    with reporter.progress("certifying") as steps:
-        each = certified(body, found.grasps, asked, jobs=jobs, progress=steps.update)
-        write_regions(folder, body, asked, kept(each))
+    asked = Certifying(0.0, False, planning.edge_clearance_m, CONES)
+    proved = certified(
+        body, found.grasps, found.friction, asked, folder=folder, jobs=jobs, reporter=reporter
+    )
+    grasps = tuple(map(wider, found.grasps, proved.grasps))
     widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
     reporter.say(f"{widened} of {len(grasps)} grasps got larger regions, each with its own proof")
-    return replace(found, grasps=tuple(grasps))
+    return replace(found, grasps=grasps)
 
 
 def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
@@ -110,7 +154,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         if command.out:
             remove_results(command.out)
         found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
-        planned, compared = found.grasps, list["Rated"]()
+        planned, possible = found.grasps, None
         if best is not None:
             found = replace(found, grasps=(best.grasp, *planned), absence=None)
         text = plan_to_json(body, found)
@@ -120,7 +164,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         if best is not None:
             from sim_validate.planning.best import write_best
 
-            compared = write_best(body, best, planned, command.out, reporter)
+            possible = write_best(body, best, planned, command.out, reporter)
         elif reporter.json_only:
             print(text, end="")  # noqa: T201 - the document itself
     say_counts(body, found, reporter)
@@ -132,11 +176,11 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     say_cut(len(found.grasps), reporter)
     if found.moves:
         show_gains(found.moves, reporter)
-    if best is None:
+    if possible is None:
         return Exit.GOOD
     from sim_validate.planning.best import show_best
 
-    return show_best(best, compared, reporter)
+    return show_best(possible, reporter)
 
 
 def _task(command: command_flags.Plan) -> Array | None:

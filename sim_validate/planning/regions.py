@@ -1,19 +1,29 @@
 """Runs the command `regions`, which proves where each finger of a grasp may stand."""
 
 from collections import Counter
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
-from grasp_core.errors import InputError
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import InputError, SolverError, UndecidedError
+from grasp_core.figures import figures
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.regions.certificates import CertifiedRegions
+from grasp_core.regions.certify_regions import certify_regions
+from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.kit.about_object import AboutObject
+from sim_validate.kit.console import Reporter, finished
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.planning.certifying import Asked, certified
 from sim_validate.planning.grasps_json import read_grasps
-from sim_validate.planning.regions_json import REGIONS, write_regions
-
-MILLI = 1e3
+from sim_validate.planning.regions_json import Certifying, GraspRegions, Regions, write_proof
 
 
 def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
@@ -23,40 +33,70 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
     if not chosen:
         wanted = f"a grasp {command.grasp}" if command.grasp else "at least one grasp"
         raise InputError(f"{command.grasps}: expected {wanted} to certify, found none")
-    asked = Asked(
-        saved.friction if command.friction is None else command.friction,
-        command.reserve, command.recenter, command.edge_clearance_m,
-        command.max_cones,
-    )  # fmt: skip
+    friction = saved.friction if command.friction is None else command.friction
+    asked = Certifying(
+        command.reserve, command.recenter, command.edge_clearance_m, command.max_cones
+    )
     with alone_in(command.out):
         if command.out is not None:
             remove_results(command.out, "regions")
-        with reporter.progress("certifying") as steps:
-            found = certified(saved.body, chosen, asked, jobs=command.jobs, progress=steps.update)
-            document = write_regions(command.out, saved.body, asked, found)
-    _show(document, reporter)
-    if command.out is not None:
-        reporter.say(f"wrote {command.out / REGIONS}")
-    reporter.document(document)
-    proved = all(grasp["regions"] is not None for grasp in document["grasps"])
+        found = certified(
+            saved.body, chosen, friction, asked, folder=command.out, jobs=command.jobs,
+            reporter=reporter,
+        )  # fmt: skip
+    _show(found, reporter)
+    reporter.text(found.text())
+    proved = found.summary["proved"] == len(found.grasps)
     return Exit.GOOD if proved else Exit.NEGATIVE
 
 
-def _show(document: Mapping[str, Any], reporter: Reporter) -> None:
-    grasps = document["grasps"]
-    columns = ("grasp", "family", "planned mm", "disc mm", "open mm", "inner mm", "mm2", "cones")
-    reporter.table("independent regions", columns, [_row(grasp) for grasp in grasps[:TABLE_ROWS]])
-    say_cut(len(grasps), reporter)
-    reporter.say(
-        "disc: proved radius around contacts or face middles, cut off at face borders; open: a "
-        "larger radius, at which some choice of contacts is not in force closure; inner: smallest "
-        "of the discs inscribed in the regions; mm2: area of the regions; cones: size of the proof"
+def certified(
+    body: Polyhedron, grasps: Sequence[Grasp], friction: float, asked: Certifying, *,
+    folder: Path | None, jobs: int, reporter: Reporter,
+) -> Regions:  # fmt: skip
+    """Certify regions of grasps, in order; write each proof when it is ready, then regions.json.
+
+    Nothing is written if `folder` is None.
+    """
+    proofs = each(partial(_certify, body, friction, asked), grasps, jobs=jobs)
+
+    def recorded() -> Iterator[GraspRegions]:
+        for grasp, proved in zip(grasps, proofs, strict=True):
+            yield GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved))
+
+    results = reporter.counted(
+        "certifying", recorded(), len(grasps), "proved", lambda one: one.regions is not None
     )
-    reasons = Counter(grasp["reason"] for grasp in grasps if grasp["regions"] is None)
+    collect = partial(Regions, AboutObject.of(body), friction, asked)
+    return finished(results, len(grasps), collect, folder and folder / Regions.FILE, reporter)
+
+
+def _certify(
+    body: Polyhedron, friction: float, asked: Certifying, grasp: Grasp
+) -> CertifiedRegions | str:
+    left = friction * (1.0 - asked.reserve)
+    try:
+        if not force_closure(grasp.positions, grasp.normals, left).closed:
+            return f"not in force closure at friction {left:.6g}"
+        proved = certify_regions(
+            body, grasp, friction, reserve=asked.reserve, recenter=asked.recenter,
+            clearance=asked.edge_clearance_m, max_cones=asked.max_cones,
+        )  # fmt: skip
+    except (UndecidedError, SolverError) as error:
+        return str(error)
+    return "no radius could be proved" if proved is None else proved
+
+
+def _show(found: Regions, reporter: Reporter) -> None:
+    reporter.records("independent regions", found.grasps)
+    for figure in figures(GraspRegions):
+        if figure.meaning:
+            reporter.say(f"{figure.shown.heading}: {figure.meaning}")
+    reasons = Counter(each.reason for each in found.grasps if each.reason)
     for reason, count in reasons.most_common():
-        reporter.say(f"no regions for {count} of {len(grasps)} grasps: {reason}")
-    counted = [mu for grasp in grasps if grasp["regions"] for mu in grasp["friction"]]
-    left = document["friction"] * (1.0 - document["reserve"])
+        reporter.say(f"no regions for {count} of {len(found.grasps)} grasps: {reason}")
+    counted = [each.friction.min() for each in found.grasps if each.friction is not None]
+    left = found.friction * (1.0 - found.certifying.reserve)
     if counted and min(counted) < left:
         reporter.say(
             f"the proofs use friction {min(counted):.4g} only, because curved faces lean from "
@@ -64,20 +104,24 @@ def _show(document: Mapping[str, Any], reporter: Reporter) -> None:
         )
 
 
-def _row(grasp: Mapping[str, Any]) -> tuple[str, ...]:
-    named = (grasp["id"], grasp["family"], _millimetres(grasp["planned_radius_m"] or None))
-    if grasp["regions"] is None:
-        return (*named, "none", "", "", "", "")
-    regions = grasp["regions"]
-    return (
-        *named,
-        _millimetres(grasp["disc_radius_m"]),
-        _millimetres(grasp["open_radius_m"]),
-        _millimetres(min(region["inscribed_radius_m"] for region in regions)),
-        f"{MILLI**2 * sum(region['area_m2'] for region in regions):.4g}",
-        str(grasp["cones"]),
+def wider(grasp: Grasp, found: GraspRegions) -> Grasp:
+    """Give a grasp its certified regions if their discs around its contacts are larger."""
+    if found.regions is None or found.normals is None:
+        return grasp
+    radius = min(
+        _room(region.polygon, contact.position, normal)
+        for region, contact, normal in zip(
+            found.regions, grasp.contacts, found.normals, strict=True
+        )
     )
+    if radius <= grasp.radius and grasp.regions[0].kind != "point":
+        return grasp
+    return replace(grasp, regions=found.regions, radius=max(radius, 0.0))
 
 
-def _millimetres(length: float | None) -> str:
-    return "-" if length is None else f"{MILLI * length:.3g}"
+def _room(polygon: Array, point: Array, normal: Array) -> float:
+    """Compute how far a point lies from the nearest edge of a convex polygon (c, 3) [m]."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    inward = np.cross(normal, edges)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    return float(np.einsum("ci,ci->c", inward, point - polygon).min())

@@ -1,46 +1,50 @@
-"""Writes and reads certified regions: one proof file per grasp, and one `regions.json`.
-
-Type checking holds the writer to the fields of `regions.json`, which reports read.
-"""
+"""Holds certified regions of an object's grasps: one proof file each, and one `regions.json`."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, NotRequired
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, with_config
-from typing_extensions import TypedDict
 
-from grasp_core.arrays import Array, frozen, frozen_indices, frozen_units
+from grasp_core.arrays import Array, Shape, frozen, frozen_indices, frozen_units
 from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError, about
-from grasp_core.files.json_text import record_of, text_of
-from grasp_core.files.text_files import write_text
+from grasp_core.figures import Shown
+from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS
+from grasp_core.kinds import Count, Family, Friction, MaxCones, NotNegative, Reserve
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.proof import TwistCover
+from grasp_core.settings import Settings
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
-from sim_validate.kit.fields import Finite, ObjectRecord, Positive
+from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.npz import read_arrays
 from sim_validate.kit.writing import write_arrays
-from sim_validate.planning.certifying import Asked, Found
 
-SCHEMA = 1
-REGIONS, PROOFS = "regions.json", "proofs"
+PROOFS = "proofs"
+"""Folder of the proof files, beside `regions.json`."""
+MILLI = 1e3
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
 BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
+FIELDS: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
+    "normals": ("normals", (FINGERS, 3)), "friction": ("friction", (FINGERS,)),
+    "origin": ("origin_m", (3,)), "depths": ("depths_m", (FINGERS,)), "scale": ("scale_m", ()),
+    "centers": ("centers_m", (FINGERS, 3)), "radius": ("disc_radius_m", ()),
+    "limit": ("open_radius_m", ()), "open_choice": ("open_choice_m", (None, 3)),
+    "open_wrench": ("open_wrench", (None,)),
+}  # fmt: skip
+"""Name and shape of the array in a proof file for fields of `CertifiedRegions`."""
 SHAPES: Mapping[str, tuple[int | None, ...]] = {
-    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3), "normals": (FINGERS, 3),
-    "friction": (FINGERS,), "origin_m": (3,), "depths_m": (FINGERS,), "centers_m": (FINGERS, 3),
-    "open_choice_m": (None, 3), "open_wrench": (None,), "scale_m": (), "disc_radius_m": (),
-    "open_radius_m": (),
-    **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
+    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3),
+    **dict(FIELDS.values()), **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
 }  # fmt: skip
 """Shape of each array in a proof file; None stands for any length."""
 MOST_CORNERS = 1000
@@ -49,123 +53,142 @@ SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 """Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 
 
-class RegionRecord(TypedDict):
-    """Fields about the region of one finger."""
+@dataclass(frozen=True, slots=True)
+class Certifying(Settings):
+    """How regions are certified."""
 
-    kind: NotRequired[str]
-    polygon_m: Annotated[list[tuple[Finite, Finite, Finite]], Field(min_length=FEWEST_CORNERS)]
-    inscribed_radius_m: Finite
-    area_m2: NotRequired[Finite]
-
-
-class ProofRecord(TypedDict):
-    """Fields about the file that proves a grasp's regions."""
-
-    file: Annotated[str, Field(pattern=r"^proofs/[A-Za-z0-9][A-Za-z0-9_-]{0,99}\.npz$")]
-    """Path of the proof, relative to the folder of `regions.json`."""
-    sha256: NotRequired[str]
+    reserve: Reserve
+    """Share of the friction that proofs do not count on."""
+    recenter: bool
+    """Whether discs are around face middles rather than around contacts."""
+    edge_clearance_m: NotNegative
+    """Distance of regions from the edges of their faces [m]."""
+    max_cones: MaxCones
+    """Largest number of cones of a proof."""
 
 
-class NamedGrasp(TypedDict):
-    """Fields about the grasp that regions belong to."""
+@dataclass(frozen=True, slots=True)
+class ProofFile(Declared):
+    """The file that proves a grasp's regions."""
 
-    id: str
+    file: str
+    """Its path, relative to the folder of `regions.json`."""
+    sha256: str
+
+
+FourRegions = tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
+Points = Annotated[Array, Shape(FINGERS, 3)]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class GraspRegions(Declared):
+    """The certified regions of one grasp, or the reason why it has none."""
+
+    id: Annotated[str, Shown("grasp")]
     contacts_sha256: str
-    family: NotRequired[str]
-    planned_radius_m: NotRequired[Finite]
+    """Hash of the contacts, which tells grasps of one id apart."""
+    family: Annotated[Family, Shown("family")]
+    planned_radius_m: Annotated[NotNegative, Shown("planned mm", ".3g", MILLI)]
+    """Radius of the discs that the plan claims; 0.0 where it claims none [m]."""
+    reason: str = ""
+    """Why nothing was proved; empty if something was."""
+    regions: FourRegions | None = None
+    """Convex polygons in which each finger may stand; None if nothing was proved."""
+    disc_radius_m: Annotated[NotNegative | None, Shown("disc mm", ".3g", MILLI)] = None
+    """Radius of the discs that the regions hold, cut off at face borders [m]."""
+    open_radius_m: Annotated[NotNegative | None, Shown("open mm", ".3g", MILLI)] = None
+    """A larger radius, at which `open_choice_m` is not in force closure [m]; None if no such
+    contacts were found."""
+    open_choice_m: Points | None = None
+    centers_m: Points | None = None
+    """Centres of the discs."""
+    normals: Annotated[Array, Shape(FINGERS, 3, units=True)] | None = None
+    """Inward normals of the planes of the regions."""
+    friction: Annotated[Array, Shape(FINGERS, least=0.0)] | None = None
+    """Coulomb coefficient that the proof counts on, per finger."""
+    cones: Annotated[Count | None, Shown("cones")] = None
+    """Number of cones of the proof."""
+    proof: ProofFile | None = None
+    """The file with the proof; None if nothing was proved, or no folder was given."""
+
+    @classmethod
+    def of(
+        cls, grasp: Grasp, proved: CertifiedRegions | str, proof: ProofFile | None
+    ) -> "GraspRegions":
+        """Record what was proved of a grasp, or the reason why nothing was."""
+        named = (grasp.id, contacts_sha256(grasp.contacts), grasp.family, grasp.radius)
+        if isinstance(proved, str):
+            return cls(*named, reason=proved)
+        return cls(
+            *named,
+            regions=proved.regions,
+            disc_radius_m=proved.radius,
+            open_radius_m=None if proved.open_choice is None else proved.limit,
+            open_choice_m=proved.open_choice,
+            centers_m=proved.centers,
+            normals=proved.normals,
+            friction=proved.friction,
+            cones=len(proved.cover.forces),
+            proof=proof,
+        )
+
+    def _check_together(self) -> None:
+        shown = (self.disc_radius_m, self.centers_m, self.normals, self.friction, self.cones)
+        if {each is None for each in (*shown, self.regions)} != {bool(self.reason)}:
+            raise InputError(
+                f"{self.id}: expected either regions with all of their figures, or a reason why "
+                "there are none"
+            )
+        if any(len(each.polygon) < FEWEST_CORNERS for each in self.regions or ()):
+            raise InputError(
+                f"{self.id}: expected regions with at least {FEWEST_CORNERS} corners each"
+            )
+
+    @recorded
+    def inscribed_radius_m(self) -> Annotated[float | None, Shown("inner mm", ".3g", MILLI)]:
+        """Radius of the smallest of the discs inscribed in the regions [m]."""
+        return min((each.inscribed_radius for each in self.regions or ()), default=None)
+
+    @recorded
+    def area_m2(self) -> Annotated[float | None, Shown("mm2", ".4g", MILLI**2)]:
+        """Area of all four regions [m^2]."""
+        return None if self.regions is None else sum(map(area_of, self.regions))
 
 
-class GraspRecord(NamedGrasp):
-    """Fields about the regions of one grasp, or the reason why it has none."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Regions(RecordFile):
+    """The certified regions of an object's grasps, as `regions.json` holds them."""
 
-    disc_radius_m: Finite | None
-    centers_m: NotRequired[list[list[Finite]]]
-    friction: NotRequired[list[Finite]]
-    open_radius_m: NotRequired[Finite | None]
-    open_choice_m: NotRequired[list[list[Finite]] | None]
-    cones: NotRequired[int]
-    proof: NotRequired[ProofRecord | None]
-    regions: Annotated[list[RegionRecord], Field(min_length=FINGERS, max_length=FINGERS)] | None
-    reason: NotRequired[str]
+    FILE = "regions.json"
+    SCHEMA = 2
 
+    object: AboutObject
+    friction: Friction
+    certifying: Annotated[Certifying, FLAT]
+    grasps: tuple[GraspRegions, ...]
+    complete: bool
+    """Whether every grasp that was asked for was looked at."""
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
-@with_config(ConfigDict(strict=True, extra="allow"))
-class RegionsFile(TypedDict):
-    """The content of `regions.json`; type checking holds its writer to it."""
-
-    schema: Literal[1]
-    object: ObjectRecord
-    friction: Positive
-    reserve: NotRequired[Finite]
-    recenter: NotRequired[bool]
-    edge_clearance_m: NotRequired[Finite]
-    cones: NotRequired[int]
-    versions: NotRequired[dict[str, str]]
-    grasps: list[GraspRecord]
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps, and of grasps with regions."""
+        proved = sum(each.regions is not None for each in self.grasps)
+        return {"grasps": len(self.grasps), "proved": proved}
 
 
-def write_regions(
-    folder: Path | None, body: Polyhedron, asked: Asked, found: Iterable[Found]
-) -> RegionsFile:
-    """Write each proof when it is ready, then `regions.json`; write nothing if `folder` is None.
-
-    Gives the content of regions.json.
-    """
-    records = [_record(grasp, proved, body, folder) for grasp, proved in found]
-    document: RegionsFile = {
-        "schema": SCHEMA,
-        "object": {"name": body.name, "content_sha256": body.content_sha256},
-        "friction": asked.friction,
-        "reserve": asked.reserve,
-        "recenter": asked.recenter,
-        "edge_clearance_m": asked.clearance,
-        "cones": asked.max_cones,
-        "versions": versions(),
-        "grasps": records,
-    }
-    if folder is not None:
-        write_text(folder / REGIONS, text_of(document))
-    return document
-
-
-def _record(
-    grasp: Grasp, proved: CertifiedRegions | str, body: Polyhedron, folder: Path | None
-) -> GraspRecord:
-    """Build the record of one grasp, and write its proof or remove an earlier one."""
-    named: NamedGrasp = {
-        "id": grasp.id,
-        "contacts_sha256": contacts_sha256(grasp.contacts),
-        "family": grasp.family,
-        "planned_radius_m": grasp.radius,
-    }
+def write_proof(
+    folder: Path | None, body: Polyhedron, grasp: Grasp, proved: CertifiedRegions | str
+) -> ProofFile | None:
+    """Write the proof of a grasp's regions to a folder, or remove an earlier one."""
+    if folder is None:
+        return None
     name = f"{PROOFS}/{grasp.id}.npz"
     if isinstance(proved, str):
-        if folder is not None:
-            (folder / name).unlink(missing_ok=True)
-        return {**named, "disc_radius_m": None, "regions": None, "reason": proved}
-    proof: ProofRecord | None = None
-    if folder is not None:
-        path = write_arrays(folder / name, proof_arrays(proved, grasp, body))
-        proof = {"file": name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-    return {
-        **named,
-        "disc_radius_m": proved.radius,
-        "centers_m": proved.centers.tolist(),
-        "friction": proved.friction.tolist(),
-        "open_radius_m": proved.limit if proved.open_choice is not None else None,
-        "open_choice_m": None if proved.open_choice is None else proved.open_choice.tolist(),
-        "cones": len(proved.cover.forces),
-        "proof": proof,
-        "regions": [
-            {
-                "kind": region.kind,
-                "polygon_m": region.polygon.tolist(),
-                "inscribed_radius_m": region.inscribed_radius,
-                "area_m2": area_of(region),
-            }
-            for region in proved.regions
-        ],
-    }
+        (folder / name).unlink(missing_ok=True)
+        return None
+    path = write_arrays(folder / name, proof_arrays(proved, grasp, body))
+    return ProofFile(name, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 def area_of(region: ContactRegion) -> float:
@@ -179,32 +202,21 @@ def proof_arrays(
     proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
 ) -> dict[str, NDArray[Any]]:
     """Return the regions of a grasp and their proof, as arrays by name."""
-    cover, choice, wrench = proved.cover, proved.open_choice, proved.open_wrench
+    empty = {"open_choice": np.zeros((0, 3)), "open_wrench": np.zeros(0)}
+    known = {field: getattr(proved, field) for field in FIELDS}
     polygons = [region.polygon for region in proved.regions]
     return {
         "grasp": np.array(grasp.id),
         "object_sha256": np.array(body.content_sha256),
-        "axes": cover.axes,
-        "codes": cover.codes.astype(np.uint8),
-        "forces": cover.forces,
-        "normals": proved.normals,
-        "friction": proved.friction,
-        "origin_m": proved.origin,
-        "depths_m": proved.depths,
-        "scale_m": np.array(proved.scale),
-        "centers_m": proved.centers,
-        "disc_radius_m": np.array(proved.radius),
-        "open_radius_m": np.array(proved.limit),
-        "open_choice_m": np.zeros((0, 3)) if choice is None else choice,
-        "open_wrench": np.zeros(0) if wrench is None else wrench,
-        **dict(zip(POLYGONS, polygons, strict=True)),
-        **dict(zip(BORDERS, proved.borders, strict=True)),
+        "axes": proved.cover.axes,
+        "codes": proved.cover.codes.astype(np.uint8),
+        "forces": proved.cover.forces,
+        **{
+            name: np.asarray(empty[field] if known[field] is None else known[field])
+            for field, (name, _) in FIELDS.items()
+        },
+        **dict(zip((*POLYGONS, *BORDERS), (*polygons, *proved.borders), strict=True)),
     }
-
-
-def regions_file_of(text: str) -> RegionsFile:
-    """Read the text of a `regions.json`."""
-    return record_of(RegionsFile, text, REGIONS, schema=SCHEMA)
 
 
 def load_regions(path: str | Path) -> CertifiedRegions:
@@ -234,26 +246,24 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
             f"scale_m: expected a length from {SMALLEST_SCALE:g} to {LARGEST:g} m, got {scale:g}"
         )
     normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
-    choice, wrench = numbers["open_choice_m"], numbers["open_wrench"]
+    fields: dict[str, Any] = {
+        field: numbers[name] if shape else numbers[name].item()
+        for field, (name, shape) in FIELDS.items()
+    }
+    opened = {field: fields[field] for field in ("open_choice", "open_wrench")}
+    fields |= {field: value if len(value) else None for field, value in opened.items()}
+    fields |= {"limit": limit.item(), "normals": normals}
     return CertifiedRegions(
         regions=four(
             _region(name, numbers[name], normal, scale)
             for name, normal in zip(POLYGONS, normals, strict=True)
         ),
         borders=four(numbers[name] for name in BORDERS),
-        radius=numbers["disc_radius_m"].item(),
-        centers=numbers["centers_m"],
-        limit=limit.item(),
-        open_choice=choice if len(choice) else None,
-        open_wrench=wrench if len(wrench) else None,
-        friction=numbers["friction"],
-        origin=numbers["origin_m"],
-        normals=normals,
-        depths=numbers["depths_m"],
-        cover=TwistCover(numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"),
-                         numbers["forces"]),
-        scale=scale,
-    )  # fmt: skip
+        cover=TwistCover(
+            numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"), numbers["forces"]
+        ),
+        **fields,
+    )
 
 
 def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:

@@ -1,15 +1,21 @@
 """Runs the command `transfer`, which carries grasps over to a part that has changed."""
 
 import math
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated, Self
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
 from grasp_core.errors import InputError
+from grasp_core.files.records import FLAT, RecordFile
 from grasp_core.files.text_files import write_text
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
+from grasp_core.planning.result import Outcomes, Plan, PlanCounts
+from grasp_core.provenance import versions
+from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import extended
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
 from grasp_core.transferring.face_changes import check_planar
@@ -22,12 +28,12 @@ from grasp_core.transferring.transfer import (
     transfer,
 )
 from sim_validate.kit import command_flags, flag_groups
+from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps, load_object
 from sim_validate.planning.grasps_json import GRASPS
-from sim_validate.planning.transfer_json import TRANSFER, carried_to_json, transfer_to_json
 
 MM = 1e3
 ABSENT = "-"
@@ -35,6 +41,24 @@ COLUMNS = ("grasp", "status", "mm", "deg", "mu*", "now", "quality N", "now", "fa
 """How far contacts moved and turned, what they reach, and faces under them that changed."""
 BAD: tuple[Change, ...] = ("worse", "gone")
 """What becomes of a grasp if its part should not have changed like that."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TransferFile(RecordFile):
+    """Grasps carried over to a changed part; both parts are only named, so nothing reads it."""
+
+    FILE = "transfer.json"
+    SCHEMA = 2
+
+    old: AboutObject
+    new: AboutObject
+    transfer: Annotated[Transfer, FLAT]
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @classmethod
+    def of(cls, found: Transfer) -> Self:
+        """Record what became of grasps and faces."""
+        return cls(AboutObject.of(found.old), AboutObject.of(found.new), found)
 
 
 def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
@@ -61,17 +85,39 @@ def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
             saved.body, new, saved.grasps, saved.friction, distance=command.carrying.distance_m,
             angle_deg=command.carrying.angle_deg, finger=saved.finger,
         )  # fmt: skip
-        text = transfer_to_json(found)
+        text = TransferFile.of(found).text()
         if command.out is not None:
             remove_results(command.out)
             grasps = write_text(command.out / GRASPS, carried_to_json(found, saved))
-            path = write_text(command.out / TRANSFER, text)
+            path = write_text(command.out / TransferFile.FILE, text)
             reporter.say(f"wrote {grasps} and {path}")
     reporter.text(text)
     _show(found, reporter)
     if not found.carried:
         return Exit.NONE
     return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
+
+
+def carried_to_json(found: Transfer, saved: Plan) -> str:
+    """Write the carried grasps as the text of a `grasps.json` of the changed part."""
+    absence = None
+    if not found.carried:
+        absence = (
+            f"none of the {len(found.grasps)} grasps could be carried over to the changed part"
+        )
+    nothing_tried = PlanCounts(faces=len(found.new.faces), quadruples=0, spanning=None)
+    plan = Plan(
+        body=found.new,
+        grasps=found.carried,
+        friction=found.friction,
+        theta=math.atan(found.friction),
+        seed=saved.seed,
+        counts=nothing_tried,
+        outcomes=Outcomes(0, 0, 0),
+        absence=absence,
+        finger=saved.finger,
+    )
+    return plan_to_json(found.new, plan)
 
 
 def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:

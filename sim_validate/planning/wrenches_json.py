@@ -6,33 +6,47 @@ Torques are about the centre of mass; forces and torques are in the object's fra
 left out, which means zero.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import place, record_of, shown
+from grasp_core.files.json_text import object_of, shown
+from grasp_core.files.records import from_record
 from grasp_core.files.text_files import read_text
+from grasp_core.kinds import Many, Vector
 from sim_validate.engine.setup import NamedWrench
-from sim_validate.kit.fields import Triple
 
 MOST_WRENCHES = 10_000
 
 
-class _Given(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+@dataclass(frozen=True, slots=True)
+class GivenWrench(Declared):
+    """A wrench of a file."""
 
     name: str
-    force_n: Triple
-    torque_n_m: Triple = (0.0, 0.0, 0.0)
+    force_n: Vector
+    torque_n_m: Vector = (0.0, 0.0, 0.0)
 
 
-class _WrenchFile(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+@dataclass(frozen=True, slots=True)
+class WrenchFile(Declared):
+    """The wrenches of a file, all with different names."""
 
-    wrenches: Annotated[list[_Given], Field(min_length=1, max_length=MOST_WRENCHES)]
+    wrenches: Annotated[tuple[GivenWrench, ...], Many(most=MOST_WRENCHES)]
+
+    def _check_together(self) -> None:
+        names: set[str] = set()
+        for number, each in enumerate(self.wrenches):
+            if each.name in names:
+                raise InputError(
+                    f"wrenches[{number}].name: expected wrenches with different names, got two "
+                    f"named {shown(each.name)}"
+                )
+            names.add(each.name)
 
 
 def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
@@ -44,18 +58,11 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
 
 def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
     """Parse the wrenches in the text of a file."""
-    given = record_of(_WrenchFile, text, "wrench file", nulls=False).wrenches
-    found: dict[str, NamedWrench] = {}
-    for number, each in enumerate(given):
-        if each.name in found:
-            where = place(["wrenches", number, "name"])
-            raise InputError(
-                f"{where}: expected wrenches with different names, got two named {shown(each.name)}"
-            )
-        with about(place(["wrenches", number])):
-            wrench = np.array([*each.force_n, *each.torque_n_m])
-            found[each.name] = NamedWrench(each.name, wrench)
-    return tuple(found.values())
+    given = from_record(WrenchFile, object_of(text, "wrench file", nulls=False))
+    return tuple(
+        NamedWrench(each.name, np.array([*each.force_n, *each.torque_n_m]))
+        for each in given.wrenches
+    )
 
 
 def weights(

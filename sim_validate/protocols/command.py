@@ -1,6 +1,5 @@
 """Judges grasps, or hands in them, by published tests, and shows and writes the judgements."""
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from operator import call
@@ -14,14 +13,13 @@ from sim_validate.engine.setup import Setup
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.reach_command import reach_file
 from sim_validate.kit import command_flags, processes
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
+from sim_validate.kit.about_object import AboutObject
+from sim_validate.kit.console import TABLE_ROWS, Reporter, finished
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.result_folders import JUDGEMENTS, remove_results
-from sim_validate.protocols.judgements_json import judgements_summary, judgements_to_json
-from sim_validate.protocols.judging import Judgement, judge_by, judge_hand_by
-
-COLUMNS = ("grasp", "test", "theirs", "ours", "margin", "moved mm", "deg")
-TOTALS = ("test", "grasps", "theirs passed", "ours held", "predicted", "theirs as ours")
+from sim_validate.kit.result_folders import remove_results
+from sim_validate.protocols.judging import judge_by, judge_hand_by
+from sim_validate.protocols.published import protocol
+from sim_validate.protocols.verdict import Judgement, Judgements
 
 
 def judge_file(command: command_flags.Validate, reporter: Reporter) -> int:
@@ -52,7 +50,7 @@ def judge_grasps(
         for name in names
         for grasp in saved.grasps
     ]
-    return _judged(saved, cases, jobs, folder, reporter)
+    return _judged(saved, names, cases, jobs, folder, reporter)
 
 
 def judge_hands(
@@ -66,47 +64,32 @@ def judge_hands(
         for reach in found
         if reach.reached
     ]
-    return _judged(saved, cases, jobs, folder, reporter)
+    return _judged(saved, names, cases, jobs, folder, reporter)
 
 
 def _judged(
-    saved: Plan, cases: Sequence[Callable[[], Judgement]], jobs: int, folder: Path | None,
-    reporter: Reporter,
+    saved: Plan, names: Sequence[str], cases: Sequence[Callable[[], Judgement]], jobs: int,
+    folder: Path | None, reporter: Reporter,
 ) -> tuple[Exit, str]:  # fmt: skip
     if folder:
         remove_results(folder, "judgements")
     found = processes.each(call, cases, jobs=jobs)
     results = reporter.counted("judging", found, len(cases), "passed", lambda one: one.theirs)
-    text_of = partial(judgements_to_json, saved.body, saved.friction)
-    done, text = finished(results, len(cases), text_of, folder and folder / JUDGEMENTS, reporter)
-    if done:
-        _show(done, reporter)
-    return (Exit.GOOD if all(one.good for one in done) else Exit.NEGATIVE), text
+    tests = {name: protocol(name) for name in names}
+    collect = partial(Judgements, AboutObject.of(saved.body), saved.friction, tests)
+    path = folder and folder / Judgements.FILE
+    done = finished(results, len(cases), collect, path, reporter)
+    _show(done, reporter)
+    good = all(one.good for one in done.judgements)
+    return (Exit.GOOD if good else Exit.NEGATIVE), done.text()
 
 
-def _show(judgements: Sequence[Judgement], reporter: Reporter) -> None:
-    rows = [_row(each) for each in judgements[:TABLE_ROWS]]
-    reporter.table("judged by published tests", COLUMNS, rows)
-    say_cut(len(judgements), reporter)
-    totals = [
-        (name, *map(str, counts.values()))
-        for name, counts in judgements_summary(judgements).items()
-    ]
-    reporter.table("in all", TOTALS, totals)
-    for each in judgements[:TABLE_ROWS]:
-        about = f"{each.grasp}: {each.protocol.name}"
+def _show(found: Judgements, reporter: Reporter) -> None:
+    reporter.records("judged by published tests", found.judgements)
+    reporter.records("in all", [*found.summary.values()])
+    for each in found.judgements[:TABLE_ROWS]:
+        about = f"{each.grasp}: {each.protocol}"
         for run in [run for run in each.runs if not run.passed][:1]:
             reporter.warn(f"{about}: run {run.number}: {run.reason}")
         if not each.ours.held:
             reporter.warn(f"{about}: ours: {each.ours.reason}")
-
-
-def _row(each: Judgement) -> tuple[str, ...]:
-    moved = max((run.displacement_m for run in each.runs), default=0.0)
-    turned = max((run.turn_deg for run in each.runs), default=0.0)
-    margin = "no load" if math.isinf(each.ours.margin) else f"{each.ours.margin:.3g}"
-    theirs = "passed" if each.theirs else "failed"
-    return (
-        each.grasp, each.protocol.name, theirs, "held" if each.ours.held else "not held", margin,
-        f"{1e3 * moved:.2g}", f"{turned:.2g}",
-    )  # fmt: skip

@@ -9,13 +9,11 @@ that they let go of some load.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import ByValue, summary
 from grasp_core.checked import coefficient, instance, one_of
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
@@ -37,62 +35,8 @@ from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_
 from sim_validate.hands.hand_gate import require_faithful_hands
 from sim_validate.hands.validate_hand import hand_setup
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
-from sim_validate.protocols.runs import RunVerdict, their_verdict
-
-
-@dataclass(frozen=True, slots=True)
-class OurVerdict:
-    """Our verdict on the loads of a published test, with the prediction."""
-
-    closed: bool
-    """Whether the contacts are in force closure, which is proved either way."""
-    held: bool
-    """Whether the object stayed within our thresholds under every load; False without closure."""
-    margin: float
-    """Least multiple of the loads that is resisted according to the analysis; 0 without closure,
-    and infinite without a load."""
-    reason: str
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Judgement(ByValue):
-    """A grasp judged by a published test, by our trials of the same loads, and by the analysis."""
-
-    grasp: str
-    """Id of the grasp; empty for contacts without one."""
-    hand: str
-    """Name of the hand that held the object; empty for fingertips."""
-    protocol: PublishedProtocol
-    friction: float
-    """Coulomb coefficient of our verdict and of the prediction; the test has its own."""
-    mass_kg: float
-    """Mass of the object in the test [kg]."""
-    push_n: float
-    """Largest normal force with which a finger squeezes in the test [N]."""
-    runs: tuple[RunVerdict, ...]
-    ours: OurVerdict
-    """Our verdict on the loads of the test, with the predicted margin."""
-
-    @property
-    def theirs(self) -> bool:
-        """Return whether the grasp passes the published test: all of its runs."""
-        return all(each.passed for each in self.runs)
-
-    @property
-    def predicted(self) -> bool:
-        """Return whether the analysis says that the grasp resists all loads of the test."""
-        return self.ours.closed and self.ours.margin >= 1.0
-
-    @property
-    def good(self) -> bool:
-        """Return whether the test and our trials both accept the grasp."""
-        return self.theirs and self.ours.held
-
-    def __repr__(self) -> str:
-        theirs = f"theirs {'passed' if self.theirs else 'failed'}"
-        ours = f"ours {'held' if self.ours.held else 'not held'}"
-        told = (self.grasp or "contacts", self.protocol.name, theirs, ours)
-        return summary("Judgement", *told, margin=self.ours.margin)
+from sim_validate.protocols.runs import their_verdict
+from sim_validate.protocols.verdict import Judgement, OurVerdict
 
 
 def judge_by(
@@ -132,8 +76,7 @@ def judge_by(
     )
     return Judgement(
         grasp=given.id if isinstance(given, Grasp) else "",
-        hand="",
-        protocol=found,
+        protocol=found.name,
         friction=friction,
         mass_kg=scene.mass_kg,
         push_n=float(scene.pushes_n.max()),
@@ -195,8 +138,8 @@ def judge_hand_by(
     )
     return Judgement(
         grasp=reach.grasp,
+        protocol=found.name,
         hand=hand.name,
-        protocol=found,
         friction=friction,
         mass_kg=scene.mass_kg,
         push_n=float(scene.pushes_n.max(initial=0.0)),

@@ -13,8 +13,9 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.by_value import summary
 from grasp_core.checked import one_of
+from grasp_core.declared import Declared, summary
+from grasp_core.kinds import Number, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.tested import Weld
 from scenes.settings import PhysicsSettings
@@ -24,7 +25,7 @@ NOWHERE: Triple = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class Source(Declared):
     """Files of a public repository in which a test is stated."""
 
     repository: str
@@ -33,7 +34,7 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class Step(Declared):
     """A part of a run: what acts on the object, and how the palm moves, for some time."""
 
     seconds: float
@@ -57,20 +58,20 @@ Run: TypeAlias = tuple[Step, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Passing:
+class Passing(Declared):
     """When a run passes; displacement and turn count from before the fingers close."""
 
-    most_m: float = math.inf
+    most_m: OrInfinity = math.inf
     """Displacement below which a look passes [m]."""
-    most_deg: float = math.inf
-    fingers: int = 0
+    most_deg: OrInfinity = math.inf
+    fingers: Number = 0
     most_overlap_m: float | None = None
     """Overlap of hand and object before closing up to which a grasp is tested at all [m]; None
     where the test does not ask."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class PublishedProtocol:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PublishedProtocol(Declared):
     """The test of another tool as it is published."""
 
     name: str

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.declared import Declared
+from grasp_core.kinds import Measured, Number
 from scenes.mujoco.silent_mujoco import unlogged
 from scenes.mujoco.tested import TestedScene
 from sim_validate.engine.bench import batch, compiled, faults, mujoco, step
@@ -56,17 +58,17 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class RunVerdict:
+class RunVerdict(Declared):
     """How one run of a published test ended."""
 
-    number: int
+    number: Number
     passed: bool
     reason: str
-    displacement_m: float
+    displacement_m: Measured
     """Largest displacement at a look, up to the first that did not pass [m]."""
-    turn_deg: float
+    turn_deg: Measured
     """Largest turn at a look, likewise [deg]."""
-    fingers: int
+    fingers: Number
     """Least number of fingers that touched the object at a look, likewise."""
 
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from sim_validate.closure.verdict import AGREEMENT
-from sim_validate.closure.verdicts_json import let_go
+from sim_validate.closure.controls import ControlTrial
+from sim_validate.closure.verdict import AGREEMENT, Verdict, WrenchVerdict
 from sim_validate.engine.traces import LET_GO, Outcome
 
 Record = Mapping[str, Any]
@@ -51,80 +51,78 @@ class Quadrants:
     neither: int = 0
 
 
-def frictions_in(verdicts: Iterable[Record]) -> Agreement:
+def frictions_in(verdicts: Iterable[Verdict]) -> Agreement:
     """Compare critical frictions; a simulated zero means that the least one tried sufficed."""
-    found = [verdict["critical_friction"] for verdict in verdicts]
-    measured = [each for each in found if each["simulated"] is not None]
-    pairs = tuple((each["predicted"], each["simulated"]) for each in measured if each["simulated"])
+    found = [verdict.critical_friction for verdict in verdicts]
+    measured = [(each.predicted, each.simulated) for each in found if each.simulated is not None]
+    pairs = tuple(pair for pair in measured if pair[1])
     return Agreement("critical friction", pairs, len(measured) - len(pairs))
 
 
-def limits_in(verdicts: Iterable[Record]) -> Agreement:
+def limits_in(verdicts: Iterable[Verdict]) -> Agreement:
     """Compare the sizes of the largest wrenches that were resisted."""
     pairs = tuple(
-        (size * trial["predicted_limit"], size * trial["simulated_limit"])
+        (size * trial.predicted_limit, size * trial.simulated_limit)
         for verdict in verdicts
-        for trial in verdict["wrenches"]
-        if None not in (trial["predicted_limit"], trial["simulated_limit"])
+        for trial in verdict.wrenches
+        if trial.simulated_limit is not None and math.isfinite(trial.predicted_limit)
         for size in [wrench_size(verdict, trial)]
     )
     return Agreement("largest wrench [N], torques over grasp size", pairs)
 
 
-def wrench_size(verdict: Record, trial: Record) -> float:
+def wrench_size(verdict: Verdict, trial: WrenchVerdict) -> float:
     """Compute the size of a trial's wrench [N], with torques divided by the grasp's size."""
-    force, torque = np.reshape(trial["wrench"], (2, 3))
-    return math.hypot(*force, *(torque / verdict["settings"]["grasp_size_m"]))
+    force, torque = np.reshape(trial.wrench, (2, 3))
+    return math.hypot(*force, *(torque / verdict.scale.grasp_size_m))
 
 
-def quadrants_in(verdicts: Sequence[Record]) -> Quadrants:
+def quadrants_in(verdicts: Sequence[Verdict]) -> Quadrants:
     """Count trials of grasps and of negative controls; nothing resists the loads of a control."""
     counts = Counter[str]()
     for verdict in verdicts:
-        counts.update(_place(trial, resisted(trial)) for trial in verdict["wrenches"])
-        for control in verdict["controls"].values():
-            counts.update(_place(trial, False) for trial in control["wrenches"])
+        counts.update(_place(trial, resisted(trial)) for trial in verdict.wrenches)
+        for control in verdict.controls:
+            counts.update(_place(trial, False) for trial in control.tried)
     return Quadrants(**counts)
 
 
-def resisted(trial: Record) -> bool | None:
+def resisted(trial: WrenchVerdict) -> bool | None:
     """Tell whether a load is predicted to be resisted; None if it is too near its limit."""
-    limit = trial["predicted_limit"]
-    if limit is not None and abs(limit - 1.0) <= AGREEMENT:
-        return None
-    return limit is not None and limit > 1.0
+    limit = trial.predicted_limit
+    return None if abs(limit - 1.0) <= AGREEMENT else limit > 1.0
 
 
-def as_predicted(trial: Record) -> bool:
+def as_predicted(trial: WrenchVerdict) -> bool:
     """Tell whether a trial ended as predicted, or in a way that the prediction leaves open."""
     wanted = resisted(trial)
-    ends = (HELD, *GONE) if wanted is None else (HELD,) if wanted else GONE
-    return trial["outcome"] in ends
+    ends = (HELD, *LET_GO) if wanted is None else (HELD,) if wanted else LET_GO
+    return trial.hold.outcome in ends
 
 
-def _place(trial: Record, wanted: bool | None) -> str:
-    if wanted is None or trial["outcome"] not in (HELD, *GONE):
+def _place(trial: WrenchVerdict | ControlTrial, wanted: bool | None) -> str:
+    outcome = trial.hold.outcome
+    if wanted is None or outcome not in (HELD, *LET_GO):
         return "neither"
-    held = "held" if trial["outcome"] == HELD else "let_go"
+    held = "held" if outcome is HELD else "let_go"
     return f"{'resisted' if wanted else 'not_resisted'}_{held}"
 
 
-HELD = Outcome.HELD.value
-GONE = tuple(outcome.value for outcome in LET_GO)
+HELD = Outcome.HELD
 GOOD, BAD, QUIET = "good", "bad", "quiet"
 
 
-def said_of(verdict: Record | None) -> tuple[str, str]:
+def said_of(verdict: Verdict | None) -> tuple[str, str]:
     """Say in words what the verdict on a grasp is, and of which kind: good, bad or quiet."""
     if verdict is None:
         return "not validated", QUIET
-    outcome, controls = str(verdict["outcome"]), verdict["controls"].values()
-    if outcome not in (HELD, *GONE):
-        return outcome.replace("_", " "), BAD
-    if verdict["mismatches"]:
+    outcome = verdict.outcome.value.replace("_", " ")
+    if verdict.outcome not in (HELD, *LET_GO):
+        return outcome, BAD
+    if verdict.mismatches:
         return "contradicts the analysis", BAD
-    if any(control["held"] for control in controls):
+    if any(control.held for control in verdict.controls):
         return "a negative control held", BAD
-    if not all(map(let_go, controls)):
+    if not verdict.controls_let_go:
         return "a negative control is undecided", BAD
-    return outcome.replace("_", " "), GOOD if verdict["held"] else BAD
+    return outcome, GOOD if verdict.held else BAD

@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import about
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
-from grasp_core.values import ContactRegion, Grasp, four
+from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
@@ -22,10 +20,11 @@ from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import best_view
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Wanted, of_verdict, replayed
-from sim_validate.execution.executions_json import EXECUTIONS, Executions
+from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
+from sim_validate.execution.verdict import Executions
 from sim_validate.kit.result_folders import CLIPS, PICTURES
-from sim_validate.report.agreement import Record
+from sim_validate.planning.regions_json import GraspRegions
 from sim_validate.report.charts.margin_charts import margin_panels
 from sim_validate.report.charts.motion_charts import motion_panels
 from sim_validate.report.charts.wrench_charts import wrench_panels
@@ -39,8 +38,8 @@ class Task:
 
     saved: Plan
     friction: float
-    verdict: Record | None
-    regions: Record | None
+    verdict: Verdict | None
+    regions: GraspRegions | None
     executions: Executions | None
     held: PosedHand | None
     """The hand in the grasp; None if there is none, or it does not reach the grasp."""
@@ -110,15 +109,11 @@ def tasks_of(
     ]
 
 
-def certified(grasp: Grasp, record: Record | None) -> Grasp:
-    """Replace the regions of a grasp by those of a record, if the record has regions."""
-    if record is None or record["regions"] is None:
+def certified(grasp: Grasp, found: GraspRegions | None) -> Grasp:
+    """Replace the regions of a grasp by certified ones, if it has any."""
+    if found is None or found.regions is None:
         return grasp
-    regions = [
-        ContactRegion("certified", np.array(each["polygon_m"]), each["inscribed_radius_m"])
-        for each in record["regions"]
-    ]
-    return replace(grasp, regions=four(regions))
+    return replace(grasp, regions=found.regions)
 
 
 def draw(task: Task) -> Drawn:
@@ -145,7 +140,7 @@ def draw(task: Task) -> Drawn:
     return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
 
 
-def _with_motion(task: Task, verdict: Record, drawn: Drawn) -> Drawn:
+def _with_motion(task: Task, verdict: Verdict, drawn: Drawn) -> Drawn:
     recorded = of_verdict(task.source, task.saved, verdict, Wanted(task.saved.grasps[0].id))
     found = replayed(recorded)
     size = found.scene.layout.grasp_size_m
@@ -177,7 +172,7 @@ def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
     for place, trial in enumerate(worth_seeing(found.execution)):
         path = task.folder / CLIPS / f"{task.name}-executed-{place}.webp"
         try:
-            with about(f"{task.source.with_name(EXECUTIONS)}: {found.id}"):
+            with about(f"{task.source.with_name(Executions.FILE)}: {found.id}"):
                 film(job, trial.name, path)
         except GraphicsError as error:
             return replace(drawn, no_clip=str(error))
@@ -185,8 +180,8 @@ def _with_executed(task: Task, executions: Executions, drawn: Drawn) -> Drawn:
     return replace(drawn, executed=tuple(filmed))
 
 
-def largest_push(verdict: Record | None) -> float:
+def largest_push(verdict: Verdict | None) -> float:
     """Look up the largest normal force that each finger may apply [N]."""
     if verdict is None:
         return FingerSettings().max_normal_force_n
-    return float(verdict["settings"]["fingers"]["max_normal_force_n"])
+    return verdict.setup.fingers.max_normal_force_n

@@ -2,32 +2,31 @@
 
 import math
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import cast
 
 import numpy as np
 
-from grasp_core.settings import as_table
-from scenes.drawing.pages import NOTHING, number
-from sim_validate.execution.executions_json import Executions, executions_summary
-from sim_validate.execution.settings import ExecutionSettings
+from grasp_core.figures import NONE, Figure, figures
+from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
-    Execution,
+    ExecutionControl,
+    Executions,
     ExecutionTrial,
-    best_executed,
-    ended,
+    multiple_in_words,
+    totals_in_words,
 )
 from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of
+from sim_validate.report.pages import records_table
+from sim_validate.settings.executions import ExecutionSettings
 
 MILLI = 1e3
 ALWAYS = ("mass_kg", "seed")
 """Settings whose usual value depends on the object or on the plan."""
 FAILED, LOST = "failed", "lost"
 """Word that begins how many trials were not survived, and the one word for it."""
-NEVER = "never"
-"""Text that stands for a first slip that no multiple of a load brings about."""
 
 
 def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
@@ -40,14 +39,13 @@ def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
         return "a negative control held", BAD
     if not found.execution.trials:
         return "no trial is possible", BAD
-    lost = sum(not trial.survived for trial in found.execution.trials)
-    if lost:
-        return f"{FAILED} {lost} of {len(found.execution.trials)} trials", BAD
+    if lost := found.execution.lost:
+        return f"{FAILED} {len(lost)} of {len(found.execution.trials)} trials", BAD
     return "survived", GOOD
 
 
 def said_of_both(
-    verdict: Record | None, executions: Executions | None, found: ExecutedGrasp | None
+    verdict: Verdict | None, executions: Executions | None, found: ExecutedGrasp | None
 ) -> tuple[str, str]:
     """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
 
@@ -63,51 +61,28 @@ def said_of_both(
 
 
 def execution_row(found: ExecutedGrasp | None) -> Record:
-    """Build the cells about one grasp in the table of the first page."""
+    """Build the cells about one grasp in the table of the first page, and on its card."""
     said, tone = said_of_execution(found)
-    execution = None if found is None else found.execution
-    trials = () if execution is None else execution.trials
     least = 0.0 if found is None else found.least_predicted_loss
+    listed = execution_figures()
     return {
         "said": said,
         "tone": tone,
-        "loss": _slip(None if execution is None else execution.least_predicted_loss),
+        "loss": multiple_in_words(least),
         "least_loss": "Infinity" if math.isinf(least) else f"{least:.6g}",  # as scripts read it
-        "payload": number(None if execution is None else execution.payload_kg, 3),
-        "multiple": number(None if execution is None else execution.load_multiple, 3),
-        "survived": f"{sum(trial.survived for trial in trials)} of {len(trials)}",
-        "predicted": _slip(min((trial.predicted_first_slip for trial in trials), default=None)),
-        "simulated": _slip(min((trial.simulated_first_slip for trial in trials), default=None)),
+        "cells": [(NONE if found is None else each.cell(found), "") for each in listed],
     }
 
 
+def execution_figures() -> Sequence[Figure]:
+    """Return the figures of executed grasps, but for the id, which leads to a grasp's page."""
+    return figures(ExecutedGrasp)[1:]
+
+
 def described_executions(executions: Executions) -> str:
-    """Say in one sentence how many grasps survived being executed, and with which mass."""
-    counts = executions_summary(executions.grasps)
-    lost = counts["grasps_without_squeeze"]
-    said = (
-        f"Executed with {executions.settings.object_kg:.4g} kg at friction "
-        f"{executions.friction:g}, {counts['grasps_survived']} of {counts['grasps']} grasps "
-        f"survived every trial; {counts['controls_let_go']} of {counts['controls']} negative "
-        "controls let go, as all should"
-    )
-    said += f"; no squeeze holds the object in {lost} of them" if lost else ""
-    said += "." if executions.complete else "; the executions were interrupted."
-    best = best_executed(executions.grasps)
-    if best is not None and best.execution is not None:
-        said += (
-            f" Best for this is {best.id}: predicted to be lost at "
-            f"{_slip(best.least_predicted_loss)} times the loads of its hardest trial, and its "
-            f"squeeze carries {number(best.execution.payload_kg, 3)} kg in any direction."
-        )
-    return said
-
-
-def execution_settings(executions: Executions) -> Iterable[tuple[str, str]]:
-    """Yield names and values of everything that the executions of a run were asked for."""
-    yield "execution.friction", f"{executions.friction:g}"
-    for name, value in as_table(executions.settings).items():
-        yield f"execution.{name}", str(value)
+    """Say how many grasps survived being executed, and which is best."""
+    ended = [] if executions.complete else ["the executions were interrupted"]
+    return " ".join(f"{line[0].upper()}{line[1:]}." for line in totals_in_words(executions) + ended)
 
 
 def execution_section(executions: Executions | None, found: ExecutedGrasp | None) -> Record | None:
@@ -116,25 +91,16 @@ def execution_section(executions: Executions | None, found: ExecutedGrasp | None
         return None
     said, tone = said_of_execution(found)
     execution = None if found is None else found.execution
+    trials, controls = ((), ()) if execution is None else (execution.trials, execution.controls)
     return {
         "said": said,
         "tone": tone,
-        "facts": list(_facts(executions, execution)),
+        "facts": list(_facts(executions, found)),
         "reason": None if found is None else found.reason,
-        "trials": [] if execution is None else [
-            _trial(each, executions.settings) for each in execution.trials
-        ],
-        "controls": [] if execution is None else [
-            {
-                "name": each.name,
-                "said": "let go" if each.let_go else "held",
-                "tone": GOOD if each.let_go else BAD,
-                "slip": _slip(each.first_slip),
-            }
-            for each in execution.controls
-        ],
-        "skipped": [] if execution is None else execution.skipped,
-    }  # fmt: skip
+        "trials": records_table(trials, ExecutionTrial),
+        "controls": records_table(controls, ExecutionControl),
+        "skipped": () if execution is None else execution.skipped,
+    }
 
 
 def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
@@ -158,46 +124,20 @@ def _words(value: object) -> list[str]:
     return [repr(part) for part in parts]
 
 
-def _facts(executions: Executions, found: Execution | None) -> Iterable[tuple[str, str]]:
-    settings = executions.settings
-    yield "Mass", f"{settings.object_kg:.4g} kg, at friction {executions.friction:g}"
-    yield "Push of a finger", f"at most {settings.push_n:.4g} N"
+def _facts(executions: Executions, found: ExecutedGrasp | None) -> Iterable[tuple[str, str, str]]:
+    settings, execution = executions.settings, None if found is None else found.execution
+    yield "Mass", f"{settings.object_kg:.4g} kg", f"at friction {executions.friction:g}"
     tips = f"fingertips of {MILLI * settings.tip_mass_kg:.4g} g"
-    if found is not None and found.tip_radius_m is not None:
-        tips += f" and {MILLI * float(found.tip_radius_m.max()):.4g} mm radius"
-    yield "Springs", f"{settings.tip_stiffness_n_per_m:.5g} N/m, {tips}"
-    yield "Counts as held", f"up to {settings.max_mm:g} mm and {settings.max_deg:g} deg"
-    if found is not None:
-        sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(found.squeeze, axis=1))
-        yield "Squeeze, finger by finger", f"{sizes} N"
-        yield (
-            "Certified for", f"{found.load_multiple:.3g} times the weight, in any direction: a "
-            f"payload of {found.payload_kg:.3g} kg, for loads that grow slowly",
-        )  # fmt: skip
-        yield "Least predicted loss", f"{_slip(found.least_predicted_loss)} times a trial's load"
-        if found.load_multiple >= 1.0:
-            spare = f"{found.load_multiple - 1.0:.3g} g in any direction, if it grows slowly"
-            yield "So the palm may accelerate by", spare
-        if found.enough is not None:
-            yield "What would be enough", str(found.enough)
-
-
-def _trial(trial: ExecutionTrial, settings: ExecutionSettings) -> Record:
-    return {
-        "name": trial.name,
-        "fate": ended(trial, settings),
-        "said": "survived" if trial.survived else "failed",
-        "tone": GOOD if trial.survived else BAD,
-        "slip": number(MILLI * trial.slip_m, 2),
-        "displacement": number(MILLI * trial.displacement_m, 2),
-        "turn": number(math.degrees(trial.turn_rad), 2),
-        "predicted": _slip(trial.predicted_first_slip),
-        "loss": _slip(trial.predicted_loss),
-        "simulated": _slip(trial.simulated_first_slip),
-    }
-
-
-def _slip(multiple: float | None) -> str:
-    if multiple is None:
-        return NOTHING
-    return NEVER if math.isinf(multiple) else f"{multiple:.2f}"
+    if execution is not None and execution.tip_radius_m is not None:
+        tips += f" and {MILLI * float(execution.tip_radius_m.max()):.4g} mm radius"
+    yield "Push of a finger", f"at most {settings.push_n:.4g} N", ""
+    yield "Springs", f"{settings.tip_stiffness_n_per_m:.5g} N/m", tips
+    yield "Counts as held", f"up to {settings.max_mm:g} mm and {settings.max_deg:g} deg", ""
+    if found is None or execution is None:
+        return
+    sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))
+    yield "Squeeze, finger by finger", f"{sizes} N", ""
+    for figure in execution_figures():
+        yield figure.shown.heading, figure.cell(found), figure.meaning
+    if found.enough is not None:
+        yield "What would be enough", str(found.enough), ""

@@ -9,11 +9,13 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
+from grasp_core.figures import figures
 from grasp_core.values import Grasp
 from scenes.drawing.pages import NOTHING, number
 from scenes.drawing.turntable import Fact, as_text, grasp_data, grasp_facts
-from sim_validate.closure.verdicts_json import let_go
-from sim_validate.planning.best_json import BestFile, shares_of_bound
+from sim_validate.closure.controls import ControlVerdict
+from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.planning.best_json import MEASURES, Best
 from sim_validate.planning.grasps_json import GRASPS
 from sim_validate.report.agreement import BAD, GOOD, Record, as_predicted, wrench_size
 from sim_validate.report.drawn_grasps import Drawn, certified, largest_push
@@ -34,23 +36,8 @@ SPAN = (
     "half-angle of the widest cones around the normals of which any choice of directions "
     "positively spans space; 0: none do, and the force cones lean"
 )
-MOTIONS = (
-    (
-        "Object moved at most", "displacement_m",
-        "under any of the loads below, from when friction was lowered until the answer was known; "
-        "the chart shows one trial in full length",
-    ),
-    (
-        "While a load came, at most", "start_displacement_m",
-        "before that, at high friction: the fingers give way a little",
-    ),
-)  # fmt: skip
-MEASURES = {
-    "ferrari-canny": ("Ferrari-Canny quality", " N"),
-    "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
-    "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
-}
-"""What each measure of the best grasp says of a grasp, and its unit."""
+SAID_ABOVE = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
+"""Figures of a verdict that the page says in other places."""
 FOCUS = "where lines of force meet, in the object's frame"
 
 
@@ -78,7 +65,7 @@ def grasp_page(
     verdict = run.verdicts.get(grasp.id)
     shown = certified(grasp, run.shaded.get(grasp.id))
     said, tone = said_of_both(verdict, run.executions, run.executed(grasp.id))
-    size = None if verdict is None else verdict["settings"]["grasp_size_m"]
+    size = None if verdict is None else verdict.scale.grasp_size_m
     return page(
         "grasp.html",
         grasp=grasp,
@@ -105,8 +92,8 @@ def grasp_page(
             "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
             "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
         },
-        trials=[] if verdict is None else [_trial(verdict, each) for each in verdict["wrenches"]],
-        controls=[] if verdict is None else _controls(verdict["controls"]),
+        trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
+        controls=[] if verdict is None else [_control(each) for each in verdict.controls],
         commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(
             grasp_data(run.saved.body, shown, run.friction, held_in(run.reaches, grasp))
@@ -114,11 +101,11 @@ def grasp_page(
     )
 
 
-def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fact]:
+def _facts(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable[Fact]:
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
     yield "Family", grasp.family, FAMILIES[grasp.family]
-    simulated = None if verdict is None else verdict["critical_friction"]["simulated"]
+    simulated = None if verdict is None else verdict.simulated_critical_friction
     in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
     yield from grasp_facts(run.saved.body, grasp, at_plan=at_plan, in_simulation=in_simulation)
     yield from possible_facts(run.possible, grasp.id)
@@ -127,26 +114,25 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[Fac
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
         yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
     if verdict is not None:
-        for name, field, meaning in MOTIONS:
-            moved = [trial.get(field) for trial in verdict["wrenches"]]
-            known = [MICRO * each for each in moved if each is not None]
-            yield name, f"{number(max(known, default=None), 2)} µm", meaning
-        if (repeats := verdict.get("robustness")) is not None:
-            low, high = repeats["pass_rate_interval"]
-            said = f"held {repeats['held']} of {repeats['trials']} times"
+        for figure in figures(Verdict):
+            if figure.name not in SAID_ABOVE and figure.of(verdict) is not None:
+                yield figure.shown.heading, figure.cell(verdict), figure.meaning
+        if (repeats := verdict.robustness) is not None:
+            low, high = repeats.interval
+            said = f"held {repeats.held} of {len(repeats.trials)} times"
             yield "With noise", said, f"95 % interval of the share held: {low:.2f} to {high:.2f}"
 
 
-def possible_facts(best: BestFile | None, grasp: str) -> Iterable[Fact]:
+def possible_facts(best: Best | None, grasp: str) -> Iterable[Fact]:
     """Yield the share that a grasp reaches of what a search has bounded."""
-    share = None if best is None else shares_of_bound(best).get(grasp)
+    share = None if best is None else best.shares.get(grasp)
     if best is None or share is None:
         return
-    what, unit = MEASURES[best["measure"]]
+    what, unit = MEASURES[best.measure]
     yield (
         "Share of the possible", f"{PERCENT * share:.1f} %",
-        f"{what}, over the bound {number(best['bound'])}{unit} for all contacts "
-        f"at least {number(MILLI * best['clearance_m'])} mm from edges; grasps nearer to edges "
+        f"{what}, over the bound {number(best.bound)}{unit} for all contacts "
+        f"at least {number(MILLI * best.clearance_m)} mm from edges; grasps nearer to edges "
         "may exceed it",
     )  # fmt: skip
 
@@ -168,60 +154,53 @@ def _contacts(grasp: Grasp) -> Iterable[Record]:
 
 
 def _certified(run: RunFolder, grasp: Grasp) -> str:
-    record = run.regions.get(grasp.id)
-    if record is None:
+    found = run.regions.get(grasp.id)
+    if run.certified is None or found is None:
         return ""
+    friction = f"{run.certified.friction:g}"
     if not run.shaded:
-        return f"Certified regions are for friction {run.regions_friction:g}: not shown."
-    if record["regions"] is None:
-        return f"No certified regions: {record['reason']}."
-    proof = record.get("proof")
-    where = f" Proof: {proof['file']}." if proof else ""
-    discs = number(MILLI * record["disc_radius_m"])
-    return (
-        f"Regions are certified for friction {run.regions_friction:g}: discs of {discs} mm.{where}"
-    )
+        return f"Certified regions are for friction {friction}: not shown."
+    if found.regions is None:
+        return f"No certified regions: {found.reason}."
+    where = f" Proof: {found.proof.file}." if found.proof else ""
+    discs = number(MILLI * found.disc_radius_m) if found.disc_radius_m is not None else NOTHING
+    return f"Regions are certified for friction {friction}: discs of {discs} mm.{where}"
 
 
-def _trial(verdict: Record, trial: Record) -> Record:
-    moved, size = trial["displacement_m"], wrench_size(verdict, trial)
-    limit, found = trial["predicted_limit"], trial["simulated_limit"]
+def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
+    size, limit, found = wrench_size(verdict, trial), trial.predicted_limit, trial.simulated_limit
+    moved = MICRO * trial.hold.displacement_m
     return {
-        "name": trial["name"],
-        "wrench": ", ".join(f"{part + 0.0:.3g}" for part in trial["wrench"]),
+        "name": trial.name,
+        "wrench": ", ".join(f"{part + 0.0:.3g}" for part in trial.wrench),
         "share": "" if not limit else f"{100.0 / limit:.0f} %",
-        "limit": number(None if limit is None else size * limit),
+        "limit": number(size * limit if math.isfinite(limit) else None),
         "simulated": number(None if found is None else size * found),
-        "friction": number(trial["required_friction"], 3),
-        "outcome": str(trial["outcome"]).replace("_", " "),
+        "friction": number(trial.required_friction, 3),
+        "outcome": trial.hold.outcome.value.replace("_", " "),
         "tone": GOOD if as_predicted(trial) else BAD,
-        "moved": NOTHING if moved is None else number(MICRO * moved, 2),
+        "moved": NOTHING if math.isnan(moved) else number(moved, 2),
     }
 
 
-def _controls(controls: Record) -> Sequence[Record]:
-    return [
-        {
-            "name": name.replace("_", " "),
-            "friction": number(control["friction"]),
-            "outcomes": ", ".join(
-                f"{trial['name']}: {str(trial['outcome']).replace('_', ' ')}"
-                for trial in control["wrenches"]
-            ),
-            "tone": GOOD if let_go(control) else BAD,
-            "said": "let go" if let_go(control) else "held" if control["held"] else "undecided",
-        }
-        for name, control in controls.items()
-    ]
+def _control(each: ControlVerdict) -> Record:
+    ended = (f"{trial.name}: {trial.hold.outcome.value}" for trial in each.tried)
+    return {
+        "name": each.control.name.replace("_", " "),
+        "friction": number(each.control.friction),
+        "outcomes": ", ".join(ended).replace("_", " "),
+        "tone": GOOD if each.let_go else BAD,
+        "said": "let go" if each.let_go else "held" if each.held else "undecided",
+    }
 
 
-def _commands(run: RunFolder, grasp: Grasp, verdict: Record | None) -> Iterable[str]:
+def _commands(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable[str]:
     asked = f"--grasp {shlex.quote(grasp.id)}"
     other = "" if run.friction == run.saved.friction else f" --friction {run.friction:g}"
     yield f"graspproof view {GRASPS} {asked}{other}"
     if verdict is not None:
         yield f"graspproof replay . {asked} --out replay"
-        for name in verdict["controls"]:
+        for name in (each.control.name for each in verdict.controls):
             yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
     if run.executions is not None and run.executed(grasp.id) is not None:
         yield execute_command(run.executions, GRASPS, grasp.id)

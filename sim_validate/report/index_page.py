@@ -1,16 +1,21 @@
 """Writes the first page of a report: all runs, and the pictures of their grasps."""
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, cast
 
+from grasp_core.figures import table
+from grasp_core.files.records import record_of
 from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing.pages import number
 from scenes.drawing.sheets import svg_of
-from sim_validate.closure.verdicts_json import let_go
-from sim_validate.planning.best_json import BestFile, shares_of_bound
+from sim_validate.closure.verdict import Verdict
+from sim_validate.planning.best_json import MEASURES, Best, Rated
+from sim_validate.protocols.verdict import Totals
 from sim_validate.report.agreement import (
     Record,
     frictions_in,
@@ -21,11 +26,11 @@ from sim_validate.report.agreement import (
 from sim_validate.report.charts.run_charts import fidelity_panel
 from sim_validate.report.executed_grasps import (
     described_executions,
+    execution_figures,
     execution_row,
-    execution_settings,
     said_of_both,
 )
-from sim_validate.report.grasp_page import MEASURES, MILLI, MIRRORED, PERCENT, Copy
+from sim_validate.report.grasp_page import MILLI, MIRRORED, PERCENT, Copy
 from sim_validate.report.pages import page
 from sim_validate.report.reached_grasps import (
     described_reaches,
@@ -99,40 +104,43 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         agreements=found,
         fidelity=[svg_of(fidelity_panel(each)) for each in found] if verdicts else [],
         limits=bool(limits.pairs),
-        mismatches=[f"{each['id']}: {line}" for each in verdicts for line in each["mismatches"]],
+        mismatches=[f"{each.id}: {line}" for each in verdicts for line in each.mismatches],
         controls=_controls(verdicts),
         executions=[described_executions(each) for each in executed],
-        judged=[
-            {"name": name, "object": run.saved.body.name, **counts}
-            for run in runs if run.judgements is not None
-            for name, counts in run.judgements["summary"].items()
-        ],
+        executed_columns=[(each.shown.heading, each.meaning) for each in execution_figures()],
+        judged=_judged(runs),
         possible=[
-            {"object": run.saved.body.name, **found}
+            {"object": run.saved.body.name, **_described_possible(run.possible)}
             for run in runs
-            if (found := _described_possible(run.possible)) is not None
+            if run.possible is not None
         ],
     )  # fmt: skip
 
 
-def _described_possible(best: BestFile | None) -> Record | None:
-    if best is None:
-        return None
-    (what, unit), bound, name = MEASURES[best["measure"]], best["bound"], best["grasp"]["id"]
-    proved = f"by the proof in {best['proof']}" if best["proof"] else "whose proof was not kept"
-    reached = {each["id"]: each["quality"][0] for each in best["planned"]}
-    ranked = sorted({**reached, name: best["quality"][0]}.items(), key=lambda e: (-e[1], e[0]))
+def _judged(runs: Sequence[RunFolder]) -> Record | None:
+    """Return a table of how many grasps each published test accepts, for each object."""
+    judged = [(run.saved.body.name, run.judgements) for run in runs if run.judgements is not None]
+    totals = [(name, each) for name, found in judged for each in found.summary.values()]
+    columns, rows = table([each for _, each in totals], Totals)
+    named = [(*row[:1], name, *row[1:]) for (name, _), row in zip(totals, rows, strict=True)]
+    return {"columns": (*columns[:1], "object", *columns[1:]), "rows": named} if totals else None
+
+
+def _described_possible(best: Best) -> Record:
+    (what, unit), name = MEASURES[best.measure], best.grasp.id
+    proved = f"by the proof in {best.proof}" if best.proof else "whose proof was not kept"
+    distinct = {each.id: each for each in reversed(best.rated)}
+    ranked = sorted(distinct.values(), key=lambda each: (-each.quality[0], each.id))
+    columns, rows = table(ranked[:ROWS], Rated)
     return {
         "said": (
-            f"Best is {name}: {number(best['quality'][0])}{unit} of {what}. No four contacts at "
-            f"least {number(MILLI * best['clearance_m'])} mm from edges exceed "
-            f"{number(bound)}{unit} at friction {number(best['friction'])}, {proved}; "
-            f"{PERCENT * best['gap']:.1f} % are between the two."
+            f"Best is {name}: {number(best.quality[0])}{unit} of {what}. No four contacts at "
+            f"least {number(MILLI * best.clearance_m)} mm from edges exceed "
+            f"{number(best.bound)}{unit} at friction {number(best.friction)}, {proved}; "
+            f"{PERCENT * best.gap:.1f} % are between the two."
         ),
-        "what": f"{what}{f' [{unit.strip()}]' if unit else ''}",
-        "rows": [
-            (each, number(value), f"{PERCENT * value / bound:.1f}") for each, value in ranked[:ROWS]
-        ],
+        "columns": columns,
+        "rows": rows,
         "more": max(0, len(ranked) - ROWS),
     }
 
@@ -153,7 +161,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
-        "share": shares_of_bound(shown.run.possible).get(grasp.id) if shown.run.possible else None,
+        "share": shown.run.possible.shares.get(grasp.id) if shown.run.possible else None,
         "critical_friction": grasp.critical_friction,
         "executed": execution_row(executed) if shown.run.executions else None,
         "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,
@@ -162,26 +170,23 @@ def _card(shown: Shown) -> dict[str, Any]:
     }
 
 
-def _weakest(verdict: Record) -> float | None:
+def _weakest(verdict: Verdict) -> float | None:
     """Find the smallest wrench limit of a grasp [N], with torques divided by the grasp's size."""
-    found = [
-        trial["predicted_limit"] * wrench_size(verdict, trial)
-        for trial in verdict["wrenches"]
-        if trial["predicted_limit"] is not None
-    ]
-    return min(found, default=None)
+    found = [trial.predicted_limit * wrench_size(verdict, trial) for trial in verdict.wrenches]
+    return min(filter(math.isfinite, found), default=None)
 
 
 def _described(run: RunFolder) -> dict[str, Any]:
-    counts = run.summary.get("summary")
+    tested = run.tested
     said = f"{len(run.saved.grasps) + run.left_out} grasps at friction {run.friction:g}"
-    if counts:
+    if tested is not None:
+        counts = tested.summary
         said += (
             f"; {counts['grasps_held']} of {counts['grasps']} held, "
             f"{counts['controls_let_go']} of {counts['controls']} negative controls were let go, "
             f"{counts['mismatches']} results contradict the analysis"
         )
-        said += "" if run.summary.get("complete", True) else "; the run was interrupted"
+        said += "" if tested.complete else "; the run was interrupted"
     said += "."
     said += f" {described_reaches(run.reaches)}" if run.reaches else ""
     if run.left_out:
@@ -189,13 +194,13 @@ def _described(run: RunFolder) -> dict[str, Any]:
             f" {len(run.saved.grasps)} are shown, those with problems among them; "
             "`graspproof report` draws all."
         )
-    gate = run.summary.get("gate", {}).get("checks", ())
+    gate = () if tested is None else tested.gate.checks
     return {
         "name": run.saved.body.name,
         "summary": " ".join([said, *run.saved.body.notes]),
         "about": list(_about(run)),
         "gate": gate,
-        "gate_passed": sum(check["least"] <= check["value"] <= check["largest"] for check in gate),
+        "gate_passed": sum(check.passed for check in gate),
     }
 
 
@@ -205,28 +210,32 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
     yield "content_sha256", body.content_sha256
     yield "friction", f"{run.friction:g}"
     yield "seed", str(run.saved.seed)
-    first = next(iter(run.verdicts.values()), None)
-    settings: Record = {} if first is None else first["settings"]
-    for table, values in settings.items():
-        if isinstance(values, dict):
-            for name, value in cast("Record", values).items():
-                yield f"{table}.{name}", str(value)
-        else:
-            yield table, str(values)
+    for first in islice(run.tested or (), 1):
+        asked = {"setup": first.setup, "agenda": first.agenda, "scale": first.scale}
+        yield from _lines({name: record_of(each) for name, each in asked.items()})
     if run.executions is not None:
-        yield from execution_settings(run.executions)
+        used = {"friction": run.executions.friction, **record_of(run.executions.settings)}
+        yield from _lines({"execution": used})
     if run.reaches is not None:
         yield from reach_settings(run.reaches)
-    for name, version in (versions() if first is None else first["versions"]).items():
+    found = versions() if run.tested is None else run.tested.versions
+    for name, version in found.items():
         yield f"version of {name}", str(version)
 
 
-def _controls(verdicts: Sequence[Record]) -> list[dict[str, Any]]:
+def _lines(tables: Mapping[str, Any], where: str = "") -> Iterator[tuple[str, str]]:
+    """Yield each setting in tables inside each other with its place."""
+    for name, value in tables.items():
+        if isinstance(value, dict):
+            yield from _lines(cast("Mapping[str, Any]", value), f"{where}{name}.")
+        else:
+            yield f"{where}{name}", str(value)
+
+
+def _controls(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     kinds = dict[str, dict[str, Any]]()
-    for verdict in verdicts:
-        for name, control in verdict["controls"].items():
-            plain = name.rstrip("0123456789").rstrip("_").replace("_", " ")
-            kind = kinds.setdefault(plain, {"name": plain, "let_go": 0, "held": 0, "undecided": 0})
-            gone = let_go(control)
-            kind["let_go" if gone else "held" if control["held"] else "undecided"] += 1
+    for control in (each for verdict in verdicts for each in verdict.controls):
+        plain = control.control.name.replace("_", " ")
+        kind = kinds.setdefault(plain, {"name": plain, "let_go": 0, "held": 0, "undecided": 0})
+        kind["let_go" if control.let_go else "held" if control.held else "undecided"] += 1
     return list(kinds.values())

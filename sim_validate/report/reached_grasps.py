@@ -4,21 +4,20 @@ import shlex
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from grasp_core.by_value import counted
+from grasp_core.declared import counted
+from grasp_core.figures import figures
+from grasp_core.files.records import record_of
 from grasp_core.hands.named_hands import HANDS
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.execution.executions_json import enough_of
 from sim_validate.report.agreement import BAD, GOOD, QUIET, Record
 
 if TYPE_CHECKING:
-    from grasp_core.hands.reach import HandReach
-    from sim_validate.hands.reaches_json import ExecutedHandRecord, SavedReaches
+    from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-MILLI = 1e3
-STARTS, SEED, CLEARANCE_M = 100, 0, 5e-4
-"""Values that `graspproof reach` takes where nothing else is asked for."""
+Fact = tuple[str, str, str]
+"""Name, value and meaning of a figure."""
 REASONS = {
     "collision": "a collision",
     "limit": "a joint's limit",
@@ -26,168 +25,136 @@ REASONS = {
     "no closure": "no three contacts close",
 }
 """Words for what was in the way."""
-CLEARANCE = "least distance asked for between all that must not touch: links, palm, object, table"
 FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
-WITHIN = "where the fingertips touch; force closure is proved again with these contacts"
-OPENING = "joint angles at which the fingers are 3 to 15 mm open, with the palm where it is"
-MOTORS = "in simulation, each at 80 % of what contacts and motors resist by the analysis"
-WEAKEST = "that contacts and motors resist; torques over the object's radius"
-LOSS = "multiple of a trial's load at which the object is lost, by the analysis"
-PAYLOAD = "that it is certified to carry slowly, in any direction, within the motors' torques"
-CARRIED = "that motors and contacts hold whichever way the hand is turned, forces chosen anew"
-WAY = "over 60 mm, with open fingers and nothing in the way"
+SAID_ABOVE = ("grasp", "id")
+"""Figures that the page has in its title."""
+FLAGS = {"starts": "--starts", "seed": "--seed", "clearance_m": "--clearance-m"}
+"""Flags of `graspproof reach` for what may be asked of a pose."""
 
 
-def held_in(reaches: "SavedReaches | None", grasp: Grasp) -> PosedHand | None:
+def held_in(reaches: "Reaches | None", grasp: Grasp) -> PosedHand | None:
     """Return the hand in the pose in which it stands in a grasp."""
-    reach = reach_of(reaches, grasp)
-    if reaches is None or reaches.hand is None or reach is None or not reach.reached:
+    found = reach_of(reaches, grasp)
+    if reaches is None or found is None or not found.reach.reached:
         return None
-    return posed_hand(reaches.hand, reach, grasp)
+    return posed_hand(reaches.hand, found.reach, grasp)
 
 
-def reach_of(reaches: "SavedReaches | None", grasp: Grasp) -> "HandReach | None":
+def reach_of(reaches: "Reaches | None", grasp: Grasp) -> "ReachedGrasp | None":
     """Return what was found for a grasp; None where no hand was asked for."""
-    return None if reaches is None else reaches.found.get(grasp.id)
+    return None if reaches is None or grasp.id not in reaches else reaches[grasp.id]
 
 
-def why_not_held(reaches: "SavedReaches", grasp: Grasp) -> str:
+def why_not_held(reaches: "Reaches", grasp: Grasp) -> str:
     """Say why there is no hand to draw in a grasp."""
     found = reach_of(reaches, grasp)
     if found is None:
         return f"reaches.json holds nothing about {grasp.id}; `graspproof reach` looks for a pose"
-    return reaches.missing if found.reached else f"{grasp.id}: {found.explanation}"
+    return f"{grasp.id}: {found.reach.explanation}"
 
 
-def said_of_reach(reaches: "SavedReaches | None", grasp: Grasp) -> tuple[str, str]:
+def said_of_reach(reaches: "Reaches | None", grasp: Grasp) -> tuple[str, str]:
     """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
     if reaches is None:
         return "", QUIET
-    found, name = reach_of(reaches, grasp), reaches.hand_name
+    found, name = reach_of(reaches, grasp), reaches.hand.name
     if found is None:
         return f"{name}: not asked", QUIET
-    if not found.reached:
-        return f"{name}: not reached, {REASONS[found.reason]}", QUIET
-    within = found.within_regions or ()
+    reach, held, executed = found.reach, found.simulated, found.executed
+    if not reach.reached:
+        return f"{name}: not reached, {REASONS[reach.reason]}", QUIET
+    within = reach.within_regions or ()
     inside = f"{sum(within)} of {len(within)} contacts "
     said = [f"{name}: reached, {'' if all(within) else inside}within regions"]
-    tone = GOOD
-    if (held := reaches.simulated.get(grasp.id)) is not None:
-        strength = f"held: {number(held['weakest_n'])} N with its motors"
-        said.append(strength if held["held"] else "not held in simulation")
-        tone = tone if held["held"] else BAD
-    if (tried := reaches.executed.get(grasp.id)) is not None:
-        if (trials := tried["execution"]) is None:
-            said.append("not executed")
-        else:
-            lost = len(trials["lost"])
-            said.append(f"survived {trials['trials'] - lost} of {trials['trials']} trials")
-            tone = BAD if lost else tone
-    return ", ".join(said), tone
+    if held is not None:
+        strength = f"held: {number(held.weakest_n)} N with its motors"
+        said.append(strength if held.held else "not held in simulation")
+    if executed is not None and executed.execution is None:
+        said.append("not executed")
+    elif executed is not None:
+        kept = sum(trial.survived for trial in executed.trials)
+        said.append(f"survived {kept} of {len(executed.trials)} trials")
+    lost = executed is not None and not all(trial.survived for trial in executed.trials)
+    return ", ".join(said), BAD if lost or (held is not None and not held.held) else GOOD
 
 
-def held_by_hand(reaches: "SavedReaches | None", grasp: Grasp) -> float | None:
+def held_by_hand(reaches: "Reaches | None", grasp: Grasp) -> float | None:
     """Return the weakest wrench that a hand resists in a grasp [N]; None if it was not simulated.
 
     Torques count over the object's radius.
     """
-    held = None if reaches is None else reaches.simulated.get(grasp.id)
-    return None if held is None else float(held["weakest_n"])
+    found = reach_of(reaches, grasp)
+    return None if found is None or found.simulated is None else found.simulated.weakest_n
 
 
-def described_reaches(reaches: "SavedReaches | None") -> str:
-    """Say in one sentence how many grasps a hand reaches, and whether it can be drawn."""
+def described_reaches(reaches: "Reaches | None") -> str:
+    """Say in one sentence how many grasps a hand reaches."""
     if reaches is None:
         return ""
-    asked = counted(len(reaches.found), "grasp")
-    said = f"The hand {reaches.hand_name} reaches {reaches.reached} of {asked}"
-    said += "." if reaches.complete else "; the search was interrupted."
-    return f"{said} {reaches.missing}".strip()
+    asked = counted(len(reaches), "grasp")
+    said = f"The hand {reaches.hand.name} reaches {reaches.summary['reached']} of {asked}"
+    return said + ("." if reaches.complete else "; the search was interrupted.")
 
 
-def reach_settings(reaches: "SavedReaches") -> Iterable[tuple[str, str]]:
+def reach_settings(reaches: "Reaches") -> Iterable[tuple[str, str]]:
     """Yield names and values of everything that was asked for."""
-    yield "hand.name", reaches.hand_name
+    yield "hand.name", reaches.hand.name
     yield "hand.friction", f"{reaches.friction:g}"
-    yield from ((f"hand.{name}", str(value)) for name, value in reaches.asked.items())
-    limits = [] if reaches.hand is None else [j.torque_limit_n_m for j in reaches.hand.joints]
-    stated = sorted({limit for limit in limits if limit is not None})
-    if stated:
+    for name, value in record_of(reaches.asked).items():
+        yield f"hand.{name}", str(value)
+    limits = {joint.torque_limit_n_m for joint in reaches.hand.joints}
+    if stated := sorted(limit for limit in limits if limit is not None):
         yield "hand.torque_limits_n_m", ", ".join(f"{limit:g}" for limit in stated)
 
 
-def reach_section(reaches: "SavedReaches | None", grasp: Grasp) -> Record | None:
+def reach_section(reaches: "Reaches | None", grasp: Grasp) -> Record | None:
     """Build the section about the hand in a grasp; None where no hand was asked for."""
     found = reach_of(reaches, grasp)
     if reaches is None or found is None:
         return None
     said, tone = said_of_reach(reaches, grasp)
     return {
-        "hand": reaches.hand_name,
+        "hand": reaches.hand.name,
         "said": said.partition(": ")[2],
         "tone": tone,
         "facts": list(_facts(reaches, found)),
-        "explanation": found.explanation,
-        "missing": reaches.missing if found.reached else "",
+        "explanation": found.reach.explanation,
     }
 
 
-def _facts(reaches: "SavedReaches", found: "HandReach") -> Iterable[tuple[str, str, str]]:
-    if found.reached:
-        names = ", ".join(f"{k}: {name}" for k, name in enumerate(reaches.finger_names(found)))
-        yield "Fingers used", names, FINGERS
-        within = found.within_regions or ()
-        yield "Contacts within regions", f"{sum(within)} of {len(within)}", WITHIN
-        margin = number(reaches.margins[found.grasp])
-        yield "Margin of closure there", margin, f"at friction {number(reaches.friction)}"
-    yield "Least clearance", f"{number(MILLI * found.clearance_m)} mm", CLEARANCE
-    if found.reached:
-        for name, way, meaning in (
-            ("Fingers open", found.pregrasp, OPENING), ("Straight way in", found.approach, WAY)
-        ):  # fmt: skip
-            yield name, "none found" if way is None else "found", meaning
-    if (carried := reaches.payloads.get(found.grasp)) is not None:
-        yield "Payload in any orientation", f"{number(carried['lower_kg'])} kg", CARRIED
-    if (held := reaches.simulated.get(found.grasp)) is not None:
-        count, lost = held["wrenches"], len(held["not_held"])
-        yield "Held with its motors", f"{count - lost} of {count} wrenches", MOTORS
-        yield "Weakest wrench of the hand", f"{number(held['weakest_n'])} N", WEAKEST
-        let_go = sum(control["let_go"] for control in held["controls"])
-        controls = ", ".join(control["name"].replace("_", " ") for control in held["controls"])
-        yield "Controls let go", f"{let_go} of {len(held['controls'])}", controls
-    if (tried := reaches.executed.get(found.grasp)) is not None:
-        yield from _executed(tried)
-    yield "Starts tried", str(found.starts), "postures from which a pose was sought"
+def _facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
+    if found.reach.reached:
+        names = reaches.finger_names(found.reach)
+        yield "Fingers used", ", ".join(f"{k}: {name}" for k, name in enumerate(names)), FINGERS
+    yield from _figures(found, "")
+    if found.simulated is not None:
+        yield from _figures(found.simulated, "With its motors: ")
+    if (executed := found.executed) is not None:
+        yield from _figures(executed, "Executed with the hand: ")
+        if executed.reason is not None:
+            yield "Not executed", executed.reason, ""
+        if executed.enough is not None:
+            yield "What would be enough", str(executed.enough), ""
 
 
-def _executed(tried: "ExecutedHandRecord") -> Iterable[tuple[str, str, str]]:
-    found = tried["execution"]
-    if found is None:
-        yield "Executed with the hand", "not tried", tried["refused"]
-        return
-    kept, lost = found["trials"] - len(found["lost"]), ", ".join(found["lost"])
-    said = f"{kept} of {found['trials']} trials survived"
-    yield "Executed with the hand", said, f"lost: {lost}" if lost else "; ".join(found["skipped"])
-    loss = found["least_predicted_loss"]
-    yield "Least predicted loss", "none" if loss is None else number(loss), LOSS
-    yield "Payload of the squeeze", f"{number(found['payload_kg'])} kg", PAYLOAD
-    if (enough := enough_of(tried["enough"], ("executed", "enough"))) is not None:
-        yield "What would be enough", str(enough), ""
+def _figures(record: object, part: str) -> Iterable[Fact]:
+    """Yield the figures that a record has, but for the grasp that the page is about."""
+    for each in figures(type(record)):
+        if each.name not in SAID_ABOVE and each.of(record) is not None:
+            heading = f"{part}{each.shown.heading}"
+            yield heading[:1].upper() + heading[1:], each.cell(record), each.meaning
 
 
-def reach_commands(reaches: "SavedReaches | None", grasp: Grasp, path: str) -> Sequence[str]:
+def reach_commands(reaches: "Reaches | None", grasp: Grasp, path: str) -> Sequence[str]:
     """Write the shell command that seeks the pose again; none for a hand from a file."""
-    if reaches is None or reaches.hand_name not in HANDS or grasp.id not in reaches.found:
+    if reaches is None or reaches.hand.name not in HANDS or grasp.id not in reaches:
         return []
-    asked = reaches.asked
-    words = ["graspproof", "reach", path, "--hand", reaches.hand_name, "--grasp", grasp.id]
+    asked, usual = reaches.asked, type(reaches.asked)()
+    words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", grasp.id]
     words += ["--friction", repr(reaches.friction)]
-    for flag, value, usual in (
-        ("--starts", asked["starts"], STARTS), ("--seed", asked["seed"], SEED),
-        ("--clearance-m", asked["clearance_m"], CLEARANCE_M),
-    ):  # fmt: skip
-        words += [] if value == usual else [flag, repr(value)]
-    down = asked["table_down"]
-    words += [] if down is None else ["--table", *map(repr, down)]
-    words += [] if asked["regions"] else ["--contacts-only"]
+    for name, flag in FLAGS.items():
+        value = getattr(asked, name)
+        words += [] if value == getattr(usual, name) else [flag, repr(value)]
+    words += [] if asked.table_down is None else ["--table", *map(repr, asked.table_down)]
+    words += [] if asked.regions else ["--contacts-only"]
     return [shlex.join(words)]

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from grasp_core.errors import InputError
+from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.mujoco.closure_scene import write_scene
@@ -13,7 +14,6 @@ from sim_validate.datasets.recorded import recorded_in_dataset
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.fields import finite
 
 SHOWN = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
@@ -28,8 +28,8 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     said = recorded.outcome_of(found.name)
     _show(recorded, found, said, reporter)
     files = [] if command.out is None else list(_written(found, command, reporter))
-    record = _record(recorded, found, said) | {"files": [str(path) for path in files]}
-    reporter.document(finite(record))
+    beside = {"recorded_outcome": said, "files": [str(path) for path in files]}
+    reporter.document({"name": recorded.name, **record_of(found), **beside})
     return Exit.GOOD if found.hold.outcome.value == said else Exit.NEGATIVE
 
 
@@ -96,23 +96,3 @@ def trace_text(found: Replayed) -> str:
     )  # fmt: skip
     rows = [",".join(repr(float(value)) for value in row) for row in zip(*table, strict=True)]
     return "\n".join([",".join(names), *rows]) + "\n"
-
-
-def _record(recorded: Recorded, found: Replayed, said: str | None) -> dict[str, object]:
-    hold = found.hold
-    return {
-        "name": recorded.name,
-        "wrench": found.name,
-        "wrench_n_nm": found.load.wrench.tolist(),
-        "friction": found.friction,
-        "predicted_limit": found.predicted_limit,
-        "required_friction": found.required_friction,
-        "outcome": hold.outcome.value,
-        "reason": hold.reason,
-        "recorded_outcome": said,
-        "displacement_m": hold.displacement_m,
-        "start_displacement_m": hold.start_displacement_m,
-        "rotation_rad": hold.rotation_rad,
-        "slip_m": hold.slip_m.tolist(),
-        "failed_after_s": hold.failed_after_s,
-    }

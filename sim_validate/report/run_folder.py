@@ -1,31 +1,26 @@
 """Reads the folder of a run: its grasps, verdicts, executions, regions, and a hand's poses."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import record_of
-from grasp_core.files.text_files import read_text
+from grasp_core.errors import InputError
 from grasp_core.planning.result import Plan
-from sim_validate.closure.verdicts_json import VerdictsFile, verdicts_of
-from sim_validate.execution.executions_json import EXECUTIONS, Executions, load_executions
-from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.kit.result_folders import BEST, JUDGEMENTS, REACHES
-from sim_validate.planning.best_json import BestFile, best_of
+from sim_validate.closure.verdict import Verdict, Verdicts
+from sim_validate.execution.verdict import ExecutedGrasp, Executions
+from sim_validate.kit.result_folders import REACHES
+from sim_validate.planning.best_json import Best
 from sim_validate.planning.grasps_json import GRASPS, read_grasps
-from sim_validate.planning.regions_json import REGIONS, RegionsFile, regions_file_of
-from sim_validate.protocols.judgements_json import JudgementsFile
-from sim_validate.report.agreement import BAD, Record, said_of
+from sim_validate.planning.regions_json import GraspRegions, Regions
+from sim_validate.protocols.verdict import Judgements
+from sim_validate.report.agreement import BAD, said_of
 
 if TYPE_CHECKING:
-    from sim_validate.hands.reaches_json import SavedReaches
+    from sim_validate.hands.reaches import Reaches
 
-VERDICTS = "verdicts.json"
-Read = TypeVar("Read", VerdictsFile, RegionsFile, JudgementsFile, BestFile)
+File = TypeVar("File", Verdicts, Executions, Regions, Judgements, Best)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,17 +31,15 @@ class RunFolder:
     saved: Plan
     friction: float
     """Friction at which the grasps were tested; if they were not, at which they were planned."""
-    verdicts: Mapping[str, Record]
-    """Verdicts by the ids of the grasps; empty if no grasp was tested."""
-    summary: Record
-    """All of `verdicts.json` but the verdicts; empty if the file does not exist."""
-    regions: Mapping[str, Record]
-    regions_friction: float | None
+    tested: Verdicts | None
+    """Verdicts on the grasps; None if no grasp was tested."""
+    certified: Regions | None
+    """Certified regions of the grasps; None if the file does not exist."""
     executions: Executions | None
     """Grasps as a robot executes them; None if the file does not exist."""
-    reaches: "SavedReaches | None" = None
-    judgements: Record | None = None
-    possible: BestFile | None = None
+    reaches: "Reaches | None" = None
+    judgements: Judgements | None = None
+    possible: Best | None = None
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
@@ -73,15 +66,25 @@ class RunFolder:
         return next((each for each in grasps if each.id == name), None)
 
     @property
-    def shaded(self) -> Mapping[str, Record]:
+    def verdicts(self) -> Mapping[str, Verdict]:
+        """Verdicts by the ids of the grasps; empty if no grasp was tested."""
+        return {each.id: each for each in self.tested or ()}
+
+    @property
+    def regions(self) -> Mapping[str, GraspRegions]:
+        """Certified regions by the ids of the grasps; empty if none were asked for."""
+        return {} if self.certified is None else {each.id: each for each in self.certified.grasps}
+
+    @property
+    def shaded(self) -> Mapping[str, GraspRegions]:
         """Certified regions that may be drawn: those for the friction of the verdicts, or less."""
-        enough = self.regions_friction is not None and self.regions_friction <= self.friction
+        enough = self.certified is not None and self.certified.friction <= self.friction
         return self.regions if enough else {}
 
     @property
     def verdicts_path(self) -> Path:
         """Path of the verdicts, which error messages name."""
-        return self.path / VERDICTS
+        return self.path / Verdicts.FILE
 
 
 def folder_of(path: Path) -> Path:
@@ -109,82 +112,59 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
 
 def _run(path: Path) -> RunFolder:
     saved = read_grasps(path / GRASPS)
-    tried = _read(path / VERDICTS, verdicts_of, saved)
-    certified = _read(path / REGIONS, regions_file_of, saved)
-    judgements_of = partial(record_of, JudgementsFile, wanted=JUDGEMENTS, schema=1)
-    verdicts: Sequence[Record] = [] if tried is None else tried["verdicts"]
-    regions: Sequence[Record] = [] if certified is None else certified["grasps"]
+    tried = _read(path, Verdicts, saved)
     return RunFolder(
         path=path,
         saved=saved,
-        friction=saved.friction if tried is None else tried["friction"],
-        verdicts=_by_id(path / VERDICTS, verdicts, saved),
-        summary={} if tried is None else {key: tried[key] for key in tried if key != "verdicts"},
-        regions=_by_id(path / REGIONS, regions, saved),
-        regions_friction=None if certified is None else certified["friction"],
-        executions=_executions(path / EXECUTIONS, saved),
+        friction=saved.friction if tried is None else tried.friction,
+        tested=tried,
+        certified=_read(path, Regions, saved),
+        executions=_read(path, Executions, saved),
         reaches=reaches_beside(path / GRASPS, saved),
-        judgements=_read(path / JUDGEMENTS, judgements_of, saved),
-        possible=_read(path / BEST[0], best_of, saved),
+        judgements=_read(path, Judgements, saved),
+        possible=_read(path, Best, saved),
     )
 
 
-def reaches_beside(grasps: Path, saved: Plan) -> "SavedReaches | None":
+def reaches_beside(grasps: Path, saved: Plan) -> "Reaches | None":
     """Read where a hand stands in grasps from the folder of their file."""
     path = grasps.with_name(REACHES)
     if not path.is_file():
         return None
-    from sim_validate.hands.reaches_json import read_reaches  # runs without a hand need none
+    from sim_validate.hands.reaches import Reaches  # runs without a hand need none
 
-    found, record = read_reaches(path)
-    _check_object(path, record["object"]["content_sha256"], saved)
-    _check_contacts(path, record["reaches"], saved)
+    found = Reaches.read(path)
+    _check_about(path, found, saved)
     return found
 
 
-def _by_id(path: Path, records: Sequence[Record], saved: Plan) -> Mapping[str, Record]:
-    _check_contacts(path, records, saved)
-    return {each["id"]: each for each in records}
-
-
-def _check_contacts(path: Path, records: Sequence[Record], saved: Plan) -> None:
-    """Refuse a file that lists a grasp twice, or with other contacts than its own."""
-    contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    for each in records:
-        if contacts.get(each["id"]) != each["contacts_sha256"]:
-            raise InputError(
-                f"{path}: the contacts of {each['id']} differ from those in {GRASPS} beside it, "
-                f"or the grasp is not in that file: write {path.name} again, or remove it"
-            )
-    if len({each["id"] for each in records}) < len(records):
-        raise InputError(
-            f"{path}: the file has two records of one grasp; make {path.name} again with the "
-            "command that wrote it"
-        )
-
-
-def _executions(path: Path, saved: Plan) -> Executions | None:
+def _read(folder: Path, kind: type[File], saved: Plan) -> File | None:
+    """Read results about the grasps of a run, if there are any."""
+    path = folder / kind.FILE
     if not path.is_file():
         return None
-    found = load_executions(path)
-    _check_object(path, found.object_sha256, saved)
-    listed = [{"id": each.id, "contacts_sha256": each.contacts_sha256} for each in found.grasps]
-    _check_contacts(path, listed, saved)
+    found = kind.read(path)
+    _check_about(path, found, saved)
     return found
 
 
-def _read(path: Path, read: Callable[[str], Read], saved: Plan) -> Read | None:
-    if not path.is_file():
-        return None
-    with about(path):
-        found = read(read_text(path))
-    _check_object(path, found["object"]["content_sha256"], saved)
-    return found
-
-
-def _check_object(path: Path, sha256: str, saved: Plan) -> None:
-    if sha256 != saved.body.content_sha256:
+def _check_about(path: Path, found: Any, saved: Plan) -> None:
+    """Refuse a file about another object, or that lists a grasp twice or with other contacts."""
+    if found.object.content_sha256 != saved.body.content_sha256:
         raise InputError(
             f"{path}: the file is about another object than {GRASPS} beside it; write it again, "
             "or remove it"
+        )
+    contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
+    listed: list[Any] = list(found) if hasattr(found, "ITEMS") else []
+    for each in listed:
+        if contacts.get(each.id) != each.contacts_sha256:
+            raise InputError(
+                f"{path}: the contacts of {each.id} differ from those in {GRASPS} beside it, "
+                f"or the grasp is not in that file: write {path.name} again, or remove it"
+            )
+    if len({each.id for each in listed}) < len(listed):
+        raise InputError(
+            f"{path}: the file has two records of one grasp; make {path.name} again with the "
+            "command that wrote it"
         )

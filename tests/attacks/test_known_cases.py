@@ -175,6 +175,6 @@ def test_fields_of_a_piece_agree_to_its_own_size():
         piece, origin=s * piece.origin, corners=s * piece.corners, b=s * piece.b,
         inradius=s * piece.inradius,
     )  # fmt: skip
-    assert piece.sound()
-    assert small.sound()
-    assert not replace(small, b=small.b + 9e-10).sound()
+    assert piece.is_sound()
+    assert small.is_sound()
+    assert not replace(small, b=small.b + 9e-10).is_sound()

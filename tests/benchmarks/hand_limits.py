@@ -83,7 +83,7 @@ def limits(count):
                     begun = time.process_time()
                     verdict = sv.validate_hand(strong, body, found, FRICTION, agenda=AGENDA)
                     seconds.append(time.process_time() - begun)
-                    at = [trial.simulated_limit for trial in verdict.wrenches]
+                    at = [trial.let_go_at for trial in verdict.wrenches]
                     shares += [one.share for one in at if one is not None]
                     counted["limits not found"] += sum(one is None for one in at)
                     counted["not held at .8"] += len(verdict.failures)

@@ -6,42 +6,39 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import to_jsonable_python
-
 import grasp_core as gc
-from grasp_core.files.json_text import record_of
+from grasp_core.files.records import RecordFile, record_of
 from grasp_core.files.text_files import text_of
+from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
 from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.baselines.baseline import baseline_from_json, baseline_to_json
-from sim_validate.baselines.settings import of_settings
+from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.closure.setup_toml import setup_from_tables, tables_of
-from sim_validate.closure.verdicts_json import verdicts_of
+from sim_validate.closure.setup_toml import setup_from_tables
+from sim_validate.closure.validate import validate
+from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
 from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import (
     Listed,
     Manifest,
     left_out_from,
-    manifest_from_json,
-    manifest_to_json,
 )
 from sim_validate.datasets.staging import UnitRecord
-from sim_validate.engine.setup import Setup
-from sim_validate.execution.executions_json import executions_from_json, executions_to_json
-from sim_validate.hands.reaches_json import reaches_from_json
+from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.execution.verdict import Executions
+from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.command_flags import Run
 from sim_validate.kit.config_file import flags_from
 from sim_validate.kit.flag_values import flags_of
 from sim_validate.kit.toml_tables import tables_of_toml
-from sim_validate.planning.regions_json import RegionsFile
+from sim_validate.planning.regions_json import Regions
 from sim_validate.planning.wrenches_json import wrenches_from_json
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text
-from tests.sim_validate.execution.executed import executions_text
+from tests.sim_validate.execution.executed import executions
 
 STABILITY = Path(__file__).parents[1] / "stability" / "box"
 HASH = "0" * 64
@@ -100,59 +97,42 @@ def _same_given(data: bytes, found: Any) -> None:
         assert [each["position_m"] for each in one["contacts"]] == [list(p) for p in other.points]
 
 
-def _trial(**more: Any) -> dict[str, Any]:
-    return {
-        "name": "+force_x",
-        "wrench": [1.0, 0, 0, 0, 0, 0],
-        "outcome": "held",
-        "displacement_m": 1e-6,
-    } | more
-
-
-VERDICTS = {
-    "schema": 1, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
-    "complete": True,
-    "gate": {"passed": True, "checks": [{"name": "a", "value": 1.0, "least": 0.9, "largest": 1.1}]},
-    "summary": {"grasps": 1, "grasps_held": 1, "controls": 1, "controls_held": 0,
-                "controls_let_go": 1, "mismatches": 0},
-    "verdicts": [{
-        "id": "c-0-1-2-3", "contacts_sha256": HASH, "outcome": "held", "held": True,
-        "mismatches": [], "critical_friction": {"predicted": 0.3, "simulated": None},
-        "wrenches": [_trial(predicted_limit=2.0, simulated_limit=None, required_friction=0.2)],
-        "controls": {"low_friction": {"held": False, "friction": 0.1,
-                                      "wrenches": [_trial(outcome="slipped")]}},
-        "robustness": {"trials": 3, "held": 2, "pass_rate_interval": [0.1, 0.9],
-                       "noise": {"shift": 0.01},
-                       "not_held": [{"trial": 1, "wrench": "a", "outcome": "slipped"}]},
-        "settings": tables_of(Setup()) | {"surface": "pads", "random_wrenches": 0, "seed": 0,
-                                          "grasp_size_m": 0.1},
-        "versions": {"numpy": "2.2"},
-    }],
-}  # fmt: skip
+@cache
+def _verdicts_seed() -> bytes:
+    body = example_object("tetrahedron")
+    grasp = plan(body).grasps[0]
+    agenda = Agenda(trials=1, limits="ramp")
+    verdict = validate(body, grasp, agenda=agenda)
+    return Verdicts.of(body, 0.5, verdict.gate, (verdict,)).text().encode()
 
 
 def _same_executions(data: bytes, found: Any) -> None:
-    stated, body = json.loads(data), example_object("tetrahedron")
-    text = executions_to_json(body, 0.5, found.settings, found.grasps, complete=True)
+    stated, written = json.loads(data), json.loads(found.text())
     for name in ("executions", "settings"):
-        _compare(stated[name], json.loads(text)[name])
+        _compare(stated[name], written[name])
 
 
 POLYGON = [[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
+NAMED = {"contacts_sha256": HASH, "planned_radius_m": 0.01}
+FOUR_POINTS = [[0.0, 0, 0.1]] * 4
 REGIONS = {
-    "schema": 1, "object": {"name": "box", "content_sha256": HASH}, "friction": 0.5,
-    "edge_clearance_m": 0.0,
-    "grasps": [{"id": "c-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": 0.1,
-                "regions": [{"polygon_m": POLYGON, "inscribed_radius_m": 0.01}] * 4,
-                "proof": {"file": "proofs/c-0-1-2-3.npz", "sha256": HASH}},
-               {"id": "p-0-1-2-3", "contacts_sha256": HASH, "disc_radius_m": None,
-                "regions": None, "reason": "open"}],
+    "schema": 2, "object": {"name": "box", "source_sha256": "", "content_sha256": HASH},
+    "friction": 0.5, "reserve": 0.0, "recenter": False, "edge_clearance_m": 0.0, "max_cones": 64,
+    "grasps": [
+        {"id": "c-0-1-2-3", "family": "concurrent", **NAMED, "disc_radius_m": 0.1,
+         "regions": [{"kind": "certified", "polygon_m": POLYGON, "inscribed_radius_m": 0.01}] * 4,
+         "centers_m": FOUR_POINTS, "normals": [[0.0, 0, 1]] * 4, "friction": [0.5] * 4, "cones": 3,
+         "proof": {"file": "proofs/c-0-1-2-3.npz", "sha256": HASH},
+         "inscribed_radius_m": 0.01, "area_m2": 0.02},
+        {"id": "p-0-1-2-3", "family": "pencil", **NAMED, "reason": "open",
+         "inscribed_radius_m": None, "area_m2": None}],
+    "complete": True, "summary": {"grasps": 2, "proved": 1},
 }  # fmt: skip
 
 
 def _same_record(data: bytes, found: Any) -> None:
     """Every field that is spoken of is as it is written."""
-    _compare(json.loads(data), to_jsonable_python(found))
+    _compare(json.loads(data), found)
 
 
 def _compare(stated: Any, found: Any) -> None:
@@ -162,7 +142,7 @@ def _compare(stated: Any, found: Any) -> None:
             if key in stated:
                 _compare(stated[key], value)
             else:
-                assert value in (None, "")
+                assert value in (None, "", {})
     elif isinstance(found, list):
         assert isinstance(stated, list)
         for one, other in zip(stated, found, strict=True):
@@ -179,16 +159,15 @@ def _baseline_seed() -> list[bytes]:
 
 
 def _baseline(data: bytes) -> Any:
-    found = baseline_from_json(text_of(data), "b.json")
-    return found, of_settings(found.settings, "b.json")
+    return Baseline.of_text(text_of(data))
 
 
-def _same_baseline(data: bytes, found: Any) -> None:
-    again = json.loads(baseline_to_json(found[0]))
+def _same_baseline(data: bytes, found: Baseline) -> None:
+    again = json.loads(found.text())
     stated = json.loads(data)
     _compare(stated, again)
     assert stated.keys() == again.keys()
-    setup, agenda = found[1].setup, found[1].agenda
+    setup, agenda = found.settings.setup, found.settings.agenda
     assert agenda.seed == stated["settings"]["seed"]
     given = stated["settings"]["setup"].get("hold", {})
     assert {name: getattr(setup.hold, name) for name in given} == given
@@ -215,27 +194,25 @@ MANIFEST = Manifest(
 )  # fmt: skip
 
 
+def _same_file(data: bytes, found: RecordFile) -> None:
+    _compare(json.loads(data), json.loads(found.text()))
+
+
 def _same_manifest(data: bytes, found: Manifest) -> None:
-    stated, again = json.loads(data), json.loads(manifest_to_json(found))
-    for each in stated["files"]:
-        for key in [key for key, value in each.items() if value is None]:
-            del each[key]
-    stated["files"].sort(key=lambda each: each["path"])
-    assert stated == again
+    _same_file(data, found)
     assert not any(Path("/a/b", each.path).resolve() == Path("/a/b") for each in found.files)
     assert all(Path("/a/b", e.path).resolve().is_relative_to("/a/b") for e in found.files)
 
 
 LEFT_OUT = {"object": "a.obj", "source_sha256": HASH, "friction": 0.5, "given": ["given-000001"],
             "reason": "no solid"}  # fmt: skip
-UNIT = {"object": "a.obj", "friction": 0.5, "files": {"grasps.parquet": HASH}, "object_id": HASH,
-        "split": "train"}  # fmt: skip
+UNIT = UnitRecord("a.obj", 0.5, {"grasps.parquet": HASH}, HASH, "train")
 
 
 def _same_lines(data: bytes, found: Any) -> None:
     lines = data.decode().removesuffix("\n").split("\n") if data else []
     for line, other in zip(lines, found, strict=True):
-        assert json.loads(line, parse_int=float) == other.model_dump()
+        assert json.loads(line, parse_int=float) == record_of(other)
 
 
 def _setup(data: bytes) -> Any:
@@ -331,24 +308,26 @@ TARGETS = (
     Target("given", lambda data: given_from_json(text_of(data)), lambda: [_json(GIVEN)],
            _same_given, "json"),
     Target("verdicts",
-           lambda data: verdicts_of(text_of(data)),
-           lambda: [_json(VERDICTS)], _same_record, "json"),
-    Target("executions", lambda data: executions_from_json(text_of(data)),
-           lambda: [executions_text().encode()], _same_executions, "json"),
-    Target("regions", lambda data: record_of(RegionsFile, text_of(data), "regions.json", schema=1),
-           lambda: [_json(REGIONS)], _same_record, "json"),
-    Target("reaches", lambda data: reaches_from_json(text_of(data)),
+           lambda data: Verdicts.of_text(text_of(data)), lambda: [_verdicts_seed()],
+           lambda data, found: _same_record(data, json.loads(found.text())), "json"),
+    Target("executions", lambda data: Executions.of_text(text_of(data)),
+           lambda: [executions().text().encode()], _same_executions, "json"),
+    Target("regions", lambda data: Regions.of_text(text_of(data)),
+           lambda: [Regions.of_text(json.dumps(REGIONS)).text().encode()],
+           lambda data, found: _same_record(data, json.loads(found.text())), "json"),
+    Target("reaches", lambda data: Reaches.of_text(text_of(data)),
            lambda: [reaches_text().encode()],
-           lambda data, found: _same_record(data, found[1]), "json"),
+           lambda data, found: _same_record(data, json.loads(found.text())), "json"),
     Target("baseline", _baseline, _baseline_seed, _same_baseline, "json"),
     Target("wrenches", lambda data: wrenches_from_json(text_of(data)), lambda: [_json(WRENCHES)],
            _same_wrenches, "json"),
-    Target("manifest", lambda data: manifest_from_json(text_of(data)),
-           lambda: [manifest_to_json(MANIFEST).encode()], _same_manifest, "json"),
+    Target("manifest", lambda data: Manifest.of_text(text_of(data)),
+           lambda: [MANIFEST.text().encode()], _same_manifest, "json"),
     Target("quarantine", lambda data: left_out_from(text_of(data)),
            lambda: [_json(LEFT_OUT) + b"\n" + _json(LEFT_OUT) + b"\n"], _same_lines, "json"),
-    Target("staged", lambda data: record_of(UnitRecord, text_of(data), "unit.json"),
-           lambda: [_json(UNIT)], _same_record, "json"),
+    Target("staged", lambda data: UnitRecord.of_text(text_of(data)),
+           lambda: [UNIT.text().encode()],
+           _same_file, "json"),
     Target("setup", _setup, lambda: [SETUP], _same_setup, "toml"),
     Target("suite", _suite, lambda: [SUITE], _same_suite, "toml"),
     Target("dataset-config",

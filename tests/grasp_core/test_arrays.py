@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from grasp_core.arrays import (
     to_digits,
 )
 from scenes.example_objects import example_object
+from tests.tampering.changes import forged
 
 
 def test_a_frozen_array_is_a_read_only_copy():
@@ -67,8 +67,8 @@ def test_certificates_with_other_types_are_none(kind):
     quality = gc.ferrari_canny(grasp, friction=0.5, torque_scale=body.radius)
     assert quality.verify()
     for name in ("corners", "normals", "forces"):
-        other = replace(quality.polytope, **{name: getattr(quality.polytope, name).astype(kind)})
-        assert replace(quality, polytope=other).verify() is False
-    wrenches = replace(quality.wrenches, G=quality.wrenches.G.astype(kind))
-    assert replace(quality, wrenches=wrenches).verify() is False
-    assert replace(quality, direction=quality.direction.astype(kind)).verify() is False
+        other = forged(quality.polytope, **{name: getattr(quality.polytope, name).astype(kind)})
+        assert forged(quality, polytope=other).verify() is False
+    wrenches = forged(quality.wrenches, G=quality.wrenches.G.astype(kind))
+    assert forged(quality, wrenches=wrenches).verify() is False
+    assert forged(quality, direction=quality.direction.astype(kind)).verify() is False

@@ -9,17 +9,10 @@ from typing import Annotated, Literal
 import numpy as np
 import pytest
 
+from grasp_core.declared import FieldError
 from grasp_core.errors import InputError
-from grasp_core.settings import (
-    CHOSEN,
-    Direction,
-    Ending,
-    Range,
-    SettingError,
-    Settings,
-    Vector,
-    for_users,
-)
+from grasp_core.kinds import Direction, Ending, Range, Vector
+from grasp_core.settings import CHOSEN, Settings, for_users
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -42,7 +35,7 @@ class Outer(Settings):
 
     def _check_together(self) -> None:
         if self.quick and self.count is None:
-            raise SettingError("quick", "needs a count")
+            raise FieldError("quick", "needs a count")
         if self.count is not None and self.count > self.size_m:
             raise InputError("count times size_m is too much")
 
@@ -74,7 +67,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("name", "value"), WRONG)
 def test_a_wrong_value_is_refused_by_its_name_in_python_and_in_a_table(name, value):
-    with pytest.raises(SettingError, match=f"^{name} must be ") as raised:
+    with pytest.raises(FieldError, match=f"^{name} must be ") as raised:
         Outer(**{"size_m": 1.0, name: value})
     assert raised.value.name == name
     assert str(pickle.loads(pickle.dumps(raised.value))) == str(raised.value)  # noqa: S301 - ours

@@ -80,9 +80,9 @@ CALLS = [
     }, succeeds_in="tests/sim_validate/datasets/test_loading.py"),
     reading("sv.load_regions", "no/such/file.npz", "tests/sim_validate/planning/test_regions.py"),
     reading("sv.load_executions", "no/such/executions.json",
-            "tests/sim_validate/execution/test_executions_json.py"),
+            "tests/sim_validate/execution/test_executions.py"),
     reading("sv.load_verdicts", "no/such/verdicts.json",
-            "tests/sim_validate/closure/test_verdicts_json.py"),
+            "tests/sim_validate/closure/test_verdict.py"),
     Call("sv.margin_figure", of_grasp(friction=0.5), {
     }, slow=True),
     Call("sv.wrench_figure", of_grasp(friction=0.5)),

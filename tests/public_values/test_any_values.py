@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.settings import SettingError
+from grasp_core.declared import FieldError
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 WEIRD = [
@@ -107,7 +107,7 @@ def test_a_setting_is_refused_or_finite_and_kept(kind, name, number):
         assert getattr(kind(**{name: number}), name) == number
 
 
-GIVEN = {gc.MeshError: (gc.MeshRefusal.OPEN, "mended so"), SettingError: ("size_m", "is wrong")}
+GIVEN = {gc.MeshError: (gc.MeshRefusal.OPEN, "mended so"), FieldError: ("size_m", "is wrong")}
 
 
 def test_errors_are_the_same_after_pickling():

@@ -8,7 +8,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.hands.named_hands import hand_names
-from grasp_core.settings import taken
+from grasp_core.kinds import takes
 from scenes.settings import PhysicsSettings
 from sim_validate.datasets.config import HandName
 from sim_validate.kit.flag_values import flags_of, parts_of
@@ -17,7 +17,7 @@ from sim_validate.main import COMMANDS
 
 def refuses(kind, value):
     try:
-        taken(value, kind)
+        takes(kind)(value)
     except ValueError:
         return True
     return False

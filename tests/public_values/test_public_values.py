@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.by_value import MOST
+from grasp_core.declared import MOST
 from tests.public_values import (
     calls_of_analysis,
     calls_of_execution,
@@ -33,7 +33,7 @@ MADE_BY_FUNCTIONS = {
     "HandPayload HandReach Improvement Payload Plan QualityCeiling Transfer WrenchLimit",
     "scenes": "HandScene HeldScene Layout Scene Sheet Turntable",
     "sv": "ExecutedGrasp Execution ExecutionTrial Executions HandVerdict Judgement "
-    "PublishedProtocol SavedVerdict SavedVerdicts Verdict",
+    "PublishedProtocol Verdict Verdicts",
 }
 """Results, by package: users read them and do not make them."""
 NAMED_OTHERWISE = {

@@ -1,6 +1,10 @@
 """Files of results with changes, as another program or a hand would leave them."""
 
 import json
+from dataclasses import replace
+
+from sim_validate.closure.verdict import Verdicts
+from sim_validate.engine.traces import Outcome
 
 
 def changed(path, change):
@@ -14,3 +18,16 @@ def changed(path, change):
 def first_grasp(**values):
     """A change of the first grasp that a document lists."""
     return lambda document: document["grasps"][0].update(values)
+
+
+def changed_verdicts(path, change):
+    """Write a verdicts.json again, whole and without contradictions, with a change of its value."""
+    path.write_text(change(Verdicts.read(path)).text())
+
+
+def slipped(verdict, place=0):
+    """The verdict in which the object slipped in one trial."""
+    trial = verdict.wrenches[place]
+    trial = replace(trial, hold=replace(trial.hold, outcome=Outcome.SLIPPED))
+    wrenches = (*verdict.wrenches[:place], trial, *verdict.wrenches[place + 1 :])
+    return replace(verdict, wrenches=wrenches)

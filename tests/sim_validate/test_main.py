@@ -64,8 +64,10 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     document = json.loads(capsys.readouterr().out)
     (verdict,) = document["verdicts"]
     assert {
-        "id", "contacts_sha256", "outcome", "held", "mismatches", "critical_friction", "wrenches",
-        "controls", "robustness", "settings", "versions",
+        "id", "contacts_sha256", "outcome", "held", "good", "mismatches", "critical_friction",
+        "predicted_critical_friction", "simulated_critical_friction", "shares_found",
+        "displacement_m", "start_displacement_m", "wrenches", "controls", "controls_let_go",
+        "robustness", "contacts", "friction", "setup", "agenda", "scale",
     } == set(verdict)  # fmt: skip
     assert verdict["mismatches"] == []
     friction = verdict["critical_friction"]
@@ -77,12 +79,11 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
         verdict["wrenches"][0]
     )
     assert len(verdict["wrenches"]) == 13
-    settings = verdict["settings"]
-    assert settings["physics"]["cone"] == "elliptic"
-    assert settings["flags"]["autoreset"] == "disable"
-    for control in verdict["controls"].values():
+    physics = verdict["setup"]["physics"]
+    assert (physics["cone"], physics["autoreset"]) == ("elliptic", False)
+    for control in verdict["controls"]:
         assert control["held"] is False
-        assert control["separating_wrench"] is not None
+        assert control["certificate"]["separating_wrench"] is not None
     assert (here / "graspproof-out" / "wedge" / "verdicts.json").exists()
 
 
@@ -284,13 +285,13 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     assert "no finger is placed there" in shown.err
     assert "2 of 2 grasps held" in shown.out
     verdict = json.loads((here / "r" / "verdicts.json").read_text())["verdicts"][0]
-    assert verdict["settings"]["drive"]["radius_m"] == 0.004
+    assert verdict["scale"]["fingers"]["radius_m"] == 0.004
     saved = json.loads((here / "r" / "grasps.json").read_text())
     assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
     assert saved["finger"] == {"radius_m": 0.004, "approach_m": 0.03}
     assert main(["validate", "r/grasps.json", "--limit", "1", "--out", "again"]) == Exit.GOOD
     again = json.loads((here / "again" / "verdicts.json").read_text())["verdicts"][0]
-    assert again["settings"]["drive"]["radius_m"] == 0.004
+    assert again["scale"]["fingers"]["radius_m"] == 0.004
     capsys.readouterr()
     assert main(["inspect", "scan.ply", "--unit", "mm", "--json"]) == Exit.GOOD
     facts = json.loads(capsys.readouterr().out)

@@ -4,12 +4,23 @@ A field is named by its place, as `pieces[].normal` or `cover.forces`; of a tupl
 drawn. New fields of any dataclass are found by themselves.
 """
 
+import copy
 import dataclasses
 
 import numpy as np
 
+from grasp_core.declared import Declared
+
 WORDS = ("l1", "linf", "point", "disc", "cone", "certified", "")
 NONSENSE = (None, "a", float("nan"), np.zeros((0, 3)), (), np.array([[None]]))
+
+
+def forged(value, **fields):
+    """A copy with other fields that no constructor has seen, and with all that it has kept."""
+    made = copy.copy(value)
+    for name, field in fields.items():
+        object.__setattr__(made, name, field)
+    return made
 
 
 def places(value, name=""):
@@ -36,7 +47,7 @@ def get(value, place, rng):
 
 
 def tampered(value, place, change, rng):
-    """The same with `change` applied at a place."""
+    """The same with `change` applied at a place, past constructors or not."""
     return _at(value, list(steps(place)), change, rng)
 
 
@@ -61,7 +72,8 @@ def _at(value, path, change, rng):
         return (*value[:i], _at(value[i], rest, change, rng), *value[i + 1 :])
     if not dataclasses.is_dataclass(value) or not hasattr(value, step):
         raise LookupError(step)
-    return dataclasses.replace(value, **{step: _at(getattr(value, step), rest, change, rng)})
+    make = forged if isinstance(value, Declared) and rng.integers(2) else dataclasses.replace
+    return make(value, **{step: _at(getattr(value, step), rest, change, rng)})
 
 
 def change_of(value, other, rng):

@@ -24,6 +24,7 @@ from grasp_core.arrays import Array
 from grasp_core.checked import coefficient, function, number, seed_of, whole
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
+from grasp_core.kinds import Gap, TimeLimit
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, exact_maps, first_nodes, grounds_of
@@ -34,7 +35,7 @@ from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Sla
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
 from grasp_core.planning.certify import named
 from grasp_core.quality.measures import Measure, MeasureName
-from grasp_core.settings import Gap, TimeLimit, value_of
+from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits, first_best, on_grid, surpassing
 from grasp_core.values import Grasp
 

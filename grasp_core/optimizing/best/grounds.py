@@ -30,12 +30,13 @@ same reason.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices, is_array, is_indices
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face, unit_pieces
 from grasp_core.objects.polyhedron import Polyhedron
@@ -63,36 +64,26 @@ MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
 KERNEL = "grasp_core.optimizing.best.cuts_kernel"
-SHAPES = {"normals": (3,), "origins": (3,), "frames": (3, 2), "corners": (ROOM, 2)}
-"""Shapes of the arrays of a polygon in `Grounds`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Grounds(ByValue):
+class Grounds(Declared):
     """Convex polygons on which contacts may be, at unit size about the centre of mass."""
 
-    faces: Indices  # the face of each polygon, (p,)
-    normals: Array  # inward unit normals, (p, 3)
-    origins: Array  # points whose plane coordinates are zero, (p, 3)
-    frames: Array  # orthonormal columns that span the planes, (p, 3, 2)
-    corners: Array  # corners in plane coordinates, in order, zero where there are fewer, (p, 24, 2)
-    counts: Indices  # how many corners each has, (p,)
+    faces: Annotated[Indices, Shape("p", whole=True)]  # the face of each polygon, (p,)
+    normals: Annotated[Array, Shape("p", 3)]  # inward unit normals, (p, 3)
+    origins: Annotated[Array, Shape("p", 3)]
+    """Points whose plane coordinates are zero, (p, 3)."""
+    frames: Annotated[Array, Shape("p", 3, 2)]
+    """Orthonormal columns that span the planes, (p, 3, 2)."""
+    corners: Annotated[Array, Shape("p", ROOM, 2)]
+    """Corners in plane coordinates, in order, zero where there are fewer, (p, 24, 2)."""
+    counts: Annotated[Indices, Shape("p", whole=True, least=3, most=ROOM)]
+    """How many corners each has, (p,)."""
 
-    def __post_init__(self) -> None:
-        for name, shape in SHAPES.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), (None, *shape), name))
-        for name in ("faces", "counts"):
-            object.__setattr__(self, name, frozen_indices(getattr(self, name), (None,), name))
-
-    def sound(self) -> bool:
+    def _is_consistent(self) -> bool:
         """Return whether these are convex polygons in planes, at about unit size."""
-        n = len(self.counts) if is_indices(self.counts, None) else 0
-        if not (
-            0 < n <= MOST_PIECES
-            and is_indices(self.faces, n)
-            and all(is_array(getattr(self, name), n, *shape) for name, shape in SHAPES.items())
-            and bool((self.counts >= 3).all() and (self.counts <= ROOM).all())  # noqa: PLR2004
-        ):
+        if not 0 < len(self.counts) <= MOST_PIECES:
             return False
         axes = np.concatenate([self.frames, self.normals[:, :, None]], axis=2)
         square = axes.transpose(0, 2, 1) @ axes

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_bytes, write_parts
 from grasp_core.optimizing.best.grounds import Grounds
 from grasp_core.optimizing.best.support_cuts import CutTree
@@ -74,12 +74,10 @@ def read_proof(path: Path) -> CutTree:
 
 def _measure(path: Path, arrays: dict[str, NDArray[Any]]) -> Measure:
     name: Any = str(arrays["measure"])
-    found = Measure(name, arrays["loads"])
-    if found.is_usual or not found.sound():
-        raise InputError(
-            f"{path}: expected measure 'weight' without loads, or 'task' with loads that are not "
-            f"zero, got {name!r} with {len(found.loads)} loads"
-        )
+    with about(path):
+        found = Measure(name, arrays["loads"])
+        if found.is_usual:
+            raise InputError(f"expected measure 'weight' or 'task' with schema {OTHER}, got {name}")
     return found
 
 

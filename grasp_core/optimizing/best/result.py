@@ -5,9 +5,9 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, is_a, is_number
-from grasp_core.by_value import ByValue
+from grasp_core.arrays import Amount, Array
 from grasp_core.closure.wrench_sets import WrenchSet
+from grasp_core.declared import Declared
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.search import EXACT_GAP
 from grasp_core.optimizing.best.support_cuts import CutTree
@@ -24,7 +24,7 @@ small, or too many, to be divided further."""
 
 def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
     """Return whether a grasp has a wrench set's contacts, in radii, on polygons of a proof."""
-    if not (is_a(grasp, Grasp) and wrenches.norm == "l1" and len(wrenches.friction) == FINGERS):
+    if wrenches.norm != "l1" or len(wrenches.friction) != FINGERS:
         return False
     if (wrenches.friction != proof.friction).any() or wrenches.width != 3:  # noqa: PLR2004
         return False
@@ -58,7 +58,7 @@ def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class GapAt:
+class GapAt(Declared):
     """How far a search had come at one moment."""
 
     seconds: float
@@ -77,14 +77,14 @@ class GapAt:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class BestGrasp(ByValue):
+class BestGrasp(Declared):
     """The best grasp found, with a proved bound of the quality of all others."""
 
     grasp: Grasp
     quality: FerrariCanny | ResistedLoads
     """Bounds of the grasp's quality (`l1`), with torques over the object's radius; or of the
     largest multiple of the loads of another measure that its contacts resist."""
-    clearance: float
+    clearance: Amount
     """Distance that contacts keep from the edges of faces [m], or half the radius of the largest
     disc in a face where that is less."""
     proof: CutTree
@@ -118,10 +118,9 @@ class BestGrasp(ByValue):
         `grounds_of`.
         """
         return (
-            is_a(self.proof, CutTree)
+            self.is_sound()
             and self.proof.owners is None  # all contacts, not those on four given faces
             and self._has_its_measure()
-            and is_number(self.clearance, least=0.0)
             and self.quality.verify()
             and self.proof.verify()
             and self.quality.lower <= self.bound
@@ -131,8 +130,7 @@ class BestGrasp(ByValue):
     def _has_its_measure(self) -> bool:
         if isinstance(self.quality, ResistedLoads):
             return self.quality.measure == self.proof.measure
-        usual = is_a(self.proof.measure, Measure) and self.proof.measure.is_usual
-        return is_a(self.quality, FerrariCanny) and usual
+        return self.proof.measure.is_usual
 
 
 def measured(

@@ -62,23 +62,14 @@ takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from grasp_core.arrays import (
-    Array,
-    Indices,
-    frozen,
-    frozen_indices,
-    is_a,
-    is_array,
-    is_indices,
-    is_number,
-)
-from grasp_core.by_value import ByValue
-from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
+from grasp_core.declared import Declared
+from grasp_core.kinds import FrictionOrZero, Many
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
@@ -122,41 +113,33 @@ class Slack(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class CutTree(ByValue):
+class CutTree(Declared):
     """A proof that a measure of contacts on the pieces of faces is below a bound."""
 
     grounds: Grounds
     """Where contacts may be, at unit size."""
-    friction: float
-    maps: Array
+    friction: FrictionOrZero
+    maps: Annotated[Array, Shape(None, 3, 3), Many()]
     """Symmetries that are used, matrices about the centre of mass, the identity first, (g, 3, 3).
     """
     threshold: float
     """The multiple of the loads, or the Ferrari-Canny quality [N], that the tree refutes."""
-    deeds: Indices
+    deeds: Annotated[Indices, Shape("n", whole=True), Many()]
     """What is done at each node, parents before their children, the whole subtree of a child before
     the next child, (n,): the sum of 2**i over fingers i that may answer; 16 + i if finger i is on
     some pieces or others; 32 + i if it is on one side of a line or the other."""
-    asked: Indices
+    asked: Annotated[Indices, Shape("n", whole=True)]
     """Place of the twist, or of the line, (n,)."""
-    twists: Array
+    twists: Annotated[Array, Shape(None, 6)]
     """Twists, with torques over the object's radius, (m, 6)."""
-    lines: Array
+    lines: Annotated[Array, Shape(None, 3)]
     """Rows (a, b, c): first a x + b y <= c in the piece's plane, then >=; for pieces (k, 0, 0),
     first those below k, then the others, (l, 3)."""
     measure: Measure = FERRARI_CANNY
     """The loads whose largest resisted multiple is bounded."""
-    owners: Indices | None = None
+    owners: Annotated[Indices, Shape(None, whole=True)] | None = None
     """The finger that may be on each piece, (p,), where each finger has pieces of its own; None
     where any finger may be on any piece."""
-
-    def __post_init__(self) -> None:
-        if self.owners is not None:
-            object.__setattr__(self, "owners", frozen_indices(self.owners, (None,), "owners"))
-        for name, shape in (("maps", (None, 3, 3)), ("twists", (None, 6)), ("lines", (None, 3))):
-            object.__setattr__(self, name, frozen(getattr(self, name), shape, name))
-        for name in ("deeds", "asked"):
-            object.__setattr__(self, name, frozen_indices(getattr(self, name), (None,), name))
 
     @property
     def bound(self) -> float:
@@ -170,25 +153,11 @@ class CutTree(ByValue):
     def verify(self) -> bool:
         """Replay the proof without the search, from the pieces, in plain arithmetic."""
         with np.errstate(all="ignore"):
-            return self._is_sound() and bool(self._replayed())
+            return self.is_sound() and self._is_fit() and bool(self._replayed())
 
-    def _is_sound(self) -> bool:
+    def _is_fit(self) -> bool:
         """Return whether all numbers are of sizes for which (3) and (4) are derived."""
-        count = len(self.deeds) if is_indices(self.deeds, None) else 0
-        if not (
-            is_a(self.grounds, Grounds)
-            and self.grounds.sound()
-            and is_number(self.friction, least=0.0, most=LARGEST_FRICTION)
-            and is_a(self.measure, Measure)
-            and self.measure.sound()
-            and self._has_fitting_threshold()
-            and count
-            and is_indices(self.asked, count)
-            and is_array(self.twists, None, 6)
-            and is_array(self.lines, None, 3)
-            and is_array(self.maps, None, 3, 3)
-            and len(self.maps)
-        ):
+        if not self._has_fitting_threshold():
             return False
         lengths = np.linalg.norm(self.twists, axis=1)
         fits = lengths.min(initial=1.0) >= 1.0 - TWIST_SLACK
@@ -196,17 +165,17 @@ class CutTree(ByValue):
         fits = fits and lengths.max(initial=1.0) <= longest
         alone = len(self.maps) == 1
         if self.owners is not None:  # each piece has one, and each finger a piece
-            owned = is_indices(self.owners, len(self.grounds.counts))
+            owned = len(self.owners) == len(self.grounds.counts)
             owned = owned and set(self.owners.tolist()) == set(range(FINGERS))
             return bool(fits) and alone and owned
         return bool(fits) and (alone or fitting(self.maps, self.grounds, self.measure))
 
     def _has_fitting_threshold(self) -> bool:
         if self.measure.is_usual:
-            return is_number(self.threshold, least=LEAST_THRESHOLD, most=MOST_THRESHOLD)
+            return LEAST_THRESHOLD <= self.threshold <= MOST_THRESHOLD
         size = self.measure.size
         most = LONGEST_WRENCH * (1.0 + self.friction) / size
-        return is_number(self.threshold, least=LEAST_THRESHOLD / size, most=most)
+        return LEAST_THRESHOLD / size <= self.threshold <= most
 
     def _replayed(self) -> bool:
         kernel, grounds = compiled(KERNEL), self.grounds

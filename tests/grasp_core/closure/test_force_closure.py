@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from tests.judges import (
     pyramid_margin,
     random_contacts,
 )
+from tests.tampering.changes import forged
 
 AROUND_Z = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, -1]])
 """(x, y, z) -> (-y, x, -z): a quarter turn with a reflection."""
@@ -242,4 +242,4 @@ def test_no_certificate_verifies_with_a_false_field(changed):
             change = changed(certificate)
             if "margin" in change and not certificate.closed and not math.isnan(change["margin"]):
                 change = {"margin": certificate.margin - 1e-6}
-            assert not replace(certificate, **change).verify()
+            assert not forged(certificate, **change).verify()

@@ -1,6 +1,5 @@
 """The interval of the critical friction: proved at both ends, narrow, and the same everywhere."""
 
-import dataclasses
 import math
 import os
 import subprocess
@@ -20,6 +19,7 @@ from scenes.example_objects import example_object
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
 from tests.grasp_core.grid_contacts import contact_sets
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+from tests.tampering.changes import forged
 
 WIDTH = 1e-7
 """Of an interval, in units of the larger of 1 and its upper end, that is bounded."""
@@ -234,7 +234,7 @@ def test_what_is_tampered_with_does_not_verify():
         assert 1e-3 < found.lower < found.upper < math.inf
         assert found.verify()
         for what, change in tampered(found):
-            assert dataclasses.replace(found, **change).verify() is False, what
+            assert forged(found, **change).verify() is False, what
             refused += 1
     assert refused == 4 * (17 + 4 * 11)
 

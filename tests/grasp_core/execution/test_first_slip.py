@@ -1,11 +1,10 @@
-import dataclasses
-
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from tests.grasp_core.execution.held import loads_of, opposed_grip, planned_grips
+from tests.tampering.changes import forged
 
 ACROSS = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 ALONG = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -104,4 +103,4 @@ def test_linear_forces_balance_at_rest_where_tips_do_not_roll():
 def test_a_grip_that_was_not_made_as_one_is_refused():
     grip = opposed_grip(push=5.0)
     with pytest.raises(gc.InputError, match=r"as gc\.grip makes it"):
-        gc.first_slip(dataclasses.replace(grip, normals=2.0 * grip.normals), ACROSS)
+        gc.first_slip(forged(grip, normals=2.0 * grip.normals), ACROSS)

@@ -20,6 +20,7 @@ from tests.grasp_core.execution.held import (
     planned,
 )
 from tests.grasp_core.execution.jointed import LEVER_M, hand_of, jaws, lifting, pushing
+from tests.tampering.changes import forged
 
 G = 9.80665
 ANY = gc.any_direction(1.0)
@@ -100,8 +101,8 @@ def test_a_joint_may_be_reached_before_anything_slips():
         {"joint": -1}, {"joint": 4}, {"contact": 0}, {"joint": -1, "contact": 0},
         {"joint": True}, {"joint": 0.0}, {"scale": found.scale * 0.9999}, {"scale": 4.001},
     ):  # fmt: skip
-        assert dataclasses.replace(found, **change).verify() is False, change
-    assert dataclasses.replace(found, direction=-found.direction).verify()  # as bad, by symmetry
+        assert forged(found, **change).verify() is False, change
+    assert forged(found, direction=-found.direction).verify()  # as bad, by symmetry
     slip = gc.first_slip(found.grip, found.load, model="linear", motors=found.motors)
     assert (slip.event, slip.contact, slip.joint) == ("torque limit", -1, 0)
     assert slip.multiple == pytest.approx(1.0, rel=1e-6)
@@ -243,7 +244,7 @@ def test_squeezes_of_other_motors_are_no_certificate():
         {"scale": found.scale * 1.001}, {"upper": found.scale * 0.999},
         {"joint": 0}, {"joint": True}, {"joint": 0.0}, {"joint": -2}, {"contact": -1},
     ):  # fmt: skip
-        assert dataclasses.replace(found, **change).verify() is False, change
+        assert forged(found, **change).verify() is False, change
 
 
 @pytest.mark.parametrize("model", ["finite", "linear"])

@@ -27,6 +27,7 @@ from tests.grasp_core.families.free_cases import (
     wrench,
 )
 from tests.judges import pyramid_margin
+from tests.tampering.changes import forged
 
 
 def random_contacts(rng, pieces):
@@ -311,14 +312,14 @@ def test_a_leaf_with_an_altered_twist_proves_nothing():
         ((path, proof),) = absence.leaves
         wrong = [-proof.separating_wrench, np.zeros(6), np.full(6, np.nan), rng.normal(size=6)]
         for twist in wrong:
-            altered = replace(proof, separating_wrench=twist)
-            assert not replace(absence, leaves=((path, altered),)).verify()
+            altered = forged(proof, separating_wrench=twist)
+            assert not forged(absence, leaves=((path, altered),)).verify()
         stronger = ClosureCertificate(
             False, proof.margin, proof.positions, proof.normals, 50.0 + proof.friction, None,
             proof.separating_wrench,
         )  # fmt: skip
-        assert not replace(absence, leaves=((path, stronger),)).verify()
-        assert not replace(absence, leaves=((path, replace(proof, closed=True)),)).verify()
+        assert not forged(absence, leaves=((path, stronger),)).verify()
+        assert not forged(absence, leaves=((path, forged(proof, closed=True)),)).verify()
     assert len(cases) == 40
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import InputError
+from grasp_core.files.records import from_record, record_of
 from grasp_core.hands.hand import Fingertip, Hand, Joint, LinkShape
-from sim_validate.hands.hand_model import hand_of_model, model_record
 from tests.grasp_core.hands.gripping import plain_hand
 
 HANDS = ["allegro", "leap"]
@@ -56,7 +56,7 @@ def test_a_fingertip_that_is_a_block_is_covered_by_the_last_shape():
     assert replace(first, tip=tip).tip.core[1] == 1e-4
     with pytest.raises(InputError, match="last shape of the last link of finger f0 must cover"):
         replace(first, tip=replace(tip, corners=corners))
-    with pytest.raises(InputError, match="corners must be 2"):
+    with pytest.raises(InputError, match=r"corners .*at least 2"):
         replace(tip, corners=corners[:1])
     with pytest.raises(InputError, match="rounding"):
         replace(tip, rounding=0.0)
@@ -66,8 +66,7 @@ def test_a_fingertip_that_is_a_block_is_covered_by_the_last_shape():
 
 def test_a_hand_with_blocks_is_kept_in_files():
     hand = gc.load_hand("leap")
-    again = hand_of_model(hand.name, model_record(hand), list(hand.sources), hand.torque_source)
-    assert again == hand
+    assert from_record(Hand, record_of(hand)) == hand
 
 
 def test_values_refuse_what_makes_no_hand():

@@ -1,7 +1,5 @@
 """The grip of a hand changes its forces as chains of joints on servos do, by their kinematics."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.reach import stance_of
 from tests.sim_validate.hands.executing import standing
+from tests.tampering.changes import forged
 
 SMALL = 1e-7
 """Size of a motion [m, rad] whose square is nothing beside it."""
@@ -97,4 +96,4 @@ def test_a_squeeze_of_joints_that_are_none_proves_nothing():
         {"joint_arms": 0.0 * grip.joint_arms}, {"joint_arms": grip.joint_arms[:, :1]},
         {"servo_n_m_per_rad": 0.0}, {"servo_n_m_per_rad": np.nan},
     ):  # fmt: skip
-        assert not dataclasses.replace(best, grip=dataclasses.replace(grip, **wrong)).verify()
+        assert not forged(best, grip=forged(grip, **wrong)).verify()

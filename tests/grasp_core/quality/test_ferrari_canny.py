@@ -1,5 +1,4 @@
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ import grasp_core as gc
 from grasp_core.quality import ferrari_canny as module
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+from tests.tampering.changes import forged
 
 TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5
 ALL_NORMS = ("l1", "linf")
@@ -196,28 +196,29 @@ def test_proofs_do_not_survive_tampering():
     found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0)
     polytope = found.polytope
     tampered = (
-        replace(found, lower=found.lower * 1.001),
-        replace(found, upper=found.upper * 0.999),
-        replace(found, direction=-found.direction),
-        replace(found, polytope=replace(polytope, corners=polytope.corners[1:])),
-        replace(found, polytope=replace(polytope, forces=1.01 * polytope.forces)),
-        replace(found, polytope=None),
+        forged(found, lower=found.lower * 1.001),
+        forged(found, upper=found.upper * 0.999),
+        forged(found, direction=-found.direction),
+        forged(found, polytope=forged(polytope, corners=polytope.corners[1:])),
+        forged(found, polytope=forged(polytope, forces=1.01 * polytope.forces)),
+        forged(found, polytope=None),
     )
     assert found.verify()
     assert not any(each.verify() for each in tampered)
     apart = gc.ferrari_canny(TETRA_CENTERS, np.tile([0.0, 0, 1], (4, 1)), 0.5, torque_scale=1.0)
     assert apart.verify()
-    assert not replace(apart, lower=0.99 * apart.lower).verify()
-    assert not replace(apart, upper=1.01 * apart.upper).verify()
+    assert not forged(apart, lower=0.99 * apart.lower).verify()
+    assert not forged(apart, upper=1.01 * apart.upper).verify()
 
 
 def test_a_ray_through_a_corner_proves_nothing():
     """A simplex beside zero, one corner on the ray: rounding would decide what is crossed."""
     ray = np.cos(np.arange(1.0, 7.0))
+    unit = ray / np.linalg.norm(ray)
     rng = np.random.default_rng(8)
-    wrenches = replace(gc.ferrari_canny(*TETRA, torque_scale=1.0).wrenches, G=np.eye(6))
+    wrenches = forged(gc.ferrari_canny(*TETRA, torque_scale=1.0).wrenches, G=np.eye(6))
     corners = np.array([[i for i in range(7) if i != j] for j in range(7)])
     for _ in range(50):
         points = np.vstack([ray, ray + 0.3 * rng.normal(size=(6, 6))])
-        polytope = module.InnerPolytope(points, corners, np.tile(ray, (7, 1)))
+        polytope = module.InnerPolytope(points, corners, np.tile(unit, (7, 1)))
         assert polytope.proved_radius(wrenches) == -np.inf

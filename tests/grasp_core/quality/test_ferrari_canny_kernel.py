@@ -15,6 +15,7 @@ from grasp_core.quality import ferrari_canny as module
 from grasp_core.quality.inner_polytope import InnerPolytope
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
+from tests.tampering.changes import forged
 
 CUBE = np.vstack([np.eye(3), -np.eye(3)])
 CORNERS = np.array(list(itertools.product([-1.0, 1.0], repeat=3))) / np.sqrt(3.0)
@@ -121,21 +122,21 @@ def test_what_a_cross_polytope_proves_and_what_its_spoiled_forms_do_not():
     polytope, wrenches = cross_polytope()
     radius = pytest.approx(1.0 / np.sqrt(6.0), rel=1e-12)
     assert polytope.proved_radius(wrenches) == radius
-    scaled = replace(polytope, normals=3.0 * polytope.normals)
+    scaled = forged(polytope, normals=3.0 * polytope.normals)
     assert scaled.proved_radius(wrenches) == radius
     corners, normals = polytope.corners, polytope.normals
-    beside = replace(polytope, forces=polytope.forces + 2.0)
+    beside = forged(polytope, forces=polytope.forces + 2.0)
     spoiled_forms = [
         beside,
-        replace(polytope, corners=corners[1:], normals=normals[1:]),
-        replace(polytope, corners=corners[1:]),
-        replace(polytope, corners=np.tile(corners, (2, 1)), normals=np.tile(normals, (2, 1))),
-        replace(polytope, corners=corners - 6),
-        replace(polytope, corners=corners + 1),
-        replace(polytope, corners=corners[:0], normals=normals[:0]),
-        replace(polytope, normals=-normals),
-        replace(polytope, normals=0.0 * normals),
-        replace(polytope, forces=np.nan * polytope.forces),
+        forged(polytope, corners=corners[1:], normals=normals[1:]),
+        forged(polytope, corners=corners[1:]),
+        forged(polytope, corners=np.tile(corners, (2, 1)), normals=np.tile(normals, (2, 1))),
+        forged(polytope, corners=corners - 6),
+        forged(polytope, corners=corners + 1),
+        forged(polytope, corners=corners[:0], normals=normals[:0]),
+        forged(polytope, normals=-normals),
+        forged(polytope, normals=0.0 * normals),
+        forged(polytope, forces=np.nan * polytope.forces),
     ]
     for each in spoiled_forms:
         assert each.proved_radius(wrenches) == -np.inf

@@ -11,6 +11,7 @@ from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.measures import Measure, resisted_loads
 from scenes.example_objects import example_object
 from tests.judges import TETRA_NORMALS
+from tests.tampering.changes import forged
 
 WEIGHT = Measure("weight")
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
@@ -168,27 +169,27 @@ def test_a_wrench_that_is_zero_or_huge_is_named():
         rows = np.vstack([good[:3], bad * good[0], bad * good[1]])
         with pytest.raises(gc.InputError, match=told):
             Measure.of("task", rows, 1.0)
-    with pytest.raises(gc.InputError, match="1 to 100 wrenches, got 101"):
+    with pytest.raises(gc.InputError, match="1 to 100, got 101"):
         Measure.of("task", np.tile(good[0], (101, 1)), 1.0)
 
 
 @pytest.mark.parametrize("measure", [WEIGHT, some_task(np.random.default_rng(5))])
 def test_changed_bounds_are_refused(measure):
     found = resisted_loads(planned("tetrahedron")[0], measure)
-    assert not replace(found, lower=1.001 * found.upper, upper=1.002 * found.upper).verify()
-    assert not replace(found, lower=0.9 * found.lower, upper=0.99 * found.lower).verify()
-    assert not replace(found, measure=Measure("ferrari-canny")).verify()
-    assert not replace(found, direction=2.0 * found.direction).verify()
-    assert not replace(found, wrenches=planned("box")[0]).verify()
+    assert not forged(found, lower=1.001 * found.upper, upper=1.002 * found.upper).verify()
+    assert not forged(found, lower=0.9 * found.lower, upper=0.99 * found.lower).verify()
+    assert not forged(found, measure=Measure("ferrari-canny")).verify()
+    assert not forged(found, direction=2.0 * found.direction).verify()
+    assert not forged(found, wrenches=planned("box")[0]).verify()
     if measure is WEIGHT:
-        assert not replace(found, ball=None).verify()
-        weaker = replace(found.ball, wrenches=found.wrenches)
-        assert not replace(found, ball=weaker).verify()
+        assert not forged(found, ball=None).verify()
+        weaker = forged(found.ball, wrenches=found.wrenches)
+        assert not forged(found, ball=weaker).verify()
     else:
-        assert not replace(found, forces=1.01 * found.forces).verify()
-        assert not replace(found, ball=None).verify()
-        assert not replace(found, ball=wrench_set_quality(planned("box")[0])).verify()
-        assert not replace(found, forces=found.forces[:-1]).verify()
+        assert not forged(found, forces=1.01 * found.forces).verify()
+        assert not forged(found, ball=None).verify()
+        assert not forged(found, ball=wrench_set_quality(planned("box")[0])).verify()
+        assert not forged(found, forces=found.forces[:-1]).verify()
 
 
 def test_symmetries_of_loads_turn_torques_with_the_hand():

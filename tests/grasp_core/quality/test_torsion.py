@@ -82,7 +82,7 @@ def test_forces_and_torques_drawn_from_the_cones_never_pass_the_support():
         wrenches = WrenchSet.of(
             x, n, mu, center=np.zeros(3), torque_scale=0.7, norm=norm, torsion_m=mu_t
         )
-        assert wrenches.sound()
+        assert wrenches.is_sound()
         y = rng.normal(size=6)
         pushes = rng.uniform(size=(2000, count))
         pushes /= pushes.sum(axis=1, keepdims=True) if norm == "l1" else 1.0

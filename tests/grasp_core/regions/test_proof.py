@@ -178,7 +178,7 @@ def test_what_a_proof_does_not_speak_of_is_refused(proved):
     assert not proved.cover.verify([np.full((3, 3), np.nan)] * 4, proved.normals, proved.friction)
 
 
-@pytest.mark.parametrize("size", [1e-200, 1e-100, 1e100])
+@pytest.mark.parametrize("size", [1e-200, 1e-100, 1e40])
 def test_the_size_of_forces_proves_nothing(proved, size):
     """Squares of tiny numbers are zero: a friction cone could not be told from a line."""
     corners = corners_of(proved)

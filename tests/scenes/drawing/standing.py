@@ -9,10 +9,11 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.hands.reach import HandReach
-from grasp_core.values import Contact
 from scenes.drawing.hands import posed_hand
-from sim_validate.hands.reaches_json import reaches_to_json
+from sim_validate.hands.reaches import ReachedGrasp, Reaches, ReachSettings
+from sim_validate.kit.about_object import AboutObject
 
 FRICTION, CLEARANCE = 0.5, 5e-4
 GRASP = "c-0-1-4-5"
@@ -55,7 +56,7 @@ def standing():
     reach = HandReach(
         hand.name, GRASP, "", "", 1, CLEARANCE,
         fingers=np.array([names.index(name) for name in FINGERS]), joints=np.array(JOINTS),
-        palm_pose=np.array(PALM_POSE), contacts=tuple(map(Contact, positions, normals)),
+        palm_pose=np.array(PALM_POSE),
         certificate=gc.force_closure(positions, normals, FRICTION), within_regions=(True,) * 4,
     )  # fmt: skip
     return plan.body, plan[GRASP], hand, reach
@@ -86,9 +87,9 @@ def reaches_text():
     body, grasp, hand, reach = standing()
     plan = small_plan()
     (other,) = (each for each in plan if each.id != grasp.id)
-    asked = {"regions": True, "table_down": None, "clearance_m": CLEARANCE, "starts": 100,
-             "seed": 0}  # fmt: skip
-    found = [reach if each is grasp else not_reached(other) for each in plan]
-    return reaches_to_json(
-        hand, body, FRICTION, asked, found, complete=True, grasps=list(plan.grasps)
+    found = tuple(
+        ReachedGrasp(reach if each is grasp else not_reached(other), contacts_sha256(each.contacts))
+        for each in plan
     )
+    about = AboutObject.of(body)
+    return Reaches(about, FRICTION, True, hand, ReachSettings(), None, found).text()

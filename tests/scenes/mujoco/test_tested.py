@@ -160,8 +160,6 @@ def test_shapes_touch_at_one_point_where_the_test_has_it_so():
     assert loaded(welded(Weld()))[0].opt.disableflags & off
     usual = fingertip_scene(BODY, GRASP, 0.7, 0.2, PHYSICS, FingerSettings())
     assert not loaded(usual)[0].opt.disableflags & off
-    assert "multiccd" not in PHYSICS.record()
-    assert replace(PHYSICS, multiccd=False).record()["multiccd"] is False
 
 
 def test_a_tip_under_a_shape_of_its_link_touches_once_and_another_by_its_ball():

@@ -1,29 +1,36 @@
 """Which change is which: worse, better, within bands, or not to be compared."""
 
 import dataclasses
+import math
+from typing import Annotated
 
 import pytest
 
-from sim_validate.baselines.baseline import Baseline, Entry
+from grasp_core.declared import Declared
+from grasp_core.figures import Compared, Shown, figure, less
+from sim_validate.baselines.baseline import Baseline, Entry, How, Kept, VerdictFigures, keeps
 from sim_validate.baselines.compare import (
+    OTHER_PROCESSOR,
     OTHER_VERSIONS,
     Carried,
     Status,
     compare,
+    differing_figures,
     failing,
 )
+from sim_validate.engine.schedules import HoldProtocol
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
+from sim_validate.kit.about_object import AboutObject
 
-ENTRY = Entry(
-    id="c-0-1-2-3",
-    contacts_sha256="1f",
+FIGURES = VerdictFigures(
     outcome=Outcome.HELD,
     wrenches=13,
     not_held=(),
     controls=4,
-    controls_let_go=4,
+    controls_held=0,
     mismatches=0,
-    critical_friction=0.2,
+    predicted_critical_friction=0.2,
     simulated_critical_friction=0.2001,
     limit_n=3.0,
     simulated_limit_n=2.99,
@@ -33,14 +40,14 @@ ENTRY = Entry(
     noisy_not_held=(3, 50),
     noisy_close=(7, 50),
 )
+ENTRY = Entry("c-0-1-2-3", "1f", FIGURES)
 BEFORE = Baseline(
     grasps_file="grasps.json",
     limit=None,
-    object="wedge",
-    content_sha256="ab",
+    object=AboutObject("wedge", "", "ab"),
     friction=0.5,
     planned_radius_m=None,
-    settings={"setup": {"physics": {"timestep_s": 0.001}}, "seed": 0},
+    settings=How(),
     versions={"graspproof": "1", "mujoco": "4.0.0", "machine": "x86_64", "numpy": "2"},
     arithmetic="as here",
     entries=(ENTRY,),
@@ -50,9 +57,12 @@ OTHER_ARITHMETIC = {"arithmetic": "as elsewhere"}
 SLIPPED = {"outcome": Outcome.SLIPPED, "not_held": ("weakest",)}
 
 
+def entry(name=ENTRY.id, contacts_sha256=ENTRY.contacts_sha256, **changed):
+    return Entry(name, contacts_sha256, dataclasses.replace(FIGURES, **changed))
+
+
 def now(header=None, **changed):
-    entry = dataclasses.replace(ENTRY, **changed)
-    return dataclasses.replace(BEFORE, entries=(entry,), **(header or {}))
+    return dataclasses.replace(BEFORE, entries=(entry(**changed),), **(header or {}))
 
 
 def found(after, before=BEFORE):
@@ -69,13 +79,15 @@ def test_nothing_changed():
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
-        ({"outcome": Outcome.SLIPPED, "not_held": ("+force_x",)}, "held -> slipped at +force_x"),
-        ({"controls_let_go": 3}, "negative controls that were not let go: 0 -> 1"),
-        ({"controls": 3, "controls_let_go": 3}, "negative controls: 4 -> 3"),
-        ({"critical_friction": 0.22}, "critical_friction: 0.2 -> 0.22"),
+        ({"outcome": Outcome.SLIPPED, "not_held": ("+force_x",)}, "no longer held: +force_x"),
+        (SLIPPED, "outcome: held -> slipped"),
+        ({"mismatches": 1}, "contradictions of the analysis: 0 -> 1"),
+        ({"controls_held": 1}, "negative controls that were not let go: 0 -> 1"),
+        ({"controls": 3}, "negative controls: 4 -> 3"),
+        ({"predicted_critical_friction": 0.22}, "predicted_critical_friction: 0.2 -> 0.22"),
         ({"simulated_critical_friction": None}, "simulated_critical_friction: 0.2001 -> None"),
         ({"limit_n": 2.7}, "limit_n: 3 -> 2.7"),
-        ({"displacement_m": None}, "displacement_m: 1e-05 -> None"),
+        ({"displacement_m": math.nan}, "displacement_m: 1e-05 -> nan"),
         ({"noisy_not_held": (3, 9, 50)}, "repeats with noise no longer held: 9"),
     ],
 )
@@ -88,14 +100,15 @@ def test_what_is_worse_is_a_regression_and_the_other_way_round_an_improvement(
     finding = found(now(header, **changed))
     assert finding.status is Status.REGRESSED
     assert any(reason in text for text in finding.reasons)
-    before = dataclasses.replace(BEFORE, entries=(dataclasses.replace(ENTRY, **changed),))
+    before = dataclasses.replace(BEFORE, entries=(entry(**changed),))
     assert found(now(header), before).status is Status.IMPROVED
 
 
 @pytest.mark.parametrize(
     "changed",
     [
-        {"critical_friction": 0.205}, {"simulated_critical_friction": 0.205}, {"limit_n": 2.95},
+        {"predicted_critical_friction": 0.205}, {"simulated_critical_friction": 0.205},
+        {"limit_n": 2.95},
         {"displacement_m": 1.5e-4}, {"rotation_rad": 2e-3},
         {"noisy_not_held": (3,)}, {"noisy_not_held": (3, 7, 50)},
     ],
@@ -112,7 +125,8 @@ def test_small_differences_count_with_the_same_versions_only(changed):
 @pytest.mark.parametrize(
     "changed",
     [
-        {"critical_friction": 0.2 * (1.0 + 5e-7)}, {"simulated_critical_friction": 0.2005},
+        {"predicted_critical_friction": 0.2 * (1.0 + 5e-7)},
+        {"simulated_critical_friction": 0.2005},
         {"limit_n": 3.0 - 1e-6}, {"simulated_limit_n": 2.98}, {"displacement_m": 1e-5 + 5e-7},
         {"rotation_rad": 1e-4 + 5e-6},
     ],
@@ -123,7 +137,7 @@ def test_what_rounding_does_counts_on_processors_that_round_alike_only(changed):
 
 
 def test_the_last_digits_do_not_count():
-    close = now(critical_friction=0.2 * (1.0 + 5e-10), displacement_m=1e-5 + 5e-8)
+    close = now(predicted_critical_friction=0.2 * (1.0 + 5e-10), displacement_m=1e-5 + 5e-8)
     assert found(close).status is Status.WITHIN
 
 
@@ -147,7 +161,7 @@ def test_another_verdict_at_the_critical_friction_is_grey_with_other_versions(fr
     "damage",
     [
         {"outcome": Outcome.DIVERGED}, {"outcome": Outcome.INVALID_START},
-        {"controls_let_go": 3}, {"mismatches": 2}, {"critical_friction": 0.9},
+        {"controls_held": 1}, {"mismatches": 2}, {"predicted_critical_friction": 0.9},
         {"simulated_critical_friction": None}, {"noisy_not_held": (3, 4, 50)}, {"limit_n": 1.0},
     ],
 )  # fmt: skip
@@ -157,7 +171,7 @@ def test_the_grey_zone_excuses_nothing_else(damage):
 
 
 def test_where_it_slips_first_counts_and_each_wrench_does():
-    before = dataclasses.replace(BEFORE, entries=(dataclasses.replace(ENTRY, **SLIPPED),))
+    before = dataclasses.replace(BEFORE, entries=(entry(**SLIPPED),))
     elsewhere = now(outcome=Outcome.SLIPPED, not_held=("+force_x",))
     assert found(elsewhere, before).status is Status.REGRESSED
     more = found(now(outcome=Outcome.SLIPPED, not_held=("weakest", "lift")), before)
@@ -176,9 +190,8 @@ def test_grasps_that_are_refused_now_have_regressed():
 
 
 def test_grasps_of_another_object_are_not_just_missing():
-    other = dataclasses.replace(ENTRY, id="a-new-one")
-    header = {"content_sha256": "cd", "object": "cup"}
-    listed = compare(BEFORE, dataclasses.replace(BEFORE, entries=(other,), **header))
+    header = {"object": AboutObject("cup", "", "cd")}
+    listed = compare(BEFORE, now(header, name="a-new-one"))
     assert {finding.status for finding in listed} == {Status.NOT_COMPARABLE}
     assert listed[0].reasons == ("the object is another one: wedge -> cup",)
 
@@ -186,25 +199,26 @@ def test_grasps_of_another_object_are_not_just_missing():
 @pytest.mark.parametrize(
     ("header", "changed", "reason"),
     [
-        ({"content_sha256": "cd"}, {}, "the object is another one"),
+        ({"object": AboutObject("wedge", "", "cd")}, {}, "the object is another one"),
         ({"friction": 0.4}, {}, "friction: 0.5 -> 0.4"),
         ({"planned_radius_m": 0.004}, {}, "planned for: radius_m None -> 0.004"),
-        ({"settings": {"setup": {"physics": {"timestep_s": 0.002}}, "seed": 0}}, {},
-         "setup.physics.timestep_s: 0.001 -> 0.002"),
-        ({"settings": {**BEFORE.settings, "seed": 1}}, {}, "seed: 0 -> 1"),
+        ({"settings": How(Setup(hold=HoldProtocol(hold_s=0.3)))}, {},
+         "setup.hold.hold_s: 0.4 -> 0.3"),
+        ({"settings": How(agenda=Agenda(seed=1))}, {}, "seed: 0 -> 1"),
+        ({"settings": How(agenda=Agenda(wrenches=(NamedWrench("lift", [1.0] * 6),)))}, {},
+         "wrenches.lift: None -> [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]"),
         ({}, {"contacts_sha256": "2e"}, "the contacts are others"),
     ],
 )  # fmt: skip
 def test_what_is_another_trial_is_not_compared(header, changed, reason):
     finding = found(now(header, **changed, **SLIPPED))
     assert finding.status is Status.NOT_COMPARABLE
-    assert "held -> slipped at weakest" in finding.differences
+    assert "outcome: held -> slipped" in finding.differences
     assert finding.reasons == (reason,) or reason in finding.reasons[0]
 
 
 def test_grasps_that_are_gone_or_new_are_named():
-    other = dataclasses.replace(ENTRY, id="a-new-one")
-    after = dataclasses.replace(BEFORE, entries=(other,))
+    after = now(name="a-new-one")
     assert [(each.id, each.status) for each in compare(BEFORE, after)] == [
         ("a-new-one", Status.NEW),
         ("c-0-1-2-3", Status.MISSING),
@@ -212,7 +226,7 @@ def test_grasps_that_are_gone_or_new_are_named():
 
 
 MOVED = Carried("part.obj has changed: face 3 moved 1.00 mm outward", {})
-OTHER_PART = {"content_sha256": "cd"}
+OTHER_PART = {"object": AboutObject("wedge", "", "cd")}
 
 
 def on_another_part(**changed):
@@ -225,11 +239,11 @@ def on_another_part(**changed):
     ("changed", "status", "word"),
     [
         ({}, Status.WITHIN, "same"),
-        ({"critical_friction": 0.2 + 0.024 + 0.2 * 0.049}, Status.WITHIN, "same"),
-        ({"critical_friction": 0.2 + 0.026 + 0.2 * 0.051}, Status.REGRESSED, "worse"),
+        ({"predicted_critical_friction": 0.2 + 0.024 + 0.2 * 0.049}, Status.WITHIN, "same"),
+        ({"predicted_critical_friction": 0.2 + 0.026 + 0.2 * 0.051}, Status.REGRESSED, "worse"),
         ({"limit_n": 3.0 * 1.06}, Status.IMPROVED, "better"),
-        ({"controls": 3, "controls_let_go": 3}, Status.WITHIN, "same"),
-        ({"controls_let_go": 3}, Status.REGRESSED, "worse"),
+        ({"controls": 3}, Status.WITHIN, "same"),
+        ({"controls_held": 1}, Status.REGRESSED, "worse"),
         (SLIPPED, Status.REGRESSED, "worse"),
     ],
 )
@@ -242,10 +256,10 @@ def test_a_grasp_on_a_changed_part_is_compared_and_the_face_is_named(changed, st
 
 def test_differences_show_the_digits_that_changed_and_their_band():
     finding = on_another_part(
-        critical_friction=0.2 + 3.21e-7, limit_n=2.5432, displacement_m=1.2e-5
+        predicted_critical_friction=0.2 + 3.21e-7, limit_n=2.5432, displacement_m=1.2e-5
     )
-    friction, limit, moved = finding.differences
-    assert friction == "critical_friction: 0.2 -> 0.20000032 (+0.00016 %, band 0.035)"
+    friction, moved, limit = finding.differences
+    assert friction == "predicted_critical_friction: 0.2 -> 0.20000032 (+0.00016 %, band 0.035)"
     assert limit == "limit_n: 3 -> 2.543 (-15 %, band 0.15)"
     assert moved == "displacement_m: 1e-05 -> 1.2e-05 (+20 %, band 0.0002)"
     assert finding.beyond == (limit,)
@@ -274,3 +288,64 @@ def test_a_grasp_that_was_gone_already_when_the_baseline_was_written_is_the_same
     assert (other.id, other.status) == ("c-9-9-9-9", Status.SAME)
     (_, other) = compare(BEFORE, now(OTHER_PART), carried=gone)
     assert other.status is Status.GONE
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Trial(Declared):
+    """What a class that nobody here knows declares of its figures."""
+
+    id: Annotated[str, Shown("trial", compared=None)]
+    grip: Annotated[float, Shown("grip")]
+    way_m: Annotated[float, Compared(less)]
+    load: Annotated[float | None, Compared(less, analysed=True)] = None
+    tips: Annotated[tuple[Declared, ...], Compared(less, "fingertips")] = ()
+
+    @figure
+    def stuck(self) -> Annotated[bool, Compared(less)]:
+        """Whether nothing slid."""
+        return self.grip > 1.0
+
+
+@keeps(Trial)
+class TrialFigures(Kept):
+    """The figures of a trial."""
+
+
+def differing(before, after, bands=OTHER_VERSIONS):
+    kept = [TrialFigures.of(each) for each in (before, after)]
+    return {
+        each.text.split(":")[0]: (each.worse, each.counts)
+        for each in differing_figures(*kept, bands)
+    }
+
+
+USUAL = Trial("a", 2.0, 0.1, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"id": "b"}, {}),
+        ({"grip": 2.09}, {"grip": (True, False)}),
+        ({"grip": 2.11}, {"grip": (True, True)}),
+        ({"grip": 1.89}, {"grip": (True, True)}),
+        ({"grip": 0.9}, {"grip": (True, True), "stuck": (True, True)}),
+        ({"way_m": 0.1001}, {"way_m": (False, False)}),
+        ({"way_m": 0.09}, {"way_m": (True, True)}),
+        ({"load": 4.5}, {"load": (False, True)}),
+        ({"load": None}, {"load": (True, True)}),
+        ({"tips": (USUAL,)}, {"fingertips": (False, True)}),
+    ],
+)
+def test_what_a_class_declares_is_kept_and_compared_as_it_says(changed, expected):
+    """A figure that says nothing of it is like a simulated one, and each change of it is worse."""
+    assert differing(USUAL, dataclasses.replace(USUAL, **changed)) == expected
+
+
+def test_the_analysis_depends_less_on_rounding_than_the_simulation():
+    assert differing(USUAL, dataclasses.replace(USUAL, load=4.001), OTHER_PROCESSOR) == {
+        "load": (False, True)
+    }
+    assert differing(USUAL, dataclasses.replace(USUAL, grip=2.001), OTHER_PROCESSOR) == {
+        "grip": (True, False)
+    }

@@ -2,30 +2,23 @@
 
 import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.baselines.baseline import (
-    baseline_from_json,
-    baseline_to_json,
-    execution_entry,
-    fields_of,
-    properties_of,
-)
+from sim_validate.baselines.baseline import Baseline, ExecutedFigures, How
 from sim_validate.baselines.check import Checked, Measured, demanded
 from sim_validate.baselines.compare import Status, compare
-from sim_validate.baselines.settings import How, of_settings, settings_of
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
     ExecutionControl,
     ExecutionTrial,
 )
+from sim_validate.settings.executions import ExecutionSettings
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 
 TRIAL = ExecutionTrial(
@@ -36,13 +29,20 @@ EXECUTION = Execution(
     trials=(TRIAL, dataclasses.replace(TRIAL, kind="lift", name="lift", slip_m=2e-7)),
     controls=(ExecutionControl("friction 0.9", True, 0.95),), skipped=(),
 )  # fmt: skip
-KEPT = execution_entry(ExecutedGrasp("c", "concurrent", "1f", EXECUTION))
+KEPT = ExecutedFigures.of(ExecutedGrasp("c", "concurrent", "1f", EXECUTION))
+UNHELD = ExecutedFigures.of(ExecutedGrasp("c", "", "1f", None, "no squeeze"))
 LOST = {"lost": ("lift",)}
 
 
-def executed(**changed):
-    entry = dataclasses.replace(ENTRY, execution=dataclasses.replace(KEPT, **changed))
+def with_execution(kept):
+    entry = dataclasses.replace(ENTRY, execution=kept)
     return dataclasses.replace(BEFORE, entries=(entry,))
+
+
+def executed(**changed):
+    execution = dataclasses.replace(KEPT.execution, **changed)
+    survived = execution.trials > 0 and not execution.lost
+    return with_execution(dataclasses.replace(KEPT, execution=execution, survived=survived))
 
 
 def found(after, before=None):
@@ -51,52 +51,45 @@ def found(after, before=None):
 
 
 def test_an_entry_keeps_the_worst_of_all_trials():
-    assert (KEPT.trials, KEPT.lost, KEPT.survived) == (2, (), True)
-    assert (KEPT.slip_m, KEPT.predicted_first_slip, KEPT.load_multiple) == (2e-7, 2.5, 2.7)
-    endless = dataclasses.replace(TRIAL, predicted_first_slip=float("inf"))
-    entry = execution_entry(
-        ExecutedGrasp("c", "", "1f", dataclasses.replace(EXECUTION, trials=(endless,)))
-    )
-    assert entry.predicted_first_slip is None
-    unheld = execution_entry(ExecutedGrasp("c", "", "1f", None, "no squeeze"))
-    assert (unheld.survived, unheld.reason, unheld.slip_m) == (False, "no squeeze", None)
-    with pytest.raises(ValueError, match="counts more than"):
-        dataclasses.replace(KEPT, trials=0, lost=("lift",))
+    kept = KEPT.execution
+    assert (kept.trials, kept.lost, KEPT.survived) == (2, (), True)
+    assert (kept.slip_m, kept.predicted_first_slip, kept.load_multiple) == (2e-7, 2.5, 2.7)
+    assert (UNHELD.survived, UNHELD.reason, UNHELD.execution) == (False, "no squeeze", None)
 
 
 def test_a_baseline_with_executions_is_the_same_when_it_is_read_again():
+    endless = executed(predicted_first_slip=math.inf, slip_m=math.inf)
+    for baseline in (executed(**LOST), endless, with_execution(UNHELD)):
+        assert Baseline.of_text(baseline.text()) == baseline
     baseline = executed(**LOST)
-    assert baseline_from_json(baseline_to_json(baseline), "b.json") == baseline
-    assert "execution" not in baseline_to_json(BEFORE)
-    assert properties_of(fields_of(baseline.entries[0]))["execution.lost"] == ("lift",)
-    broken = json.loads(baseline_to_json(baseline))
+    assert baseline.entries[0].properties()["execution.lost"] == ["lift"]
+    broken = json.loads(baseline.text())
     broken["grasps"][0]["execution"]["trials"] = -1
     with pytest.raises(gc.InputError, match=r"grasps\[0\]\.execution\.trials"):
-        baseline_from_json(json.dumps(broken), "b.json")
+        Baseline.of_text(json.dumps(broken))
 
 
 def test_settings_of_executions_are_kept():
     asked = ExecutionSettings(density_kg_m3=500.0, trials=("stop",))
-    how = How(Setup(), Agenda(), asked)
-    assert of_settings(settings_of(how), "b.json") == how
-    assert "execution" not in settings_of(How(Setup(), Agenda()))
-    with pytest.raises(gc.InputError, match=r"b\.json: settings: execution: no setting is named"):
-        of_settings(settings_of(how) | {"execution": {"weight": 1}}, "b.json")
+    baseline = dataclasses.replace(BEFORE, settings=How(execution=asked))
+    assert Baseline.of_text(baseline.text()) == baseline
+    record = json.loads(baseline.text())["settings"]["execution"]
+    assert (record["density_kg_m3"], record["trials"]) == (500.0, ["stop"])
 
 
 @pytest.mark.parametrize(
     ("changed", "status", "reason"),
     [
         ({}, Status.SAME, ""),
-        (LOST, Status.REGRESSED, "execution: survived -> did not survive"),
+        (LOST, Status.REGRESSED, "execution: survived: yes -> no"),
         (LOST, Status.REGRESSED, "execution: no longer survived: lift"),
         ({"predicted_first_slip": 2.0}, Status.REGRESSED, "predicted_first_slip: 2.5 -> 2"),
-        ({"predicted_first_slip": None}, Status.IMPROVED, "predicted_first_slip: 2.5 -> None"),
+        ({"predicted_first_slip": math.inf}, Status.IMPROVED, "predicted_first_slip: 2.5 -> inf"),
+        ({"slip_m": math.inf}, Status.REGRESSED, "execution: slip_m: 2e-07 -> inf"),
         ({"load_multiple": 3.0}, Status.IMPROVED, "execution: load_multiple: 2.7 -> 3"),
         ({"displacement_m": 2e-3}, Status.REGRESSED, "execution: displacement_m"),
-        ({"controls_let_go": 0}, Status.REGRESSED, "controls that did not slip: 0 -> 1"),
+        ({"controls_held": 1}, Status.REGRESSED, "controls that did not slip: 0 -> 1"),
         ({"trials": 1}, Status.REGRESSED, "execution: trials: 2 -> 1"),
-        ({"reason": "no squeeze", "trials": 0}, Status.REGRESSED, "executed -> no squeeze"),
     ],
 )
 def test_what_is_worse_or_better(changed, status, reason):
@@ -107,14 +100,23 @@ def test_what_is_worse_or_better(changed, status, reason):
 
 def test_what_was_lost_and_is_kept_now_is_better():
     assert found(executed(), executed(**LOST)).status is Status.IMPROVED
-    unheld = executed(reason="no squeeze", trials=0)
-    assert found(executed(), unheld).status is Status.IMPROVED
+    endless = {"slip_m": math.inf, "displacement_m": math.inf, "turn_rad": math.inf}
+    assert found(executed(), executed(**LOST, **endless)).status is Status.IMPROVED
+    assert found(executed(), executed(trials=0, slip_m=0.0)).status is Status.IMPROVED
+
+
+def test_a_grasp_that_no_squeeze_holds_is_worse_and_the_other_way_round_better():
+    finding = found(with_execution(UNHELD))
+    assert finding.status is Status.REGRESSED
+    assert "execution: reason: none -> no squeeze" in finding.reasons
+    assert found(executed(), with_execution(UNHELD)).status is Status.IMPROVED
+    assert found(with_execution(UNHELD), with_execution(UNHELD)).status is Status.SAME
 
 
 @pytest.mark.parametrize("first_slip", [0.8, 0.0])
 @pytest.mark.parametrize("other", [OTHERS, OTHER_ARITHMETIC])
 def test_how_far_contacts_slide_counts_only_where_numbers_round_alike(other, first_slip):
-    sliding = {"predicted_first_slip": first_slip, "slip_m": 3e-3}
+    sliding = {"predicted_first_slip": first_slip, "slips": True, "slip_m": 3e-3}
     before, after = executed(**sliding), executed(**sliding | {"slip_m": 4e-3})
     assert found(after, before).status is Status.REGRESSED
     assert found(dataclasses.replace(after, **other), before).status is Status.WITHIN

@@ -83,7 +83,7 @@ def test_a_simulator_that_is_unfaithful_is_refused_with_its_figures(planned, cap
 def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
     text = "[hold]\nload_share = 0.5\n[fingers]\nfingertip_radius_m = 0.004\n"
     (planned / "setup.toml").write_text(text)
-    settings = verdict("--setup", "setup.toml")["settings"]
+    settings = verdict("--setup", "setup.toml")["setup"]
     assert settings["hold"]["load_share"] == 0.5
     assert settings["fingers"]["fingertip_radius_m"] == 0.004
 
@@ -128,7 +128,7 @@ def test_the_scenes_of_a_run_are_those_that_were_simulated(planned):
 
 def test_what_a_verdict_lists_may_be_given_back(planned, verdict):
     """The tables of a setup file are those of a verdict's settings."""
-    settings = verdict()["settings"]
+    settings = verdict()["setup"]
     tables = ("physics", "fingers", "hold", "limit", "friction")
     lines: list[str] = []
     for table in tables:
@@ -136,4 +136,4 @@ def test_what_a_verdict_lists_may_be_given_back(planned, verdict):
         given = {name: value for name, value in settings[table].items() if value is not None}
         lines += [f"{name} = {json.dumps(value)}" for name, value in given.items()]
     (planned / "same.toml").write_text("\n".join(lines))
-    assert verdict("--setup", "same.toml")["settings"] == settings
+    assert verdict("--setup", "same.toml")["setup"] == settings

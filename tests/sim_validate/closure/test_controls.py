@@ -13,8 +13,8 @@ import scenes
 from grasp_core.families.regulus import LEAST_DEPTH
 from sim_validate.closure.controls import Control, negative_controls, try_control
 from sim_validate.engine import schedules
-from sim_validate.engine.settings import HoldProtocol
 from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.settings.trials import HoldProtocol
 from tests.grasp_core.families.printed_paper import printed_regulus
 from tests.grasp_core.quadruples import paired_quadruples
 from tests.marks import more
@@ -113,7 +113,7 @@ def test_the_simulator_lets_go_of_what_the_printed_regulus_program_takes_for_gra
         contacts = tuple(map(gc.Contact, places, [piece.normal for piece in quad]))
         proof = gc.force_closure(contacts, friction=math.tan(theta))
         if not proof.closed:
-            control = Control("printed", contacts, math.tan(theta), proof)
+            control = Control("printed", math.tan(theta), proof)
             assert try_control(body, control, Agenda(), Setup()).let_go
             tested += 1
     assert tested >= 3

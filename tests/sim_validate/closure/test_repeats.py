@@ -9,9 +9,9 @@ import sim_validate as sv
 from sim_validate.closure.noise import disturbed, noisy_case, noisy_trial
 from sim_validate.closure.verdict import interval
 from sim_validate.engine.rig import squeezed
-from sim_validate.engine.settings import Noise
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
+from sim_validate.settings.trials import Noise
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 

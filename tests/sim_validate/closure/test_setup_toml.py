@@ -59,7 +59,7 @@ def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('{"wrenches": []}', "wrenches: "),
+        ('{"wrenches": []}', "wrenches must "),
         ('{"wrenches": [{"name": "a", "force_n": [0, 0]}]}', "wrenches\\[0\\].force_n"),
         (
             '{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}',

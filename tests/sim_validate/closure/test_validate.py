@@ -11,7 +11,7 @@ import sim_validate as sv
 from scenes.mujoco.fingertips import clashes
 from scenes.settings import FingerSettings
 from sim_validate.closure.controls import negative_controls
-from sim_validate.closure.verdicts_json import trace_arrays, verdicts_to_json
+from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from tests.marks import MORE, more
@@ -75,7 +75,7 @@ def test_all_that_can_be_asked_for_repeats_to_the_last_digit_at_any_number_of_th
     texts, traces = set(), []
     for threads in (1, 2):
         verdict = sv.validate(body, grasp, 0.4, agenda=agenda, setup=Setup(threads=threads))
-        texts.add(verdicts_to_json(body, 0.4, [verdict], verdict.gate, complete=True))
+        texts.add(Verdicts.of(body, 0.4, verdict.gate, (verdict,)).text())
         traces.append(trace_arrays(verdict))
     assert len(texts) == 1
     for name, array in traces[0].items():
@@ -145,7 +145,7 @@ def test_limits_are_multiples_of_the_applied_wrench():
         verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
         for trial in verdict.wrenches:
             assert trial.predicted_limit == pytest.approx(1.25, rel=1e-6)
-            assert trial.simulated_limit.share == pytest.approx(1.0, abs=0.005)
+            assert trial.let_go_at.share == pytest.approx(1.0, abs=0.005)
 
 
 def test_overlapping_fingertips_make_a_grasp_invalid():
@@ -176,7 +176,7 @@ def test_limits_do_not_depend_on_how_fingers_are_built(fingers):
     )  # fmt: skip
     assert verdict.good, verdict.mismatches
     for trial in verdict.wrenches:
-        assert trial.simulated_limit.share == pytest.approx(1.0, abs=0.01)
+        assert trial.let_go_at.share == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -199,7 +199,7 @@ def test_pads_are_where_the_surface_of_the_mesh_is(name, family):
     assert pads.good
     assert mesh.good
     for one, other in zip(pads.wrenches, mesh.wrenches, strict=True):
-        assert one.simulated_limit.share == pytest.approx(other.simulated_limit.share, abs=2e-3)
+        assert one.let_go_at.share == pytest.approx(other.let_go_at.share, abs=2e-3)
         tested += 1
     assert tested == 13
 
@@ -257,7 +257,7 @@ def test_trials_that_say_nothing_neither_confirm_nor_contradict():
     verdict = sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(timeout_s=1e-9))
     assert {trial.hold.outcome for trial in verdict.wrenches} == {Outcome.TIMEOUT}
     assert not any(trial.contradiction for trial in verdict.wrenches)
-    assert not any(trial.simulated_limit for trial in verdict.wrenches)
+    assert not any(trial.let_go_at for trial in verdict.wrenches)
     assert not any(control.let_go or control.held for control in verdict.controls)
     assert not verdict.controls_let_go
     assert not verdict.good
@@ -267,7 +267,7 @@ def test_a_load_that_blows_everything_up_is_recorded_without_numbers():
     body, (grasp, *_) = grasps("wedge", 0.5, 1)
     tear = NamedWrench("tear", np.array([0, 0, 1e9, 0, 1e9, 0]))
     verdict = sv.validate(body, grasp, 0.5, agenda=replace(WITHOUT_CONTROLS, wrenches=(tear,)))
-    text = verdicts_to_json(body, 0.5, [verdict], verdict.gate, complete=True)
+    text = Verdicts.of(body, 0.5, verdict.gate, (verdict,)).text()
     (trial,) = [t for t in json.loads(text)["verdicts"][0]["wrenches"] if t["name"] == "tear"]
     assert trial["outcome"] == "diverged"
     assert not verdict.good

@@ -5,6 +5,7 @@ from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.open_dataset import select
+from sim_validate.datasets.parquet import read_table
 from tests.sim_validate.datasets.engines import Here, silent
 
 CONFIG = DatasetConfig(
@@ -32,7 +33,10 @@ BODIES = {body.content_sha256: body for body in map(example_object, LEARNED.obje
 
 
 def rows_of(folder, name):
-    return list(select(folder).rows(name))
+    """The cells of a table's rows, as its files hold them."""
+    chosen = select(folder)
+    paths = chosen.paths(name)
+    return [row for path in paths for row in read_table(path, name, chosen.tables).to_pylist()]
 
 
 def build_small(folder, config=SMALL):

@@ -4,7 +4,7 @@ import dataclasses
 import hashlib
 
 from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
-from sim_validate.datasets.parquet import parquet_bytes, read_rows
+from sim_validate.datasets.parquet import parquet_bytes, read_table
 
 
 def forged(folder, name, change):
@@ -13,7 +13,7 @@ def forged(folder, name, change):
     The rows are those of the first file in which the change finds what it looks for.
     """
     for path in folder.glob(f"data/{name}/*.parquet"):
-        rows = read_rows(path, name, read_manifest(folder).tables)
+        rows = read_table(path, name, read_manifest(folder).tables).to_pylist()
         try:
             change(rows)
         except StopIteration:

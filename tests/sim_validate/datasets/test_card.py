@@ -5,7 +5,7 @@ import pytest
 
 from sim_validate.datasets.card import CARD, card_text
 from sim_validate.datasets.manifest import read_manifest
-from sim_validate.datasets.tables import TABLES
+from sim_validate.datasets.rows import TABLES
 from sim_validate.datasets.verify import verify
 from tests.sim_validate.datasets.configs import SMALL
 

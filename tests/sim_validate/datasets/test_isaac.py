@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -19,6 +20,7 @@ from grasp_core.geometry.nearest_points import nearest_on_surface
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.isaac import export, yaml_number
+from sim_validate.datasets.manifest import read_manifest, write_manifest
 from sim_validate.datasets.tables import SPLITS, SplitName
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.writing import whole_folder
@@ -117,7 +119,7 @@ def test_a_grasp_that_slipped_has_no_confidence(copy, tmp_path):
 
     def slip(rows):
         for row in rows:
-            row["held"] = False
+            row.update(held=False, outcome="slipped")
 
     forged(copy, "grasps", slip)
     export(copy, tmp_path / "out", None, silent)
@@ -190,13 +192,10 @@ def test_a_damaged_dataset_is_refused_and_leaves_nothing(copy, tmp_path):
         export(copy, tmp_path / "out", None, silent)
     for path, text in kept.items():
         path.write_text(text)
-    (listed,) = [
-        each for each in json.loads((copy / "manifest.json").read_text())["files"]
-        if each.get("table") == "objects" and each["split"] == "train"
-    ]  # fmt: skip
-    text = (copy / "manifest.json").read_text()
-    wrong = text.replace(f'"rows": {listed["rows"]},', f'"rows": {listed["rows"] + 1},')
-    (copy / "manifest.json").write_text(wrong)
+    manifest = read_manifest(copy)
+    more = [replace(each, rows=each.rows + 1) if each.table == "objects" else each
+            for each in manifest.files]  # fmt: skip
+    write_manifest(copy, replace(manifest, files=more))
     with pytest.raises(gc.InputError, match="rows, but the manifest lists"):
         export(copy, tmp_path / "out", None, silent)
     assert [path.name for path in tmp_path.iterdir()] == ["copy"]

@@ -8,8 +8,8 @@ import pytest
 
 import sim_validate
 from sim_validate.datasets.open_dataset import by_object, select
-from sim_validate.datasets.parquet import parquet_bytes, read_columns, read_rows
-from sim_validate.datasets.tables import TABLES
+from sim_validate.datasets.parquet import parquet_bytes, read_columns, read_table
+from sim_validate.datasets.rows import TABLES
 
 pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")
@@ -72,7 +72,7 @@ def test_truth_values_are_bool_or_floats_that_refuse_to_be_negated(beside, tmp_p
     assert held.dtype == closed.dtype == bool
     assert 0 < (~held).sum() < len(held)
     (path,) = sorted(Path(beside).glob("data/grasps/train-*.parquet"))
-    rows = read_rows(path, "grasps")
+    rows = read_table(path, "grasps", TABLES).to_pylist()
     unknown = tmp_path / "grasps.parquet"
     unknown.write_bytes(parquet_bytes("grasps", [rows[0] | {"held": None}, *rows[1:]], {}))
     found = read_columns([unknown], "grasps")["held"]
@@ -124,9 +124,9 @@ def test_every_row_is_met_once_with_its_object(folder, split):
     groups = list(by_object(chosen))
     assert len(groups) == chosen.counts()["objects"]
     for name in TABLES:
-        assert sum(len(group[name]) for group in groups) == chosen.counts()[name] > 0
+        assert sum(len(group.of(name)) for group in groups) == chosen.counts()[name] > 0
     for group in groups:
-        (owner,) = group["objects"]
-        assert {row["object_id"] for row in group["grasps"]} == {owner["object_id"]}
-        names = {row["grasp_id"] for row in group["grasps"]}
-        assert {row["grasp_id"] for row in group["trials"]} == names
+        (owner,) = group.objects
+        assert {row.object_id for row in group.grasps} == {owner.object_id}
+        names = {row.grasp_id for row in group.grasps}
+        assert {row.grasp_id for row in group.trials} == names

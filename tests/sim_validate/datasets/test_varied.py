@@ -107,7 +107,7 @@ def test_a_whole_dataset_has_no_fault_and_comes_out_the_same_again(learned):
     [
         ("planned", {"kind": "given"}, "kind is given, but planned by label"),
         ("friction_near", {"made_from": "x"}, "named in made_from, has no row"),
-        ("friction_near", {"friction_ratio": 2.0}, "friction_ratio is 2.0, but from the contacts"),
+        ("friction_near", {"friction_ratio": 2.0}, "friction_ratio is 2.0, but"),
         ("friction_near", {"kind": "friction_above"}, "is none of the kind friction_above"),
         ("moved_out", {"displaced_m": [0.0] * 4}, "displaced_m is not the distance"),
         ("moved_out", {"region_exit_m": [1.0] * 4}, "is still in its region"),

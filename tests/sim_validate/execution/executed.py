@@ -7,10 +7,15 @@ import numpy as np
 
 import scenes
 import sim_validate as sv
-from sim_validate.execution.enough import Enough
-from sim_validate.execution.executions_json import executions_to_json
-from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import Execution, ExecutionControl, ExecutionTrial
+from sim_validate.execution.verdict import (
+    Enough,
+    Execution,
+    ExecutionControl,
+    Executions,
+    ExecutionTrial,
+    Skipped,
+)
+from sim_validate.kit.about_object import AboutObject
 
 SETTINGS = sv.ExecutionSettings(
     mass_kg=0.3, trials=("shake", "lift"), seed=7, shake_g=0.0, knock_n_s=0.02,
@@ -43,6 +48,6 @@ GRASPS = (
 BODY = scenes.example_object("tetrahedron")
 
 
-def executions_text(complete=True):
-    """The text of their file."""
-    return executions_to_json(BODY, 0.5, SETTINGS, GRASPS, complete=complete)
+def executions(complete=True):
+    """What the file of these grasps holds."""
+    return Executions(AboutObject.of(BODY), 0.5, complete, SETTINGS, GRASPS)

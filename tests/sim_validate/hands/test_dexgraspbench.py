@@ -274,7 +274,7 @@ def test_files_of_another_kind_are_refused(value, said, tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [({"grasp_qpos": None}, "no grasp_qpos"), ({"obj_pose": np.zeros(7)}, "length 1"),
-     ({"squeeze_qpos": np.ones(5)}, "squeeze"), ({"obj_scale": -1.0}, "object_scale")],
+     ({"squeeze_qpos": np.ones(5)}, "squeeze"), ({"obj_scale": -1.0}, "obj_scale")],
     ids=lambda value: str(value)[:20],
 )  # fmt: skip
 def test_what_a_record_lacks_is_named(change, said, tmp_path):

@@ -21,7 +21,7 @@ def test_every_joint_and_fingertip_of_a_file_is_shown(words, capsys):
     assert main([*words, "--json"]) == Exit.GOOD
     facts = json.loads(capsys.readouterr().out)
     assert [finger["name"] for finger in facts["fingers"]] == list(THREE_TIPS)
-    assert [finger["tip_radius_m"] for finger in facts["fingers"]] == pytest.approx([0.008] * 3)
+    assert [finger["tip"]["radius_m"] for finger in facts["fingers"]] == pytest.approx([0.008] * 3)
     assert [len(finger["links"]) for finger in facts["fingers"]] == [2, 3, 3]
     joints = [link["joint"] for finger in facts["fingers"] for link in finger["links"]]
     names = [joint["name"] for joint in joints]

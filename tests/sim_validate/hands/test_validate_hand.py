@@ -35,7 +35,7 @@ def test_a_hand_holds_up_to_its_predicted_limits(case):
     assert len(found.wrenches) == 16
     for trial in found.wrenches:
         assert trial.simulated_limit is not None
-        assert abs(trial.simulated_limit.share - 1.0) < AGREEMENT
+        assert abs(trial.let_go_at.share - 1.0) < AGREEMENT
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{case[1]}")

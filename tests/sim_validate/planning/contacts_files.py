@@ -21,6 +21,4 @@ TETRAHEDRON = {
 
 def arms_and_normals(grasp):
     """The contacts of an answer as seen from its center."""
-    positions = np.array([contact["position_m"] for contact in grasp["contacts"]])
-    normals = np.array([contact["normal"] for contact in grasp["contacts"]])
-    return positions - grasp["center_m"], normals
+    return np.array(grasp["positions_m"]) - grasp["center_m"], np.array(grasp["normals"])

@@ -191,7 +191,7 @@ def test_grasps_of_a_plan_are_measured_by_their_object(tmp_path, monkeypatch, ca
         radius = np.linalg.norm(vertices - center, axis=1).max()
         assert grasp["torque_scale_m"] == pytest.approx(radius, rel=1e-9)
         assert grasp["ferrari_canny_l1_n"] == pytest.approx(source["ferrari_canny"], rel=1e-4)
-        assert {contact["friction"] for contact in grasp["contacts"]} == {0.5}
+        assert set(grasp["friction"]) == {0.5}
     assert max(g["critical_friction"] for g in planned["grasps"]) > 0.01
     assert main(["analyze", "p/grasps.json", "--friction", "0.01", "-q"]) == Exit.NEGATIVE
     assert main(["analyze", "p/grasps.json", "--outward"]) == Exit.INPUT
@@ -217,3 +217,11 @@ def test_what_cannot_be_decided_is_named_and_the_rest_is_answered(analyze, monke
     assert document["summary"]["undecided"] == 1
     assert main(["analyze", "contacts.json"]) == Exit.NEGATIVE
     assert "closure is undecided: too close to zero" in capsys.readouterr().out
+
+
+def test_a_document_is_read_as_it_was_made(analyze):
+    flags = ["--wrench", "0", "0", "-25", "0", "0", "0"]
+    _, document = analyze({"contacts": contacts(CROSS, -CROSS), "friction": 0.5}, *flags)
+    found = analysis.Analyses.of_text(json.dumps(document))
+    assert json.loads(found.text()) == document
+    assert found.grasps[0].wrenches[0].least_norm_forces_n is None

@@ -38,8 +38,7 @@ def test_friction_is_that_of_the_contact_then_the_flag_then_the_file(analyze):
     file["contacts"][0]["friction"] = 0.9
 
     def used(*flags):
-        listed = analyze(file, *flags)[1]["grasps"][0]["contacts"]
-        return [contact["friction"] for contact in listed]
+        return analyze(file, *flags)[1]["grasps"][0]["friction"]
 
     assert used() == [0.9, 0.5, 0.5, 0.5]
     assert used("--friction", "0.3") == [0.9, 0.3, 0.3, 0.3]
@@ -85,12 +84,13 @@ ONE = TETRAHEDRON["contacts"][0]
         ("{}", '"contacts" (one grasp) or "grasps" (several)'),
         (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
         (changed(["friction"], ...), 'contacts[0].friction: the key is missing; give it there'),
-        (changed(["mu"], 0.5), "mu: unknown key; known keys are contacts, grasps, friction"),
-        (changed(["contacts"], [ONE]), "contacts: expected at least 2 items, got 1"),
+        (changed(["mu"], 0.5), "no field is named 'mu'; choose from contacts, grasps, friction"),
+        (changed(["contacts"], [ONE]), "contacts must have a length of at least 2 and at most 100"),
         (changed(["contacts"], [ONE] * 3), "all contacts lie within"),
         (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
         (changed(["contacts", 3, "normal", 0], float("nan")), "contacts[3].normal[0]: expected a"),
-        ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]}, "grasps[0].contacts[1].normal: "),
+        ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]},
+         "grasps[0].contacts[1].normal must have shape (3,)"),
         ({"grasps": [{"id": "1", "contacts": [ONE, ONE]}, {"contacts": [ONE, ONE]}]},
          "grasps[1].id: '1' is also that of grasps[0]"),
     ],
@@ -124,5 +124,5 @@ def test_the_page_of_files_shows_one_that_is_read(analyze):
     shown = json.loads(re.search(r"```json\n(.*?)```", page, re.DOTALL)[1])
     code, document = analyze(shown)
     assert code == Exit.GOOD
-    assert len(document["grasps"][0]["contacts"]) == 4
+    assert len(document["grasps"][0]["positions_m"]) == 4
     assert document["grasps"][0]["verified"]["closure"] is True

@@ -11,6 +11,7 @@ from grasp_core.optimizing.best.proof_file import read_proof
 from grasp_core.quality.measures import MeasureName
 from sim_validate.kit.command_flags import Plan
 from sim_validate.main import main
+from sim_validate.planning.best_json import Best
 
 ASKED = ["plan", "tetrahedron", "--limit", "2", "--families", "concurrent", "--best"]
 
@@ -23,7 +24,9 @@ def folder(tmp_path_factory):
 
 
 def test_the_best_grasp_comes_first_and_its_proof_holds(folder):
-    best = json.loads((folder / "best.json").read_text())
+    text = (folder / "best.json").read_text()
+    assert Best.of_text(text).text() == text
+    best = json.loads(text)
     grasps = gc.load_grasps(folder / "grasps.json")
     proof = read_proof(folder / best["proof"])
     assert proof.verify()
@@ -73,8 +76,8 @@ def test_the_weight_and_a_task_can_be_held_best(tmp_path, capsys):
         assert all(each["quality"][0] <= each["quality"][1] for each in best["planned"])
         assert best["planned"]
         assert gc.load_grasps(out / "grasps.json")[0].id == best["grasp"]["id"]
-    assert [each["force_n"] for each in best["wrenches"]] == [[0, 0, -3], [0, 0, -3]]
-    assert np.allclose(best["wrenches"][1]["torque_n_m"], [0.02, 0, 0], rtol=0.0, atol=1e-12)
+    loads = [[0, 0, -3, 0, 0, 0], [0, 0, -3, 0.02, 0, 0]]
+    assert np.allclose(best["wrenches"], loads, rtol=0.0, atol=1e-12)
     assert "multiple" in capsys.readouterr().out
 
 

@@ -13,6 +13,7 @@ from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.regions.proof import TwistCover
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.planning.regions_json import Regions
 
 NAMES = ("axes", "codes", "forces")
 
@@ -29,14 +30,18 @@ def folder(tmp_path_factory):
 
 def test_every_grasp_has_regions_of_its_own(folder):
     planned = json.loads((folder / "grasps.json").read_text())
-    found = json.loads((folder / "regions.json").read_text())
+    text = (folder / "regions.json").read_text()
+    assert Regions.of_text(text).text() == text
+    found = json.loads(text)
     assert found["object"]["content_sha256"] == planned["object"]["content_sha256"]
     assert [each["id"] for each in found["grasps"]] == [each["id"] for each in planned["grasps"]]
+    assert found["summary"] == {"grasps": 3, "proved": 3}
     for grasp in found["grasps"]:
         assert grasp["disc_radius_m"] > 0.0
+        assert grasp["area_m2"] >= 4.0 * np.pi * grasp["inscribed_radius_m"] ** 2
         for region in grasp["regions"]:
             assert region["kind"] == "certified"
-            assert region["area_m2"] >= np.pi * region["inscribed_radius_m"] ** 2
+            assert region["inscribed_radius_m"] >= grasp["inscribed_radius_m"]
             assert np.shape(region["polygon_m"])[1] == 3
 
 

@@ -1,14 +1,13 @@
 """`transfer.json` says what became of grasps and faces on a changed part, with finite numbers."""
 
 import json
-import math
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
 import scenes
-from sim_validate.planning.transfer_json import transfer_to_json
+from sim_validate.planning.transfer import TransferFile
 from tests.changed_parts import with_face_moved, with_hole
 
 
@@ -29,7 +28,7 @@ def test_the_file_says_what_was_found(change):
     body = scenes.example_object("box")
     grasps = gc.plan(body, 0.5, limit=12).grasps
     found = gc.transfer(body, change(body, grasps), grasps, 0.5)
-    record = json.loads(transfer_to_json(found), parse_constant=pytest.fail)
+    record = json.loads(TransferFile.of(found).text(), parse_constant=pytest.fail)
     assert record["old"]["content_sha256"] == found.old.content_sha256
     assert record["new"]["content_sha256"] == found.new.content_sha256
     lost = 0
@@ -41,12 +40,11 @@ def test_the_file_says_what_was_found(change):
         for contact, each in zip(told["contacts"], there.contacts, strict=True):
             lost += each.contact is None
             assert contact["new_face"] == each.new_face
-            assert (contact["position_m"] is None) == (each.contact is None)
+            assert (contact["contact"] is None) == (each.contact is None)
             if each.contact is not None:
-                assert contact["position_m"] == each.contact.position.tolist()
-                assert contact["moved_mm"] == pytest.approx(1e3 * each.distance, abs=1e-9)
+                assert contact["contact"]["position_m"] == each.contact.position.tolist()
+                assert contact["moved_m"] == each.distance
     assert record["summary"]["contacts_lost"] == lost
     for told, there in zip(record["faces"], found.faces, strict=True):
         assert (told["old"], told["new"], told["moved"]) == (there.old, there.new, there.moved)
-        assert told["turned_deg"] == pytest.approx(math.degrees(there.turn), abs=1e-9)
-        assert told["new_area_mm2"] == pytest.approx(1e6 * there.new_area, abs=1e-9)
+        assert (told["turned_rad"], told["new_area_m2"]) == (there.turn, there.new_area)

@@ -54,11 +54,12 @@ def test_a_grasp_that_slips_says_at_which_wrench(blessed, tmp_path):
     """A wrench in the baseline's settings that no finger can hold."""
     copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
-    push = {"far too much": [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]}
-    changed(baseline, lambda record: record["settings"].update(wrenches=push))
+    push = {"name": "far too much", "wrench": [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]}
+    changed(baseline, lambda record: record["settings"].update(wrenches=[push]))
     code, said = run_pytest(tmp_path)
     assert code == 1
-    assert "held -> slipped at far too much" in said
+    assert "outcome: held -> slipped" in said
+    assert "no longer held: far too much" in said
     assert "first wrench that was not held: far too much [0.0, 0.0, 90.0" in said
     assert "predicted limit 0." in said
     assert "graspproof replay" not in said  # of what `validate` does not simulate

@@ -42,7 +42,7 @@ def test_close_to_slipping(grasp_case, assert_stable):
     assert_stable(grasp_case, min_margin=0.49)
 
 def test_often_dropped(grasp_case, assert_stable):
-    from sim_validate.engine.settings import Noise
+    from sim_validate.settings.trials import Noise
     assert_stable(grasp_case, repeats=8, noise=Noise(mass=0.5), min_pass_rate=0.99)
 """
 
@@ -111,7 +111,7 @@ def test_assert_stable_in_code(tmp_path):
     assert "1 failed, 1 passed" in said
     assert "push [0.0, 0.0, 900.0" in said
     assert "predicted limit" in said
-    assert ".critical_friction" in (tmp_path / "j.xml").read_text()
+    assert ".predicted_critical_friction" in (tmp_path / "j.xml").read_text()
 
 
 BAD_DEMANDS = [

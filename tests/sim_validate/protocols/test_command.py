@@ -8,6 +8,7 @@ import pytest
 from sim_validate.hands.dexgraspbench import load_dex_record
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.protocols.verdict import Judgements
 from tests.sim_validate.changing import changed
 
 
@@ -19,19 +20,22 @@ def test_grasps_are_judged_by_each_test(wedge_plan, tmp_path, capsys):
     words = ["validate", str(wedge_plan), "--protocol", "dexgraspbench", "--protocol", "dexonomy"]
     assert main([*words, "--out", str(tmp_path)]) == Exit.GOOD
     assert capsys.readouterr().out.count("dexonomy") == 3
-    document = finite((tmp_path / "judgements.json").read_text())
+    text = (tmp_path / "judgements.json").read_text()
+    document = finite(text)
     assert document["complete"]
     assert set(document["protocols"]) == {"dexgraspbench", "dexonomy"}
     for each in document["judgements"]:
         test = document["protocols"][each["protocol"]]
-        assert each["theirs"]["passed"]
-        assert each["ours"]["held"]
-        assert each["ours"]["force_closure"]
-        assert each["predicted"]["resisted"]
-        assert each["predicted"]["margin"] > 1.0
-        assert len(each["theirs"]["runs"]) == len(test["runs"])
+        assert each["theirs"]
+        assert each["held"]
+        assert each["closed"]
+        assert each["predicted"]
+        assert each["margin"] > 1.0
+        assert len(each["runs"]) == len(test["runs"])
     every = {"grasps": 2, "theirs_passed": 2, "ours_held": 2, "predicted": 2, "agree": 2}
-    assert document["summary"] == {"dexgraspbench": every, "dexonomy": every}
+    names = ("dexgraspbench", "dexonomy")
+    assert document["summary"] == {name: {"protocol": name, **every} for name in names}
+    assert Judgements.read(tmp_path / "judgements.json").text() == text
     assert document["protocols"]["dexgraspbench"]["sources"][0]["commit"].startswith("1e7a5a6f")
 
 
@@ -41,7 +45,7 @@ def test_a_test_without_loads_has_a_margin_of_null(wedge_plan, capsys):
     )
     document = finite(capsys.readouterr().out)
     (judgement,) = document["judgements"]
-    assert judgement["predicted"]["margin"] is None
+    assert judgement["margin"] is None
     assert document["protocols"]["mj-grasp-sim"]["passing"]["most_m"] is None
     assert code == Exit.GOOD
 
@@ -51,7 +55,6 @@ def test_fingers_that_hardly_push_fail_and_the_command_says_why(wedge_plan, caps
     words = ["--protocol", "dexgraspbench", "--max-normal-force-n", "0.01", "--limit", "1"]
     assert main(["validate", str(wedge_plan), *words]) == Exit.NEGATIVE
     found = capsys.readouterr()
-    assert "failed" in found.out
     assert "moved by" in found.err
     assert "ours:" in found.err
 
@@ -72,9 +75,9 @@ def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(wedge_p
 
 @pytest.mark.parametrize(
     ("change", "said"),
-    [(lambda record: record["judgements"][0].pop("ours"), "ours"),
+    [(lambda record: record["judgements"][0].pop("closed"), "closed"),
      (lambda record: record["object"].update(content_sha256="0"), "another object"),
-     (lambda record: record["summary"]["dexonomy"].update(more=1), "more")],
+     (lambda record: record["summary"]["dexonomy"].update(more=1), "summary")],
     ids=["field", "object", "unknown"],
 )  # fmt: skip
 def test_a_report_refuses_judgements_that_do_not_fit(change, said, wedge_plan, tmp_path, capsys):
@@ -108,7 +111,7 @@ def test_a_hand_is_judged_and_its_records_are_written(bracket_plan, tmp_path, ca
     assert ids
     assert [each["id"] for each in document["judgements"]] == ids
     assert all(each["hand"] == "allegro" for each in document["judgements"])
-    good = all(e["theirs"]["passed"] and e["ours"]["held"] for e in document["judgements"])
+    good = all(e["theirs"] and e["held"] for e in document["judgements"])
     assert code == (Exit.GOOD if good and len(ids) == 2 else Exit.NEGATIVE)
     assert reached["summary"]["complete"]
     assert not any("simulated" in each for each in reached["reaches"])

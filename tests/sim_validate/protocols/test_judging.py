@@ -26,7 +26,7 @@ def test_a_closed_grasp_passes_every_test_and_holds_its_loads(name):
     assert found.ours.margin > 2.0
     assert found.predicted
     assert found.good
-    assert len(found.runs) == len(found.protocol.runs)
+    assert len(found.runs) == len(protocol(found.protocol).runs)
     assert found.push_n == pytest.approx(10.0)
 
 

@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+import sim_validate as sv
 from grasp_core.closure.wrench_sets import WrenchSet
 from scenes.drawing.colours import BAD, GOOD, LEVELS
 from scenes.drawing.panels import thinned
 from scenes.drawing.sheets import Area, Dots, Image, png_of, svg_of
+from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Recorded, replayed
+from sim_validate.closure.verdict import WrenchVerdict
+from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.report.agreement import (
     Agreement,
     as_predicted,
@@ -154,27 +159,38 @@ def test_friction_used_is_one_where_a_finger_slips():
     np.testing.assert_allclose(friction_used(pushes, np.array([0.5])), [[1.0, 0.5, np.nan]])
 
 
-def verdict(trials, controls=(), frictions=(0.1, 0.1)):
-    return {
-        "critical_friction": dict(zip(("predicted", "simulated"), frictions, strict=True)),
-        "settings": {"grasp_size_m": 0.5},
-        "wrenches": [
-            {"predicted_limit": limit, "outcome": outcome, "simulated_limit": simulated,
-             "wrench": [0.0, 3.0, 0.0, 2.0, 0.0, 0.0]}
-            for limit, outcome, simulated in trials
-        ],
-        "controls": {
-            str(place): {"wrenches": [{"outcome": outcome}]}
-            for place, outcome in enumerate(controls)
-        },
-    }  # fmt: skip
+def hold(outcome):
+    return HoldVerdict(Outcome(outcome), "", 0.0, 0.0, 0.0, (), None)
 
 
-def test_trials_are_counted_by_what_was_predicted_and_what_happened():
+def tried(limit, outcome, simulated=None):
+    at = None if simulated is None else SimulatedLimit(0.0, 2.0, simulated / limit)
+    return WrenchVerdict("a", (0.0, 3.0, 0.0, 2.0, 0.0, 0.0), limit, 0.1, hold(outcome), at)
+
+
+def verdict(known, trials, controls=(), frictions=(0.1, 0.1)):
+    return replace(
+        known,
+        critical_friction=CriticalFriction(*frictions),
+        scale=replace(known.scale, grasp_size_m=0.5),
+        wrenches=tuple(tried(*trial) for trial in trials),
+        controls=tuple(
+            replace(known.controls[0], tried=(ControlTrial("a", np.ones(6), None, hold(outcome)),))
+            for outcome in controls
+        ),
+    )
+
+
+@pytest.fixture(scope="module")
+def known(wedge):
+    return sv.validate(*wedge, FRICTION)
+
+
+def test_trials_are_counted_by_what_was_predicted_and_what_happened(known):
     counted = quadrants_in([
-        verdict([(1.25, "held", None), (1.1, "slipped", None), (0.9, "held", None),
+        verdict(known, [(1.25, "held", None), (1.1, "slipped", None), (0.9, "held", None),
                  (1.01, "slipped", None), (0.99, "held", None)], ["slipped"]),
-        verdict([(0.5, "lost_contact", None), (None, "slipped", None)], ["held", "diverged"]),
+        verdict(known, [(0.5, "lost_contact", None), (0.0, "slipped", None)], ["held", "diverged"]),
     ])  # fmt: skip
     assert counted.resisted_held == 1
     assert counted.resisted_let_go == 1
@@ -185,15 +201,15 @@ def test_trials_are_counted_by_what_was_predicted_and_what_happened():
 
 def test_trials_end_as_predicted_or_as_they_might():
     cases = [(1.25, "held", True), (1.25, "slipped", False), (1.25, "timeout", False),
-             (0.5, "slipped", True), (0.5, "held", False), (None, "lost_contact", True),
+             (0.5, "slipped", True), (0.5, "held", False), (0.0, "lost_contact", True),
              (1.01, "slipped", True), (0.99, "held", True), (0.99, "diverged", False)]  # fmt: skip
     for limit, outcome, right in cases:
-        assert as_predicted({"predicted_limit": limit, "outcome": outcome}) is right
+        assert as_predicted(tried(limit, outcome)) is right
 
 
-def test_pairs_are_of_what_was_measured():
-    listed = [verdict([(2.0, "held", 2.1), (1.5, "held", None)]), verdict([], (), (0.2, None)),
-              verdict([], (), (7e-4, 0.0))]  # fmt: skip
+def test_pairs_are_of_what_was_measured(known):
+    listed = [verdict(known, [(2.0, "held", 2.1), (1.5, "held", None)]),
+              verdict(known, [], (), (0.2, None)), verdict(known, [], (), (7e-4, 0.0))]  # fmt: skip
     assert frictions_in(listed).pairs == ((0.1, 0.1),)
     assert frictions_in(listed).below == 1
     (pair,) = limits_in(listed).pairs

@@ -6,13 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import sim_validate as sv
 from scenes.drawing.turntable import UNITS
+from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.report.index_page import cards_of
 from sim_validate.report.report import FIRST, write_report
 from sim_validate.report.run_folder import runs_in
+from tests.sim_validate.changing import slipped
 from tests.sim_validate.report.test_report import Page
 
 
@@ -98,11 +101,13 @@ def test_a_problem_is_not_hidden_behind_a_copy_that_held(planned):
     (run,) = runs_in(planned)
     whole = cards_of(run)
     card = next(each for each in whole if len(each.places) > 1)
-    held = {"outcome": "held", "held": True, "controls": {}, "mismatches": []}
-    verdicts = {grasp.id: held for grasp in run.saved.grasps}
-    assert cards_of(replace(run, verdicts=verdicts)) == whole
-    last = run.saved.grasps[card.places[-1]].id
-    verdicts |= {last: {**held, "outcome": "slipped", "held": False}}
-    cards = cards_of(replace(run, verdicts=verdicts))
+    body, grasps = run.saved.body, run.saved.grasps
+    held = sv.validate(body, grasps[0], agenda=sv.Agenda(controls=False, critical_friction=False))
+    verdicts = [replace(held, id=grasp.id) for grasp in grasps]
+    tested = Verdicts.of(body, 0.5, held.gate, tuple(verdicts))
+    assert cards_of(replace(run, tested=tested)) == whole
+    last = card.places[-1]
+    verdicts[last] = slipped(verdicts[last])
+    cards = cards_of(replace(run, tested=replace(tested, verdicts=tuple(verdicts))))
     assert len(cards) == len(whole) + 1
     assert [each.places for each in cards if each.first == card.places[-1]] == [card.places[-1:]]

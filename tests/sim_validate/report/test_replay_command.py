@@ -1,11 +1,14 @@
 """Trials of verdicts and of rows of datasets, replayed from the command line."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
+from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from tests.sim_validate.changing import slipped
 
 NOISE = ("--noise.shift", ".02", "--noise.turn-deg", "3", "--noise.friction", ".3")
 
@@ -53,9 +56,9 @@ def test_verdicts(folder, replay):
 def test_controls(folder, replay):
     verdict = verdicts_in(folder)[0]
     assert len(verdict["controls"]) >= 3
-    for name, control in verdict["controls"].items():
+    for control in verdict["controls"]:
+        name, first = control["name"], control["trials"][0]
         found = replay(folder, "--grasp", verdict["id"], "--control", name)
-        first = control["wrenches"][0]
         assert found["name"] == f"{verdict['id']}:{name}"
         assert found["displacement_m"] == first["displacement_m"]
         assert found["recorded_outcome"] == first["outcome"]
@@ -68,14 +71,14 @@ def test_repeats_with_noise(folder, replay, tmp_path):
     assert main(["validate", *map(str, (*grasps, *repeats))]) == Exit.GOOD
     verdict = verdicts_in(tmp_path)[0]
     about = (tmp_path, "--grasps", folder / "grasps.json", "--grasp", verdict["id"])
-    failed = [each for each in verdict["robustness"]["not_held"] if each["wrench"]]
+    failed = [each for each in verdict["robustness"]["trials"] if each["wrench"]]
     assert failed
     for each in failed[:2]:
-        found = replay(*about, "--trial", each["trial"])
+        found = replay(*about, "--trial", each["number"])
         assert found["reason"] == each["reason"]
         assert found["recorded_outcome"] == each["outcome"]
-    numbers = {each["trial"] for each in verdict["robustness"]["not_held"]}
-    held = next(number for number in range(12) if number not in numbers)
+    repeats = verdict["robustness"]["trials"]
+    held = next(each["number"] for each in repeats if each["outcome"] == "held")
     found = replay(*about, "--trial", held, "--wrench", "+force_x")
     assert found["recorded_outcome"] == "held"
 
@@ -98,10 +101,10 @@ def test_files_are_written(folder, replay, tmp_path, monkeypatch):
 
 
 def test_a_trial_that_ends_otherwise_than_recorded_is_negative(folder, tmp_path, replay):
-    record = json.loads((folder / "verdicts.json").read_text())
-    record["verdicts"][0]["wrenches"][0]["outcome"] = "slipped"
-    (tmp_path / "verdicts.json").write_text(json.dumps(record))
-    name = record["verdicts"][0]["id"]
+    found = Verdicts.read(folder / "verdicts.json")
+    found = replace(found, verdicts=(slipped(found[0]), *found.verdicts[1:]))
+    (tmp_path / "verdicts.json").write_text(found.text())
+    name = found[0].id
     flags = ("--grasp", name, "--wrench", "+force_x")
     found = replay(tmp_path, *flags, "--grasps", folder / "grasps.json", code=Exit.NEGATIVE)
     assert (found["outcome"], found["recorded_outcome"]) == ("held", "slipped")
@@ -150,11 +153,12 @@ def test_grasps_of_another_object_are_refused(folder, tmp_path, capsys):
 
 
 def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):
-    text, first = (folder / "verdicts.json").read_text(), verdicts_in(folder)[0]
+    found = Verdicts.read(folder / "verdicts.json")
+    first = replace(found[0], contacts=found[0].contacts[::-1])
     path = tmp_path / "verdicts.json"
-    path.write_text(text.replace(first["contacts_sha256"], "0" * 64))
+    path.write_text(replace(found, verdicts=(first,)).text())
     grasps = str(folder / "grasps.json")
-    assert main(["replay", str(path), "--grasp", first["id"], "--grasps", grasps]) == Exit.INPUT
+    assert main(["replay", str(path), "--grasp", first.id, "--grasps", grasps]) == Exit.INPUT
     assert "have changed since these results" in capsys.readouterr().err
 
 

@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,13 +13,14 @@ import pytest
 from grasp_core.errors import InputError
 from scenes.drawing.turntable import UNITS
 from sim_validate import main as commands
-from sim_validate.closure import verdicts_json as verdicts
+from sim_validate.closure.verdict import Verdicts
+from sim_validate.engine.traces import Outcome
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.report.agreement import said_of
 from sim_validate.report.report import write_report
-from tests.sim_validate.changing import changed
+from tests.sim_validate.changing import changed, changed_verdicts, slipped
 
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
 
@@ -82,26 +84,26 @@ def test_nothing_is_asked_of_a_network(small_report):
 
 
 def test_a_page_says_what_the_files_say(small_run, small_report):
-    document = json.loads((small_run / "verdicts.json").read_text())
+    verdicts = Verdicts.read(small_run / "verdicts.json")
     regions = json.loads((small_run / "regions.json").read_text())
-    for verdict, certified in zip(document["verdicts"], regions["grasps"], strict=True):
-        page = Page((small_report / "grasps" / f"{verdict['id']}.html").read_text())
+    for verdict, certified in zip(verdicts, regions["grasps"], strict=True):
+        page = Page((small_report / "grasps" / f"{verdict.id}.html").read_text())
         said = " ".join(page.said)
-        for trial in verdict["wrenches"]:
-            assert trial["name"] in said
-            force, torque = np.reshape(trial["wrench"], (2, 3))
-            lever = verdict["settings"]["grasp_size_m"]
+        lever = verdict.scale.grasp_size_m
+        for trial in verdict.wrenches:
+            assert trial.name in said
+            force, torque = np.reshape(trial.wrench, (2, 3))
             size = np.linalg.norm([*force, *(torque / lever)])
-            assert f"{size * trial['simulated_limit']:.3g}" in said
-        assert f"{verdict['critical_friction']['simulated']:.3g}" in said
-        for name in verdict["controls"]:
-            assert name.replace("_", " ") in said
+            assert f"{size * trial.simulated_limit:.3g}" in said
+        assert f"{verdict.simulated_critical_friction:.3g}" in said
+        for control in verdict.controls:
+            assert control.control.name.replace("_", " ") in said
         assert f"{1e3 * certified['disc_radius_m']:.3g} mm" in said
         assert certified["proof"]["file"] in said
         assert "held 2 of 2 times" in said
-        for field, name in (("displacement_m", "Object moved at most"),
-                            ("start_displacement_m", "While a load came, at most")):  # fmt: skip
-            most = 1e6 * max(trial[field] for trial in verdict["wrenches"])
+        for field, name in (("displacement_m", "um moved"),
+                            ("start_displacement_m", "um when loaded")):  # fmt: skip
+            most = 1e6 * max(getattr(trial.hold, field) for trial in verdict.wrenches)
             place = page.said.index(name)
             assert float(page.said[place + 1].split()[0]) == pytest.approx(most, rel=0.06)
         assert f"the size of the grasp, {1e3 * lever:.3g} mm, so that the limit of a torque" in said
@@ -149,25 +151,28 @@ def copy(small_run, tmp_path):
     return shutil.copytree(small_run, tmp_path / "copy")
 
 
-def counted(document, _=None):
-    """Make the summary that of the verdicts."""
-    document["summary"].update(verdicts.recorded_summary(document["verdicts"]))
-
-
 def without_proofs(document):
-    document["grasps"][0].update(regions=None, reason=EVIL)
+    known = ("id", "contacts_sha256", "family", "planned_radius_m")
+    named = {name: document["grasps"][0][name] for name in known}
+    document["grasps"][0] = dict.fromkeys(document["grasps"][0]) | named | {"reason": EVIL}
+    document["summary"]["proved"] -= 1
 
 
-def spoiled(document):
-    document["verdicts"][0]["mismatches"] = [EVIL]
-    controls = document["verdicts"][0]["controls"]
-    document["verdicts"][0]["controls"] = {EVIL: next(iter(controls.values()))}
-    document["gate"]["checks"][0]["name"] = EVIL
+def spoiled(found):
+    """The verdicts of the run with evil names, one of them a contradiction."""
+    verdict = slipped(found[0])
+    wrenches = (*verdict.wrenches[:-1], replace(verdict.wrenches[-1], name=EVIL))
+    control = replace(verdict.controls[0].control, name=EVIL)
+    controls = (replace(verdict.controls[0], control=control),)
+    first = replace(verdict, wrenches=wrenches, controls=controls)
+    checks = (replace(found.gate.checks[0], name=EVIL), *found.gate.checks[1:])
+    gate = replace(found.gate, checks=checks)
+    return replace(found, gate=gate, verdicts=(first, *found.verdicts[1:]))
 
 
 def test_names_are_escaped(copy, tmp_path):
     changed(copy / "grasps.json", lambda each: each["object"].update(name=EVIL))
-    changed(copy / "verdicts.json", lambda each: counted(each, spoiled(each)))
+    changed_verdicts(copy / "verdicts.json", spoiled)
     changed(copy / "regions.json", without_proofs)
     index = write_report(copy, tmp_path / "out", jobs=1).index
     pages = pages_of(index.parent)
@@ -193,26 +198,20 @@ def test_without_verdicts_grasps_are_shown(copy, tmp_path):
 
 
 def test_an_interrupted_run_is_called_that(copy, tmp_path):
-    def interrupted(document):
-        document["complete"] = False
-        del document["verdicts"][1:]
-        counted(document)
-
-    changed(copy / "verdicts.json", interrupted)
+    path = copy / "verdicts.json"
+    changed_verdicts(path, lambda found: replace(found[:1], complete=False))
     said = " ".join(Page(write_report(copy, tmp_path / "out", jobs=1).index.read_text()).said)
     assert "the run was interrupted" in said
     assert "not validated" in said
 
 
 def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
-    last = json.loads((copy / "verdicts.json").read_text())["verdicts"][-1]["id"]
+    last = Verdicts.read(copy / "verdicts.json")[-1].id
 
-    def slip(document):
-        document["verdicts"][-1].update(held=False, outcome="slipped")
-        document["verdicts"][-1]["wrenches"][0]["outcome"] = "slipped"
-        counted(document)
+    def slip(found):
+        return replace(found, verdicts=(*found.verdicts[:-1], slipped(found[-1])))
 
-    changed(copy / "verdicts.json", slip)
+    changed_verdicts(copy / "verdicts.json", slip)
     report = write_report(copy, tmp_path / "out", jobs=1, limit=1)
     assert report.grasps == 1
     assert [path.stem for path in (tmp_path / "out" / "grasps").iterdir()] == [last]
@@ -291,24 +290,21 @@ def test_regions_for_more_friction_are_not_shown(copy, tmp_path):
     assert "Regions are certified" not in said
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"outcome": "timeout", "held": False, "mismatches": ["not found"]}, "timeout"),
-        ({"mismatches": ["not found"]}, "contradicts the analysis"),
-    ],
-)
-def test_bad_news_has_a_name(small_run, change, says):
-    verdict = json.loads((small_run / "verdicts.json").read_text())["verdicts"][0]
+def test_bad_news_has_a_name(small_run):
+    verdict = Verdicts.read(small_run / "verdicts.json")[0]
     assert said_of(verdict) == ("held", "good")
-    assert said_of(verdict | change) == (says, "bad")
+    assert said_of(slipped(verdict)) == ("contradicts the analysis", "bad")
+    first = verdict.wrenches[0]
+    late = replace(first, hold=replace(first.hold, outcome=Outcome.TIMEOUT))
+    late = replace(verdict, wrenches=(late, *verdict.wrenches[1:]))
+    assert said_of(late) == ("timeout", "bad")
 
 
 @pytest.mark.parametrize(
     ("file", "change", "says"),
     [
         ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
-        ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contacts"),
+        ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contradi"),
         ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
     ],
 )  # fmt: skip

@@ -28,6 +28,7 @@ from tests.grasp_core.optimizing.best.contacts_on_faces import (
     upper_bounds,
 )
 from tests.grasp_core.optimizing.best.independent_replay import replays
+from tests.tampering.changes import forged
 
 CASES = {
     ("tetrahedron", "ferrari-canny"): 0.1, ("random-4-1", "ferrari-canny"): 0.4,
@@ -180,18 +181,18 @@ def test_changed_proofs_are_refused(searched):
     proof, loads = found.proof, found.proof.measure.loads
     changes = [
         {"threshold": 0.5 * proof.threshold}, {"twists": 1.5 * proof.twists},
-        {"measure": Measure("volume")},
+        {"measure": forged(Measure("weight"), name="volume")},
     ]  # fmt: skip
     if found.measure == "task":
         # smaller loads are resisted in larger multiples
-        changes += [{"measure": Measure("task", share * loads)} for share in (0.5, 0.0)]
+        changes += [{"measure": forged(proof.measure, loads=share * loads)} for share in (0.5, 0.0)]
     for change in changes:
-        assert not replace(proof, **change).verify()
+        assert not forged(proof, **change).verify()
     for other in {"ferrari-canny", "weight"} - {found.measure}:
-        assert not replace(found, proof=replace(proof, measure=Measure(other))).verify()
+        assert not forged(found, proof=forged(proof, measure=Measure(other))).verify()
     quality = found.quality
-    higher = replace(quality, lower=1.01 * quality.upper, upper=1.02 * quality.upper)
-    assert not replace(found, quality=higher).verify()
+    higher = forged(quality, lower=1.01 * quality.upper, upper=1.02 * quality.upper)
+    assert not forged(found, quality=higher).verify()
 
 
 def test_files_that_are_damaged_are_refused(tmp_path):

@@ -17,6 +17,7 @@ from grasp_core.optimizing.best.support_cuts import ROUNDING
 from grasp_core.quality.measures import Measure, resisted_loads
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.contacts_on_faces import FRICTION, LIFT, best
+from tests.tampering.changes import forged
 
 
 def loosely_bounded():
@@ -110,6 +111,6 @@ def test_weak_directions_are_ordered_without_last_digits():
     facing, rng = np.hstack([signs, np.zeros((8, 3))]), np.random.default_rng(0)
     for _ in range(8):
         normals = rng.uniform(0.5, 2.0, size=(8, 1)) * facing
-        polytope = replace(found.ball.polytope, normals=normals)
-        again = _weakest(replace(found, ball=replace(found.ball, polytope=polytope)))
+        polytope = forged(found.ball.polytope, normals=normals)
+        again = _weakest(forged(found, ball=forged(found.ball, polytope=polytope)))
         assert np.abs(again + signs / np.sqrt(3.0)).max() <= 1e-12

@@ -4,9 +4,10 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Self, TypeAlias, get_args
 
+from grasp_core.declared import FieldError
 from grasp_core.errors import InputError
-from grasp_core.settings import NotNegative, Quantity, Range, Seed, SettingError
-from scenes.settings import HeldSettings
+from grasp_core.kinds import NotNegative, Quantity, Range, Seed
+from scenes.mujoco.held import HeldSettings
 
 TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misplaced"]
 """What a trial does: it turns gravity through all directions, lifts the object off a table, shakes
@@ -70,7 +71,7 @@ class ChosenExecution(Holding):
     def _check_together(self) -> None:
         HeldSettings._check_together(self)
         if not self.trials:
-            raise SettingError("trials", f"must name at least one of {', '.join(KINDS)}, got none")
+            raise FieldError("trials", f"must name at least one of {', '.join(KINDS)}, got none")
         object.__setattr__(self, "trials", tuple(kind for kind in KINDS if kind in self.trials))
         stopping = self.stop_from_m_per_s / self.stop_m_per_s2
         if stopping > LONGEST_S:

@@ -4,15 +4,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal, TypeAlias
 
-from grasp_core.settings import (
-    Quantity,
-    RandomWrenches,
-    Range,
-    Repeats,
-    SettingError,
-    Settings,
-    Share,
-)
+from grasp_core.declared import FieldError
+from grasp_core.kinds import Quantity, RandomWrenches, Range, Repeats, Share
+from grasp_core.settings import Settings
 
 Duration = Annotated[float, Range(least=0.05, most=60.0)]
 Settling = Annotated[float, Range(least=1.0, most=100.0)]
@@ -22,7 +16,7 @@ Spans = tuple[Annotated[float, Range(above=0.0, below=1.0)], ...]
 
 def _check_spans(spans: Spans) -> None:
     if not spans or any(one >= two for one, two in pairwise(spans)):
-        raise SettingError("spans", f"must be one or more numbers in rising order, got {spans}")
+        raise FieldError("spans", f"must be one or more numbers in rising order, got {spans}")
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -1,0 +1,278 @@
+"""Declares frozen values once: fields with their kinds, checked, compared and shown by them.
+
+    @dataclass(frozen=True, slots=True, eq=False, repr=False)
+    class Contact(Declared):
+        position: Point
+        \"\"\"Point on the surface [m].\"\"\"
+        normal: UnitVector
+        \"\"\"Unit vector into the object.\"\"\"
+
+The constructor checks each field by its kind (see `kinds`) and keeps it in plain form: arrays
+copied and read-only. Two values are equal if they are of one class and all their fields are equal:
+arrays entry by entry, tuples and mappings item by item, numbers exactly; two NaN count as equal, so
+that a copy equals its original. Fields that are declared with `compare=False` do not count.
+`is_sound` checks a value again that may come from anywhere. Nothing that is slow to import is
+imported here, since command-line help waits for it.
+"""
+
+from collections.abc import Mapping, Sized
+from dataclasses import MISSING, Field, fields
+from functools import cache
+from textwrap import shorten
+from typing import Annotated, Any, NamedTuple, TypeVar, cast, get_args, get_origin, get_type_hints
+
+from grasp_core.checked import shown
+from grasp_core.errors import InputError
+from grasp_core.kinds import Take, UnfitError, takes, words
+
+HASHED = (str, int, bool)
+"""Classes of the fields that a hash is made from."""
+HASHED_ENTRIES = 3
+"""Number of entries of an array that a hash is made from: a point tells contacts apart when they
+are looked up in a cache, without looking at each entry of a large mesh."""
+MOST = 300
+"""Largest number of characters of a value's text: two lines and a half."""
+SHORT_VECTOR = 6
+"""Largest number of components of a vector that is written in full."""
+NOTHING = 1e-12
+"""Share of a vector's largest number below which a number is shown as zero."""
+Item = TypeVar("Item")
+
+
+class FieldError(InputError):
+    """Error for a field of the wrong type or size; `name` is that of the field."""
+
+    owner: type | None = None
+    """Class of the field."""
+
+    def __init__(self, name: str, fault: str) -> None:
+        super().__init__(name, fault)
+        self.name, self.fault = name, fault
+
+    def __str__(self) -> str:
+        """Return the name of the field and what is wrong with it: 'must be .., got ..'."""
+        return f"{self.name} {self.fault}"
+
+
+class Plan(NamedTuple):
+    """How the fields of a class are checked."""
+
+    takers: tuple[tuple[str, Take], ...]
+    lettered: tuple[tuple[str, tuple[Any, ...]], ...]
+    """Names of arrays some of whose lengths have a letter, and their shapes."""
+
+
+class ByValue:
+    """Base of frozen dataclasses that are compared by their fields, also where these are arrays."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return NotImplemented
+        compared = (field.name for field in fields(cast("Any", self)) if field.compare)
+        return all(_same(getattr(self, name), getattr(other, name)) for name in compared)
+
+    def __hash__(self) -> int:
+        """Return a hash of the texts, whole numbers and first entries of arrays in the fields."""
+        named = (field for field in fields(cast("Any", self)) if field.compare)
+        kinds = (_hashed(self, field.name) for field in named)
+        return hash((type(self).__name__, *kinds))
+
+    def __repr__(self) -> str:
+        """Return a line with the figures that are short; longer fields are only counted."""
+        told = (field.name for field in fields(cast("Any", self)) if field.repr)
+        return short(type(self).__name__, {name: getattr(self, name) for name in told})
+
+
+class Declared(ByValue):
+    """Base of frozen dataclasses whose fields are checked against their kinds."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        check(self)
+        self._check_together()
+
+    def _check_together(self) -> None:
+        """Refuse fields that do not fit each other; classes replace it where some may not."""
+
+    def is_sound(self) -> bool:
+        """Return whether every field is as the constructor would keep it, whoever set it."""
+        try:
+            for name, take in plan(type(self), exact=True).takers:
+                take(getattr(self, name))
+            check_letters(self)
+            self._check_together()
+        except (UnfitError, InputError, AttributeError):
+            return False
+        return self._is_consistent()
+
+    def _is_consistent(self) -> bool:
+        """Return whether sound fields fit each other as proofs need, beyond `_check_together`."""
+        return True
+
+
+def check(value: object) -> None:
+    """Check all fields of a dataclass against their kinds, and keep them in plain form."""
+    kind = type(value)
+    for name, take in plan(kind).takers:
+        given = getattr(value, name)
+        try:
+            plain = take(given)
+        except UnfitError as fault:
+            said = str(fault) or f"must be {words(types(kind)[name])}, got {shown_of(given)}"
+            error = FieldError(name, said)
+            error.owner = kind
+            raise error from None
+        if plain is not given:
+            object.__setattr__(value, name, plain)
+    check_letters(value)
+
+
+def shown_of(value: Any) -> str:
+    """Write a wrong value for a message."""
+    return shown(str(value) if hasattr(value, "__fspath__") else value)
+
+
+def check_letters(value: object) -> None:
+    """Refuse arrays whose lengths differ where their shapes say the same letter."""
+    sizes: dict[str, tuple[int, str]] = {}
+    for name, shape in plan(type(value)).lettered:
+        array = getattr(value, name)
+        for letter, size in zip(shape, getattr(array, "shape", ()), strict=False):
+            if isinstance(letter, str):
+                known, first = sizes.setdefault(letter, (size, name))
+                if known != size:
+                    raise FieldError(name, f"must have one entry for each of the {known} of "
+                                     f"{first}, got {size}")  # fmt: skip
+
+
+@cache
+def types(kind: type) -> Mapping[str, Any]:
+    """Return the kinds of a dataclass's fields, with their rules."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {each.name: hints[each.name] for each in fields(cast("Any", kind)) if each.init}
+
+
+@cache
+def plan(kind: type, *, exact: bool = False) -> Plan:
+    """Return how the fields of a class are checked."""
+    takers = tuple((name, takes(each, exact=exact)) for name, each in types(kind).items())
+    shapes = ((name, getattr(rule, "shape", ()))
+              for name, each in types(kind).items() for rule in rules(each))  # fmt: skip
+    lettered = tuple((name, shape) for name, shape in shapes if any(map(_is_text, shape)))
+    return Plan(takers, lettered)
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def rules(kind: Any) -> tuple[Any, ...]:
+    """Return the rules that narrow a kind, or one that may be None instead."""
+    if get_origin(kind) is Annotated:
+        return get_args(kind)[1:]
+    return tuple(rule for part in get_args(kind) for rule in rules(part))
+
+
+def default_of(each: Field[Any]) -> Any:
+    """Return the default of a field; `MISSING` if it has none."""
+    return each.default if each.default_factory is MISSING else each.default_factory()
+
+
+def trusted(kind: type[Item], /, **given: Any) -> Item:
+    """Make a frozen value of fields that were checked before, unchecked and uncopied."""
+    made, put = object.__new__(kind), object.__setattr__
+    for name in given:
+        put(made, name, given[name])
+    return made
+
+
+def kept(value: object, name: str) -> Any:
+    """Return a field as it is; None where it would have to be computed first."""
+    try:
+        return object.__getattribute__(value, name)
+    except AttributeError:
+        return None
+
+
+def _same(one: Any, other: Any) -> bool:
+    if one is other:
+        return True
+    if _is_array(one) or _is_array(other):
+        return _is_array(one) and _is_array(other) and _same_entries(one, other)
+    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
+        ours, theirs = cast("tuple[Any, ...]", one), cast("tuple[Any, ...]", other)
+        return len(ours) == len(theirs) and all(map(_same, ours, theirs))
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        mine, its = cast("Mapping[Any, Any]", one), cast("Mapping[Any, Any]", other)
+        return mine.keys() == its.keys() and all(_same(mine[key], its[key]) for key in mine)
+    return bool(one == other) or (_is_nan(one) and _is_nan(other))
+
+
+def _is_array(value: Any) -> bool:
+    return hasattr(value, "dtype") and hasattr(value, "flat")
+
+
+def _same_entries(one: Any, other: Any) -> bool:
+    import numpy as np
+
+    return np.array_equal(one, other, equal_nan="f" in one.dtype.kind + other.dtype.kind)
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and value != value  # noqa: PLR0124 - only NaN differs from itself
+
+
+def _hashed(value: object, name: str) -> object:
+    known = kept(value, name)
+    if _is_array(known):
+        first = known.flat[:HASHED_ENTRIES].tolist()
+        return (known.shape, *(0.0 if _is_nan(entry) else entry for entry in first))
+    return known if isinstance(known, HASHED) else None
+
+
+def summary(kind: str, *said: str, **figures: object) -> str:
+    """Write `Kind(words, name=figure, ..)`, like a constructor call but not meant as code."""
+    parts = [*said, *(f"{name}={_figure(value)}" for name, value in figures.items())]
+    return f"{kind}({', '.join(parts)})"
+
+
+def short(kind: str, figures: Mapping[str, object]) -> str:
+    """Write `Kind(name=figure, ..)` in at most `MOST` characters, longer things by their size."""
+    parts = [f"{name}={_size(value)}" for name, value in figures.items()]
+    return shorten(f"{kind}({', '.join(parts)})", MOST, placeholder=" ...)")
+
+
+def _size(value: Any) -> str:
+    """Write a number, a short vector or a short text; else what the value is and its size."""
+    if _is_array(value):
+        if value.ndim == 1 and value.size <= SHORT_VECTOR and value.dtype.kind == "f":
+            return vector(value)
+        return f"array {value.shape}"
+    if isinstance(value, tuple | list | Mapping):
+        return counted(len(cast("Sized", value)), "item")
+    plain = value is None or isinstance(value, str | bool | int | float)
+    return _figure(value) if plain else type(value).__name__
+
+
+def counted(number: int, thing: str) -> str:
+    """Write a number with its noun, such as `1 hole` or `2 holes`."""
+    irregular = {"vertex": "vertices", "patch": "patches"}
+    return f"{number} {thing if number == 1 else irregular.get(thing, thing + 's')}"
+
+
+def _figure(value: Any) -> str:
+    if _is_array(value):
+        return vector(value)
+    return f"{value:.6g}" if isinstance(value, float) else shown(value)
+
+
+def vector(value: Any) -> str:
+    """Write a vector to six digits; a number that is rounding beside the largest is zero."""
+    sizes = [float(x) for x in value]
+    nothing = NOTHING * max(map(abs, sizes), default=0.0)
+    return f"({', '.join(f'{0.0 if abs(x) < nothing else x:.6g}' for x in sizes)})"

@@ -1,0 +1,369 @@
+"""Writes declared values as JSON and makes them of it, strictly, from their fields alone.
+
+A record is a frozen dataclass of `declared`: its fields are the keys of an object, in their order,
+and what reads a file back is the same class. Properties that are marked as `recorded` are written
+too; a file whose other fields say something else contradicts itself and is refused. In a kind,
+`Key("position_m")` names the key where it is not the field's name, `Null(math.inf)` the number that
+null stands for, `UNRECORDED` a field that only lives in memory and has a default, and `FLAT` a
+field whose own fields stand in the object itself; where it may be None, they are all absent then.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from enum import Enum
+from functools import cache, partial
+from itertools import chain
+from pathlib import Path
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    NamedTuple,
+    Self,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from grasp_core.declared import Declared, FieldError, default_of, rules, types
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import object_of, shown, text_of
+from grasp_core.files.text_files import read_text
+from grasp_core.kinds import Many, Null, inside
+from grasp_core.settings import at, named, placed
+
+UNRECORDED = "unrecorded"
+"""Mark in the type of a field that no file holds."""
+FLAT = "flat"
+"""Mark in the type of a field that is a record, whose keys stand among those of the outer one."""
+SAME = 1e-9
+"""Largest relative difference of a number that a file says and that its other fields say."""
+Record = TypeVar("Record")
+Convert = Callable[[Any], Any]
+Read = Callable[[Any, str], Any]
+"""A function of a value of JSON and of where it stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """The key of a field in files, where it is not the field's name."""
+
+    name: str
+
+
+class recorded(property):  # noqa: N801 - it is used as a decorator, as `property` is
+    """A property that files hold as well, for those who read them without this package."""
+
+
+class Entry(NamedTuple):
+    """How a field or a recorded property is written and read."""
+
+    name: str
+    key: str
+    kind: Any
+    default: Any
+    write: Convert
+    read: Read | None
+    """Makes values of JSON for the constructor; None if it takes them as they are."""
+    flat: type | None
+    """The class whose keys stand among those of the outer record; None for other fields."""
+
+    @property
+    def may_lack(self) -> bool:
+        """Whether the keys of a flat part may all be absent."""
+        kind = get_args(self.kind)[0] if get_origin(self.kind) is Annotated else self.kind
+        return type(None) in get_args(kind)
+
+
+class Entries(NamedTuple):
+    """How a record is written and read."""
+
+    fields: tuple[Entry, ...]
+    recorded: tuple[Entry, ...]
+
+
+@cache
+def entries(kind: type) -> Entries:
+    """Return how the fields and the recorded properties of a class are written and read."""
+    own: list[Entry] = []
+    defaults = {each.name: default_of(each) for each in fields(cast("Any", kind))}
+    for name, each in types(kind).items():
+        marks = rules(each)
+        if UNRECORDED not in marks:
+            key = next((rule.name for rule in marks if isinstance(rule, Key)), name)
+            flat = inside_record(each) if FLAT in marks else None
+            own.append(Entry(name, key, each, defaults[name], writes(each), reads(each), flat))
+    properties = [
+        Entry(name, name, said, MISSING, writes(said), None, None)
+        for name, said in property_kinds(kind, recorded).items()
+    ]
+    return Entries(tuple(own), tuple(properties))
+
+
+@cache
+def property_kinds(kind: type, mark: type[property]) -> Mapping[str, Any]:
+    """Return the kinds of a class's properties that a decorator marks, by name."""
+    members = {name: each for base in reversed(kind.__mro__) for name, each in vars(base).items()}
+    return {
+        name: get_type_hints(each.fget, include_extras=True)["return"]
+        for name, each in members.items() if isinstance(each, mark)
+    }  # fmt: skip
+
+
+def keys(kind: type) -> tuple[str, ...]:
+    """Return the keys of the object that holds a value of a class."""
+    own, properties = entries(kind)
+    return tuple(
+        key for each in (*own, *properties)
+        for key in ([each.key] if each.flat is None else keys(each.flat))
+    )  # fmt: skip
+
+
+def record_of(value: object) -> dict[str, Any]:
+    """Return a value as an object of JSON."""
+    own, properties = entries(type(value))
+    found: dict[str, Any] = {}
+    for each in (*own, *properties):
+        plain = each.write(getattr(value, each.name))
+        if each.flat is None:
+            found[each.key] = plain
+        else:
+            found.update(plain or {})
+    return found
+
+
+def writes(kind: Any) -> Convert:
+    """Return the function that makes plain JSON of values of a kind."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        if any(getattr(rule, "nan", False) for rule in parts[1:]):
+            return _array
+        return _finite if any(isinstance(rule, Null) for rule in parts[1:]) else writes(parts[0])
+    if origin in (Union, UnionType):
+        inner = writes(next(part for part in parts if part is not type(None)))
+        return lambda value: None if value is None else inner(value)
+    if origin is tuple:
+        return _items_written(parts)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        one = writes(parts[1])
+        return lambda value: {name: one(each) for name, each in value.items()}
+    return _plain if inside_record(kind) is None else record_of
+
+
+def inside_record(kind: Any) -> type | None:
+    """Return the class of records of a kind, alone or beside None; None if there is none."""
+    found: type | None = inside(kind, object)
+    return found if is_dataclass(cast("Any", found)) else None
+
+
+def _items_written(parts: tuple[Any, ...]) -> Convert:
+    each, endless = [writes(part) for part in parts if part is not Ellipsis], parts[-1] is Ellipsis
+    if all(write is _plain for write in each):
+        return lambda value: [_plain(item) for item in value]
+    return lambda value: [
+        write(item)
+        for write, item in zip(each * len(value) if endless else each, value, strict=True)
+    ]
+
+
+def _finite(value: Any) -> Any:
+    return value if math.isfinite(value) else None
+
+
+def _array(value: Any) -> Any:
+    """Return an array as lists in which null stands for NaN."""
+    if value.dtype.kind != "f":
+        return value.tolist()
+    whole = value.astype(object)
+    whole[value != value] = None  # noqa: PLR0124 - only NaN differs from itself
+    return whole.tolist()
+
+
+def _plain(value: Any) -> Any:
+    """Return arrays as lists, members of enumerations as their values, and paths as text."""
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Path):
+        return str(value)
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def from_record(kind: type[Record], found: object, where: str = "", **beside: Any) -> Record:
+    """Make a value of an object of JSON; `where` leads to it, such as 'verdicts[0]'.
+
+    `beside` holds fields that are in no file.
+
+    A key that is unknown or missing, a value that the class refuses, and a recorded property that
+    the other fields contradict are errors that name the field.
+    """
+    own, properties = entries(kind)
+    given = named(found, keys(kind), where, "field")
+    taken: dict[str, Any] = {}
+    for each in (*own, *properties):
+        if each.flat is not None:
+            inner = {key: given[key] for key in keys(each.flat) if key in given}
+            absent = each.may_lack and not inner
+            taken[each.name] = None if absent else from_record(each.flat, inner, where)
+        elif each.key not in given:
+            if each.default is MISSING:
+                raise InputError(f"{at(where, each.key)}: missing; add it")
+        else:
+            value, read = given[each.key], each.read
+            taken[each.name] = value if read is None else read(value, at(where, each.key))
+    said = {each.name: taken.pop(each.name) for each in properties}
+    try:
+        made = kind(**taken, **beside)
+    except FieldError as error:
+        key = next((each.key for each in own if each.name == error.name), error.name)
+        raise FieldError(at(where, key), error.fault) from None
+    except InputError as error:
+        raise placed(error, where) from None
+    for each in properties:
+        ours = each.write(getattr(made, each.name))
+        if not _agree(said[each.name], ours):
+            raise InputError(
+                f"{at(where, each.key)}: {_told(said[each.name])} contradicts the other fields, "
+                f"which say {_told(ours)}; write the file again, or remove it"
+            )
+    return made
+
+
+def reads(kind: Any) -> Read | None:
+    """Return the function that makes values of a kind of JSON; None if nothing is to be made."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _narrowed_read(*parts)
+    if origin in (Union, UnionType):
+        inner = reads(next(part for part in parts if part is not type(None)))
+        return inner and (lambda value, where: None if value is None else inner(value, where))
+    if origin is tuple:
+        return _items_read(parts)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return _values_read(parts[1])
+    own = inside_record(kind)
+    return None if own is None else partial(_record_read, own)
+
+
+def _narrowed_read(kind: Any, *given: Any) -> Read | None:
+    null = next((rule for rule in given if isinstance(rule, Null)), None)
+    if null is not None:
+        return lambda value, _where: null.value if value is None else value
+    array = next((rule for rule in given if hasattr(rule, "take")), None)
+    if array is not None:
+        return partial(_array_read, array.shape)
+    inner, many = reads(kind), next((rule for rule in given if isinstance(rule, Many)), None)
+    if inner is None or many is None:
+        return inner
+
+    def read(value: Any, where: str) -> Any:
+        if isinstance(value, list) and not many.holds(cast("list[Any]", value)):
+            raise InputError(f"{where} {many.fault(cast('list[Any]', value))}")
+        return inner(value, where)
+
+    return read
+
+
+def _record_read(kind: type, value: Any, where: str) -> Any:
+    return from_record(cast("type[Any]", kind), value, where)
+
+
+def _array_read(shape: tuple[int | str | None, ...], value: Any, where: str) -> Any:
+    """Refuse true and false, which arrays would take for 1 and 0; an empty list has no rows."""
+    if value == [] and not isinstance(shape[0], int):
+        import numpy as np
+
+        return np.empty((0, *(size for size in shape[1:] if isinstance(size, int))))
+    items: list[Any] = [value]
+    while (found := set(map(type, items))) == {list}:
+        items = [*chain.from_iterable(items)]
+    if bool in found:
+        raise InputError(f"{where}: expected numbers, got true or false among them")
+    return value
+
+
+def _items_read(parts: tuple[Any, ...]) -> Read | None:
+    """Read the items of a list; what is no list is left to the constructor to refuse."""
+    each, endless = [reads(part) for part in parts if part is not Ellipsis], parts[-1] is Ellipsis
+    if not any(each):
+        return None
+
+    def read(value: Any, where: str) -> Any:
+        if not isinstance(value, list):
+            return value
+        items = cast("list[Any]", value)
+        readers = each * len(items) if endless else each
+        return [
+            item if one is None else one(item, f"{where}[{place}]")
+            for place, (one, item) in enumerate(zip(readers, items, strict=False))
+        ] + items[len(readers) :]
+
+    return read
+
+
+def _values_read(kind: Any) -> Read | None:
+    one = reads(kind)
+    if one is None:
+        return None
+
+    def read(value: Any, where: str) -> Any:
+        if not isinstance(value, dict):
+            return value
+        table = cast("dict[str, Any]", value)
+        return {name: one(item, at(where, name)) for name, item in table.items()}
+
+    return read
+
+
+def _told(value: Any) -> str:
+    """Write a value for a message; of a list, how many items it has."""
+    return f"a list of {len(cast('list[Any]', value))}" if isinstance(value, list) else shown(value)
+
+
+def _agree(said: Any, ours: Any) -> bool:
+    """Return whether a file and its other fields say the same: numbers up to rounding.
+
+    Of sentences only the number counts, which another version may word otherwise.
+    """
+    if isinstance(said, list) and isinstance(ours, list):
+        theirs, own = cast("list[Any]", said), cast("list[Any]", ours)
+        texts = all(isinstance(each, str) for each in (*theirs, *own))
+        return len(theirs) == len(own) and (texts or all(map(_agree, theirs, own)))
+    if isinstance(said, dict) and isinstance(ours, dict):
+        mine, its = cast("dict[str, Any]", said), cast("dict[str, Any]", ours)
+        return mine.keys() == its.keys() and all(_agree(mine[key], its[key]) for key in its)
+    if isinstance(said, float) and isinstance(ours, float | int):
+        return math.isclose(said, ours, rel_tol=SAME, abs_tol=SAME * SAME)
+    return type(cast("Any", said)) is type(ours) and said == ours
+
+
+class RecordFile(Declared):
+    """Base of the records that a file of their own holds."""
+
+    __slots__ = ()
+    FILE: ClassVar[str]
+    """Name of the file, or its kind in words."""
+    SCHEMA: ClassVar[int]
+    """Version of its form."""
+
+    def text(self) -> str:
+        """Return the text of the file; equal records give equal texts."""
+        return text_of({"schema": self.SCHEMA, **record_of(self)})
+
+    @classmethod
+    def of_text(cls, text: str) -> Self:
+        """Read the text of a file."""
+        found = object_of(text, cls.FILE, schema=cls.SCHEMA)
+        del found["schema"]
+        return from_record(cls, found)
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a file; errors name it and the field."""
+        text = read_text(path)
+        with about(path):
+            return cls.of_text(text)

@@ -1,0 +1,166 @@
+"""Where a hand stands in the grasps of an object, and what it did there: `reaches.json`.
+
+The file holds the hand's parts and every proof, so that whoever has it can draw the hand and check
+the poses without anything else. Fingertips must touch at the contacts of the file, or it is about
+another hand and is refused.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from grasp_core.arrays import UnitVector
+from grasp_core.declared import Declared
+from grasp_core.errors import InputError
+from grasp_core.execution.carried_mass import HandPayload
+from grasp_core.figures import Shown
+from grasp_core.files.records import FLAT, RecordFile, recorded
+from grasp_core.grasp_tables import ById
+from grasp_core.hands.collisions import tip_distances
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.kinds import Direction, Friction, HandClearance, NotNegative, Seed, Starts
+from grasp_core.provenance import versions
+from grasp_core.settings import Settings
+from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.hands.validate_hand import HandVerdict
+from sim_validate.kit.about_object import AboutObject
+from sim_validate.settings.executions import ExecutionSettings
+
+TOUCHING_M = 1e-4
+"""How far a fingertip of the file may be from its contact [m]: ten times what `reach_with` allows.
+"""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ReachSettings(Settings):
+    """What is asked of a pose, as `reach_with` takes it."""
+
+    regions: bool = True
+    """Whether contacts may be anywhere in the grasp's regions, or must be the planned ones."""
+    table_down: Direction | None = None
+    """Downward direction in the object's frame, if the object lies on a table."""
+    clearance_m: HandClearance = 5e-4
+    """Least distance between all that must not touch [m]."""
+    starts: Starts = 100
+    """Largest number of starts for each choice of contacts."""
+    seed: Seed = 0
+    """Seed of the postures from which the search starts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CarriedMass(Declared):
+    """The largest mass that a hand holds in any orientation, its links included."""
+
+    lower_kg: NotNegative
+    """Mass that is held in every orientation, with forces chosen anew for each [kg]."""
+    upper_kg: NotNegative
+    """Mass above which some orientation is not held [kg]."""
+    weakest_gravity: UnitVector
+    """Direction of gravity in which the hand lets go first, in the object's frame."""
+
+    @classmethod
+    def of(cls, found: HandPayload) -> "CarriedMass":
+        """Leave out the proofs, which `hand_payload` finds again."""
+        return cls(found.lower, found.upper, found.weakest)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ReachedGrasp(Declared):
+    """What was found of a hand in one grasp."""
+
+    reach: Annotated[HandReach, FLAT]
+    contacts_sha256: str
+    """Hash of the planned contacts."""
+    payload: CarriedMass | None = None
+    """What the hand carries; None where motors or links are unknown, or too weak."""
+    simulated: HandVerdict | None = None
+    """What the hand held with its motors; None where no simulation was asked for."""
+    executed: ExecutedGrasp | None = None
+    """What came of executing the grasp with the hand; None where it was not asked for."""
+
+    @property
+    def id(self) -> str:
+        """Id of the grasp."""
+        return self.reach.grasp
+
+    @recorded
+    def payload_kg(self) -> Annotated[float | None, Shown("payload kg", ".3g")]:
+        """Largest mass that the motors hold whichever way the hand is turned, links included."""
+        return None if self.payload is None else self.payload.lower_kg
+
+    @property
+    def good(self) -> bool:
+        """Whether the hand stands in the grasp, and passed all trials that were asked for."""
+        executed = self.executed
+        return (
+            self.reach.reached
+            and (self.simulated is None or self.simulated.good)
+            and (executed is None or (executed.survived and executed.controls_let_go))
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Reaches(RecordFile, ById[ReachedGrasp]):
+    """A hand in the grasps of an object, as `reaches.json` holds it.
+
+    It is a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
+
+    ITEMS = "reaches"
+    FILE = "reaches.json"
+    SCHEMA = 2
+
+    object: AboutObject
+    friction: Friction
+    complete: bool
+    """Whether every grasp that was asked for was looked at."""
+    hand: Hand
+    asked: ReachSettings
+    execution: ExecutionSettings | None
+    """Settings with which grasps were executed; None where it was not asked for."""
+    reaches: tuple[ReachedGrasp, ...]
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    def _check_together(self) -> None:
+        for place, each in enumerate(self.reaches):
+            if fault := self._fault(each.reach):
+                raise InputError(
+                    f"reaches[{place}]: {fault}, so it is about another hand than {self.hand.name} "
+                    "of this file; run `graspproof reach` again, or remove it"
+                )
+
+    def _fault(self, reach: HandReach) -> str:
+        """Say why a pose cannot be one of the hand; empty if it can."""
+        if reach.hand != self.hand.name:
+            return f"the pose is one of {reach.hand}"
+        if reach.joints is None or reach.palm_pose is None or reach.fingers is None:
+            return ""
+        known, fingers = len(self.hand.joints), reach.fingers.tolist()
+        if len(reach.joints) != known or max(fingers, default=0) >= len(self.hand.fingers):
+            return f"the pose has {len(reach.joints)} joints for {known}, and fingers {fingers}"
+        touched = np.array([contact.position for contact in reach.contacts or ()])
+        off = np.abs(tip_distances(self.hand, reach.joints, reach.palm_pose, fingers, touched))
+        if off.max(initial=0.0) > TOUCHING_M:
+            return f"a fingertip is {1e3 * float(off.max()):.3g} mm off its contact"
+        return ""
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps by how the search ended: reached, or why not."""
+        reasons = [each.reach.reason for each in self.reaches]
+        return {
+            "grasps": len(reasons),
+            "reached": reasons.count(""),
+            "limit": reasons.count("limit"),
+            "collision": reasons.count("collision"),
+            "not_found": reasons.count("not found"),
+            "no_closure": reasons.count("no closure"),
+        }
+
+    def finger_names(self, reach: HandReach) -> tuple[str, ...]:
+        """Name the finger at each contact; none for a grasp that is not reached."""
+        used = () if reach.fingers is None else reach.fingers
+        return tuple(self.hand.fingers[int(finger)].name for finger in used)

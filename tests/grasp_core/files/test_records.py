@@ -1,0 +1,193 @@
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pytest
+
+import grasp_core as gc
+from grasp_core.arrays import Array, Indices, Point, Shape, UnitVector
+from grasp_core.declared import Declared
+from grasp_core.files.json_text import value_of
+from grasp_core.files.records import (
+    FLAT,
+    UNRECORDED,
+    Key,
+    RecordFile,
+    from_record,
+    record_of,
+    recorded,
+)
+from grasp_core.kinds import (
+    Count,
+    Direction,
+    Many,
+    Measured,
+    OrInfinity,
+    Quantity,
+    Seed,
+    Vector,
+)
+from tests.damaged import check_refused, damaged, optional_keys, value_at
+
+
+class Colour(StrEnum):
+    RED = "red"
+    BLUE = "blue"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part(Declared):
+    point: Annotated[Point, Key("point_m")]
+    way: UnitVector
+    size: Annotated[Quantity, Key("size_m")] = 1.0
+
+    @recorded
+    def double_m(self) -> float:
+        return 2.0 * self.size
+
+    @recorded
+    def turned(self) -> Array:
+        return -self.way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flat(Declared):
+    shift: Vector = (0.0, 0.0, 1.0)
+    axis: Direction = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Whole(Declared):
+    hidden: Annotated[object, UNRECORDED]
+    text: str
+    word: Literal["a", "b"]
+    colour_name: Colour
+    path: Path
+    on: bool
+    count: Count
+    seed: Seed
+    never: OrInfinity
+    lost: Measured
+    pair: tuple[Count, str]
+    parts: Annotated[tuple[Part, ...], Many(1, 3)]
+    table: Mapping[str, Part]
+    numbers: Annotated[Mapping[Literal["x", "y"], Quantity], Key("numbers_n")]
+    places: Annotated[Indices, Shape("k", whole=True)]
+    rows: Annotated[Array, Shape("k", 3)]
+    gaps: Annotated[Array, Shape(None, nan=True)]
+    part: Part | None
+    flat: Annotated[Flat, FLAT] = field(default_factory=Flat)
+    free: Any = None
+    late: Annotated[Mapping[str, float], UNRECORDED] = field(default_factory=dict)
+
+
+PART = Part([0, 1, 2], [0, 0, 1], 0.1)
+WHOLE = Whole(
+    hidden="here", text="é", word="b", colour_name=Colour.BLUE, path=Path("a/b"), on=True, count=2,
+    seed=2**64 - 1, never=0.5, lost=1e-300, pair=(1, "x"), parts=(PART, Part([3, 4, 5], [1, 0, 0])),
+    table={"one": PART}, numbers={"y": 2.0}, places=[1, 2], rows=np.eye(3)[:2], gaps=[1.0, np.nan],
+    part=PART, flat=Flat((1, 2, 3)), free={"any": [1, None]},
+)  # fmt: skip
+
+
+def read(text):
+    return from_record(Whole, value_of(text), hidden="here")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {}, {"never": math.inf}, {"lost": math.nan}, {"part": None}, {"table": {}},
+        {"places": [], "rows": np.empty((0, 3))}, {"gaps": []},
+    ],
+)  # fmt: skip
+def test_a_value_is_read_as_it_was_written(change):
+    value = replace(WHOLE, **change)
+    found = read(json.dumps(record_of(value), allow_nan=False))
+    assert found == value
+    assert record_of(found) == record_of(value)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PartFile(RecordFile):
+    FILE, SCHEMA = "part", 3
+    part: Annotated[Part, FLAT]
+
+
+def test_a_record_can_have_a_file_with_a_schema():
+    text = PartFile(PART).text()
+    assert json.loads(text) == {
+        "schema": 3, "point_m": [0, 1, 2], "way": [0, 0, 1], "size_m": 0.1, "double_m": 0.2,
+        "turned": [0, 0, -1],
+    }  # fmt: skip
+    assert PartFile.of_text(text).part == PART
+    with pytest.raises(gc.InputError, match="newer"):
+        PartFile.of_text(text.replace("3", "4", 1))
+
+
+def test_fields_have_their_keys_and_flat_ones_stand_among_them():
+    said = record_of(replace(WHOLE, never=math.inf, lost=math.nan))
+    assert said["never"] is None
+    assert said["lost"] is None
+    assert said["gaps"] == [1.0, None]
+    assert said["shift"] == [1, 2, 3]
+    assert said["colour_name"] == "blue"
+    assert not said.keys() & {"hidden", "late", "numbers", "flat"}
+
+
+def test_what_has_a_default_need_not_be_in_a_file():
+    said = {key: value for key, value in record_of(WHOLE).items() if key not in {"free", "axis"}}
+    assert from_record(Whole, said, hidden="here") == replace(WHOLE, free=None)
+
+
+def test_every_damaged_field_is_refused_by_its_name():
+    document = record_of(replace(WHOLE, gaps=[]))
+    del document["free"]  # which may hold anything
+    check_refused(
+        read, document, optional=optional_keys(Whole), loose={"table", "numbers_n"},
+        large={"shift", "never", "lost"},
+    )  # fmt: skip
+
+
+def test_what_a_recorded_property_says_otherwise_is_refused():
+    for place, other in (
+        (("parts", 1, "double_m"), 0.4),
+        (("part", "turned"), [0.0, 0.0, 1.0]),
+        (("part", "turned", 2), -1.000001),
+        (("table", "one", "double_m"), None),
+    ):
+        document = record_of(WHOLE)
+        value_at(document, place[:-1])[place[-1]] = other
+        name = [key for key in place if isinstance(key, str)][-1]
+        with pytest.raises(gc.InputError, match=f"{name}: .* contradicts the other fields"):
+            read(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"parts": []}, "parts must have a length of at least 1 and at most 3, got 0"),
+        ({"places": [1, 2, 3]}, "rows must have one entry for each of the 3 of places, got 2"),
+        ({"pair": [1]}, "pair must be 2 items: a whole number from 1 .*, text, got"),
+        ({"numbers_n": {"z": 1.0}}, "numbers_n"),
+        ({"rows": [[1.0, True, 0.0], [0, 0, 0]]}, "rows: expected numbers, got true or false"),
+    ],
+)
+def test_what_does_not_fit_is_told_by_field(change, says):
+    with pytest.raises(gc.InputError, match=says):
+        read(json.dumps(record_of(WHOLE) | change))
+
+
+def test_damage_is_everywhere_and_always_the_same():
+    document = {"a": 1, "b": [{"c": "x"}, {"c": "y"}], "d": None}
+    faults = [(what, place) for what, place, _ in damaged(document)]
+    assert {place[-1] for _, place in faults} >= {"a", "b", "c", "d"}
+    assert faults == [(what, place) for what, place, _ in damaged(document)]
+    assert len(list(damaged(document, count=3))) == 3
+    texts = [json.dumps(changed) for *_, changed in damaged(document)]
+    assert json.dumps(document) not in texts
