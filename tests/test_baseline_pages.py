@@ -74,7 +74,7 @@ def test_all_settings_are_shown(tmp_path):
     assert suite.baseline == tmp_path / "wedge.baseline.json"
     assert suite.noise == dataclasses.replace(Noise(), friction=0.1)
     assert suite.survives
-    assert suite.execution.settings.trials == ("weight", "lift")
+    assert suite.execution.trials == ("weight", "lift")
 
 
 def test_all_fields_and_all_answers_are_described():

@@ -111,9 +111,7 @@ def examine(case):
     known = replace(case.grasp, critical_friction=critical)
     verdicts = [
         try_control(case.body, control, Agenda(), setup)
-        for control in negative_controls(
-            case.body, known, case.friction, case.place, setup.physics.torsion_m
-        )
+        for control in negative_controls(case.body, known, case.friction, case.place, setup)
     ]
     measured = bisected_limits(rig, near) if case.torsion else ramped_limits(rig, limits)
     return Found(

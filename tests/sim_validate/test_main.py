@@ -278,7 +278,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
 
     vertices, triangles = bumpy_ellipsoid(noise=0.001, subdivisions=3)
     trimesh.Trimesh(1e3 * vertices, triangles[5:], process=False).export(here / "scan.ply")
-    flags = ["--unit", "mm", "--patches", "10", "--limit", "2", "--out", "r"]
+    flags = ["--unit", "mm", "--patches.most", "10", "--limit", "2", "--out", "r"]
     fingers = ["--finger-radius-m", "0.004", "--approach-m", "0.03"]
     assert main(["run", "scan.ply", *flags, *fingers]) == Exit.GOOD
     shown = capsys.readouterr()
