@@ -17,6 +17,7 @@ from grasp_core.errors import InputError, SolverError, about
 from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS
+from grasp_core.grasp_tables import ById
 from grasp_core.kinds import Count, Family, Friction, MaxCones, NotNegative, Reserve
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
@@ -156,7 +157,7 @@ class GraspRegions(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Regions(RecordFile):
+class Regions(RecordFile, ById[GraspRegions]):
     """The certified regions of an object's grasps, as `regions.json` holds them."""
 
     FILE = "regions.json"
