@@ -53,7 +53,7 @@ def id_of(part):
     return part if part in (int, float) else None
 
 
-@pytest.mark.parametrize("command", set(COMMANDS) - {"dataset", "baseline"})
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"dataset", "baseline"}))
 def test_no_two_flags_of_a_command_have_one_name(command):
     counts = Counter(flag.name for flag in flags_of(COMMANDS[command]))
     assert [name for name, count in counts.items() if count > 1] == []
