@@ -2,6 +2,7 @@
 
 import copy
 import json
+import math
 import random
 from dataclasses import MISSING, is_dataclass
 from typing import get_args
@@ -109,3 +110,31 @@ def _records_in(kind):
     if isinstance(kind, type) and is_dataclass(kind):
         return [kind]
     return [inner for part in get_args(kind) for inner in _records_in(part)]
+
+
+def unbounded_keys(kind):
+    """Return the keys of numbers without an upper end, of a class and of those inside it."""
+    found = set()
+    for each in (*entries(kind).fields, *entries(kind).recorded):
+        if float in _parts(each.kind) and not any(math.isfinite(end) for end in _ends(each.kind)):
+            found.add(each.key)
+        for inner in _records_in(each.kind):
+            found |= unbounded_keys(inner)
+    return found
+
+
+def _parts(kind):
+    return {kind}.union(*map(_parts, (p for p in get_args(kind) if not _is_rule(p))))
+
+
+def _is_rule(part):
+    return hasattr(part, "holds") or not (isinstance(part, type) or get_args(part))
+
+
+def _ends(kind):
+    """Upper ends of the ranges of numbers in a kind."""
+    for part in get_args(kind):
+        most = getattr(part, "most", None)
+        below = getattr(part, "below", None)
+        yield from (float(end) for end in (most, below) if isinstance(end, int | float))
+        yield from _ends(part)

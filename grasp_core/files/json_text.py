@@ -23,7 +23,7 @@ LONGEST_ECHO = 40
 KINDS: Mapping[str, Collection[str]] = {
     "baseline": {"grasps_file"},
     "verdicts.json": {"verdicts"},
-    "regions.json": {"edge_clearance_m", "grasps"},
+    "regions.json": {"edge_clearance_m", "reserve", "grasps"},
     "executions.json": {"executions"},
     "manifest.json": {"units_sha256", "files"},
     "grasps.json": {"object", "grasps"},
@@ -90,10 +90,10 @@ def _check(holder: Any, nulls: bool, where: tuple[object, ...]) -> None:
 
 def check_kind(found: Mapping[str, Any], wanted: str) -> None:
     """Refuse a JSON file of graspproof that is of another kind than the one asked for."""
-    if wanted in KINDS and set(KINDS[wanted]) <= found.keys():
-        return
+    own = set(KINDS.get(wanted, ()))
     for kind, keys in KINDS.items():
-        if kind != wanted and set(keys) <= found.keys():
+        other = set(keys)
+        if kind != wanted and other <= found.keys() and not (own - other) & found.keys():
             beside = " beside it" if wanted == "grasps.json" and kind in BESIDE else ""
             raise InputError(
                 f"this is {_with_article(kind)}, not {_with_article(wanted)}; "

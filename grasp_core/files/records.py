@@ -9,7 +9,7 @@ field whose own fields stand in the object itself; where it may be None, they ar
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cache, partial
@@ -30,7 +30,7 @@ from typing import (
     get_type_hints,
 )
 
-from grasp_core.declared import Declared, FieldError, default_of, rules, types
+from grasp_core.declared import Declared, FieldError, check, default_of, rules, types
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of, shown, text_of
 from grasp_core.files.text_files import read_text
@@ -218,6 +218,8 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
     said = {each.name: taken.pop(each.name) for each in properties}
     try:
         made = kind(**taken, **beside)
+        if not isinstance(made, Declared):
+            check(made)
     except FieldError as error:
         key = next((each.key for each in own if each.name == error.name), error.name)
         raise FieldError(at(where, key), error.fault) from None
@@ -225,10 +227,10 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
         raise placed(error, where) from None
     for each in properties:
         ours = each.write(getattr(made, each.name))
-        if not _agree(said[each.name], ours):
+        for place, given_there, ours_there in _differences(said[each.name], ours):
             raise InputError(
-                f"{at(where, each.key)}: {_told(said[each.name])} contradicts the other fields, "
-                f"which say {_told(ours)}; write the file again, or remove it"
+                f"{at(where, each.key)}{place}: {_told(given_there)} contradicts the other fields, "
+                f"which say {_told(ours_there)}; write the file again, or remove it"
             )
     return made
 
@@ -319,26 +321,40 @@ def _values_read(kind: Any) -> Read | None:
     return read
 
 
+ABSENT = object()
+"""What a file says where it lacks a key, or has one too many."""
+
+
 def _told(value: Any) -> str:
     """Write a value for a message; of a list, how many items it has."""
+    if value is ABSENT:
+        return "nothing"
     return f"a list of {len(cast('list[Any]', value))}" if isinstance(value, list) else shown(value)
 
 
-def _agree(said: Any, ours: Any) -> bool:
-    """Return whether a file and its other fields say the same: numbers up to rounding.
+def _differences(said: Any, ours: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield where a file and its other fields say different things: numbers up to rounding.
 
     Of sentences only the number counts, which another version may word otherwise.
     """
     if isinstance(said, list) and isinstance(ours, list):
         theirs, own = cast("list[Any]", said), cast("list[Any]", ours)
         texts = all(isinstance(each, str) for each in (*theirs, *own))
-        return len(theirs) == len(own) and (texts or all(map(_agree, theirs, own)))
-    if isinstance(said, dict) and isinstance(ours, dict):
+        if len(theirs) != len(own):
+            yield place, said, ours
+        elif not texts:
+            for number, (one, two) in enumerate(zip(theirs, own, strict=True)):
+                yield from _differences(one, two, f"{place}[{number}]")
+    elif isinstance(said, dict) and isinstance(ours, dict):
         mine, its = cast("dict[str, Any]", said), cast("dict[str, Any]", ours)
-        return mine.keys() == its.keys() and all(_agree(mine[key], its[key]) for key in its)
-    if isinstance(said, float) and isinstance(ours, float | int):
-        return math.isclose(said, ours, rel_tol=SAME, abs_tol=SAME * SAME)
-    return type(cast("Any", said)) is type(ours) and said == ours
+        for key in its | mine:
+            one, two = mine.get(key, ABSENT), its.get(key, ABSENT)
+            yield from _differences(one, two, f"{place}.{key}")
+    elif isinstance(said, float) and isinstance(ours, float | int):
+        if not math.isclose(said, ours, rel_tol=SAME, abs_tol=SAME * SAME):
+            yield place, said, ours
+    elif type(cast("Any", said)) is not type(ours) or said != ours:
+        yield place, said, ours
 
 
 class RecordFile(Declared):

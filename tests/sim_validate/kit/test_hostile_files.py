@@ -206,7 +206,7 @@ def test_links_that_lead_out_are_not_followed(tmp_path):
 
 KINDS = {
     "verdicts.json": {"schema": 2, "verdicts": []},
-    "regions.json": {"schema": 3, "edge_clearance_m": 0, "grasps": []},
+    "regions.json": {"schema": 3, "edge_clearance_m": 0, "reserve": 0, "grasps": []},
     "executions.json": {"schema": 1, "executions": []},
     "baseline": {"schema": 1, "grasps_file": "a"},
     "manifest.json": {"schema": 1, "units_sha256": "", "files": []},
