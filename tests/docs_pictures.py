@@ -15,17 +15,14 @@ from PIL import Image
 
 import grasp_core as gc
 import scenes
-from scenes.drawing.colours import FINGERS
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
 from scenes.drawing.pictures import grasp_figure, grasp_sheet
-from scenes.drawing.sheets import Dots, Sheet, Words, beside, moved, png_of
+from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, png_of
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.report.agreement import Agreement
-from sim_validate.report.charts.margin_charts import margin_figure
-from sim_validate.report.charts.motion_charts import motion_panels
-from sim_validate.report.charts.run_charts import fidelity_panel
-from sim_validate.report.charts.wrench_charts import wrench_figure
+from sim_validate.report.grasp_charts import margin_figure, wrench_figure
+from sim_validate.report.run_charts import fidelity_panel, motion_panels
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.text_files import write_parts
-from scenes.drawing.colours import FINGERS, rgb
+from scenes.drawing.sheets import FINGERS, rgb
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.held_mjcf import HeldScene
 

@@ -25,8 +25,7 @@ from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.hands import PosedHand, hand_shapes
-from scenes.drawing.painting import feature_edges
-from scenes.drawing.shapes import Shape, cone_rim, cone_sides, tube
+from scenes.drawing.painting import Shape, cone_rim, cone_sides, feature_edges, tube
 from scenes.drawing.sheets import closed
 from scenes.drawing.views import Extent
 

@@ -33,7 +33,7 @@ from grasp_core.hands.reach import with_balls
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.shapes import Role, Shape
+from scenes.drawing.painting import Role, Shape
 from scenes.drawing.views import DISTANCE, SAME_MERIT, Alone, View, edge_on, least_gaps, views_at
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.colours import NEUTRAL
-from scenes.drawing.sheets import LETTER, Area, Dots, Line, Mark, Words, ink_line
+from scenes.drawing.sheets import LETTER, NEUTRAL, Area, Dots, Line, Mark, Words, ink_line
 
 NARROW, WIDE = set("ijl.,:;|'!fItr()[] -"), set("mwMW@%+=<>≤")
 NARROW_WIDTH, USUAL_WIDTH, WIDE_WIDTH = 0.42, 0.66, 1.0

@@ -15,13 +15,22 @@ from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.values import Grasp
-from scenes.drawing.colours import FINGERS, NEUTRAL
 from scenes.drawing.drawings import BAR_LENGTH, drawing_of, drawing_with_hand, finger_size, glass
 from scenes.drawing.hands import PosedHand, numbers_behind, posed_hand, view_of_hand
-from scenes.drawing.painting import Patch, painted
+from scenes.drawing.painting import LOOKS, Patch, Role, Shape, colour_of, extent_of, painted
 from scenes.drawing.panels import ROW, Entry, keyed, thinned
-from scenes.drawing.shapes import LOOKS, Role, Shape, colour_of, extent_of
-from scenes.drawing.sheets import Area, Dots, Line, Mark, Sheet, closed, format_of, numbered
+from scenes.drawing.sheets import (
+    FINGERS,
+    NEUTRAL,
+    Area,
+    Dots,
+    Line,
+    Mark,
+    Sheet,
+    closed,
+    format_of,
+    numbered,
+)
 from scenes.drawing.views import Extent, View, best_view
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
-from scenes.hand_files.couplings import followers
-from scenes.hand_files.fingers import Chains, TipBall, chains, frames, tip_ball
+from scenes.hand_files.fingers import Chains, TipBall, chains, followers, frames, tip_ball
 from scenes.hand_files.model import HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text
 

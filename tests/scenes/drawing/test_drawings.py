@@ -15,7 +15,7 @@ from scenes.drawing.drawings import (
     glass,
     rulings,
 )
-from scenes.drawing.shapes import Shape, cone_sides, extent_of, ring, tube
+from scenes.drawing.painting import Shape, cone_sides, extent_of, ring, tube
 from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
 

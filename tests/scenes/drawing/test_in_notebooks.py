@@ -8,8 +8,8 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.drawing import in_notebooks
-from scenes.drawing.colours import FINGERS
+from scenes.drawing import pages
+from scenes.drawing.sheets import FINGERS
 
 SVG = "{http://www.w3.org/2000/svg}"
 EVIL = "<script>alert('&')</script>"
@@ -83,7 +83,7 @@ def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatc
     elsewhere = replace(plan, body=scenes.example_object("dodecahedron"))
     assert elsewhere._repr_html_() is None
     assert repr(elsewhere).startswith("Plan(")
-    monkeypatch.setattr(in_notebooks, "MOST_CORNERS", 10)
+    monkeypatch.setattr(pages, "MOST_CORNERS", 10)
     found, cells = read(plan.body)
     assert found.find(f".//{SVG}path") is None
     assert "67.74 mm" in cells

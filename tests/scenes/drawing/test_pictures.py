@@ -13,13 +13,25 @@ import scenes
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_hull
 from scenes.drawing import pictures
-from scenes.drawing.colours import BAD, FINGERS, FOCUS, GOOD, INK, SURFACE, rgb
 from scenes.drawing.drawings import BAR_RADIUS, drawing_of, glass
-from scenes.drawing.painting import Surface, outline, painted
+from scenes.drawing.painting import LOOKS, Shape, Surface, outline, painted
 from scenes.drawing.panels import width_of
 from scenes.drawing.pictures import grasp_figure, write_picture
-from scenes.drawing.shapes import LOOKS, Shape
-from scenes.drawing.sheets import ASSETS, FONT_FILES, FORMATS, Sheet, Words, png_of
+from scenes.drawing.sheets import (
+    ASSETS,
+    BAD,
+    FINGERS,
+    FOCUS,
+    FONT_FILES,
+    FORMATS,
+    GOOD,
+    INK,
+    SURFACE,
+    Sheet,
+    Words,
+    png_of,
+    rgb,
+)
 from scenes.drawing.views import FORESHORTENED, View, best_view
 from tests.scenes.drawing.whole import assert_whole
 from tests.scenes.meshes import sphere_mesh

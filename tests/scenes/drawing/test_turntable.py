@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.drawing.turntable import UNITS
+from scenes.drawing.pages import UNITS
 from sim_validate.main import main
 
 

@@ -1,4 +1,8 @@
-"""Charts of one trial over time: how far object and fingers moved, and how hard fingers pushed."""
+"""Charts of simulation: a trial over time, and simulated over predicted values.
+
+A trial's charts show how far object and fingers moved, and how hard fingers pushed. Points of
+simulated over predicted values should lie on the line of equal values.
+"""
 
 import math
 from collections.abc import Sequence
@@ -6,10 +10,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.colours import BAD, FINGERS, INK, NEUTRAL
-from scenes.drawing.panels import ROW, Entry, Panel, Scale, keyed, ticks_in
-from scenes.drawing.sheets import Mark, Sheet
+from scenes.drawing.panels import ROW, Entry, Panel, Scale, keyed, marker, ticks_between, ticks_in
+from scenes.drawing.sheets import (
+    BAD,
+    FINGERS,
+    GOOD,
+    INK,
+    NEUTRAL,
+    Area,
+    Dots,
+    Line,
+    Mark,
+    Sheet,
+    Words,
+)
 from sim_validate.closure.replaying import Replayed
+from sim_validate.closure.verdict import AGREEMENT
+from sim_validate.report.agreement import Agreement
 
 WIDTH, HEIGHT = 300.0, 316.0
 PLACE = (50.0, 28.0, 236.0, 180.0)
@@ -25,6 +42,11 @@ LEAST_UM = 1e-4
 """Displacement at which the chart's logarithmic axis begins [um]."""
 LEAST_PUSH = 1e-3
 """Share of a finger's largest push below which its use of friction is not shown."""
+PAIRS_WIDTH, PAIRS_HEIGHT = 360.0, 388.0
+PAIRS_PLACE = (70.0, 28.0, 280.0, 280.0)
+"""Left and upper border of what a panel draws in, its width and its height [pixels]."""
+LEAST_SHOWN = 0.5
+"""Place of zero on a logarithmic axis, relative to the least value above zero."""
 
 
 def motion_panels(found: Replayed, threshold_m: float) -> tuple[Sheet, Sheet, Sheet]:
@@ -103,3 +125,40 @@ def friction_used(pushes: Array, friction: Array) -> Array:
     pushing = normal > LEAST_PUSH * max(float(normal.max(initial=0.0)), 1e-12)
     safe = np.where(pushing, normal, 1.0) * friction[:, None]
     return np.where(pushing, tangential / safe, np.nan)
+
+
+def fidelity_panel(agreement: Agreement) -> Sheet:
+    """Draw simulated over predicted values of a quantity on logarithmic axes."""
+    name = f"{agreement.quantity}: simulated over predicted"
+    pairs = np.array(agreement.pairs).reshape(-1, 2)
+    if not (pairs > 0.0).any():
+        panel = Panel(*PAIRS_PLACE, Scale(0.0, 1.0), Scale(0.0, 1.0))
+        left, top, wide, high = PAIRS_PLACE
+        nothing = Words(left + 0.5 * wide, top + 0.5 * high, "none measured", "middle")
+        labels = panel.named(agreement.quantity, "predicted", "simulated")
+        return Sheet(PAIRS_WIDTH, PAIRS_HEIGHT, name, (*panel.frame([], []), *labels, nothing))
+    pairs = np.maximum(pairs, LEAST_SHOWN * pairs[pairs > 0.0].min())
+    ends = np.array([0.7 * pairs.min(), 1.4 * pairs.max()])
+    scale = Scale(float(ends[0]), float(ends[1]), log=True)
+    panel = Panel(*PAIRS_PLACE, scale, scale)
+    labels = [(tick, f"{tick:g}") for tick in ticks_between(scale.low, scale.high)]
+    low, high = (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends
+    band = np.vstack([panel.at(ends, low), panel.at(ends, high)[::-1]])
+    marks: list[Mark] = [*panel.frame(labels, labels), Area((band,), NEUTRAL, 0.3)]
+    marks.append(Line((panel.at(ends, ends),), NEUTRAL, 1.0))
+    key = [Entry("identity", NEUTRAL), Entry(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
+    off = np.array(agreement.differ())
+    if (~off).any():
+        marks.append(Dots(_pairs_on_sheet(panel, pairs[~off]), GOOD, 3.0))
+        key.append(Entry(f"{int((~off).sum())} agree", GOOD, "disc"))
+    if off.any():
+        marks += [marker("cross", place, 5.0, BAD) for place in _pairs_on_sheet(panel, pairs[off])]
+        key.append(Entry(f"{int(off.sum())} differ", BAD, "cross"))
+    below, _ = keyed(key, 8.0, PAIRS_HEIGHT - 2.0 * ROW, PAIRS_WIDTH - 8.0)
+    names = panel.named(agreement.quantity, "predicted", "simulated")
+    return Sheet(PAIRS_WIDTH, PAIRS_HEIGHT, name, (*marks, *names, *below))
+
+
+def _pairs_on_sheet(panel: Panel, pairs: Array) -> Array:
+    """Find where pairs are on the sheet, those within half a pixel of one another once, (k, 2)."""
+    return np.unique(np.rint(2.0 * panel.at(*pairs.T)), axis=0) / 2.0
