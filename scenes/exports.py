@@ -27,6 +27,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import FINGERS, Grasp
 from scenes.drawing import sheets
+from scenes.drawing.views import approaches
 from scenes.mujoco.fingertips import fitting_radius
 
 ROD_LENGTH = 0.5
@@ -83,7 +84,7 @@ def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedG
             tip_radius=(tip := radius or fitting_radius(plan.body, grasp.positions, grasp.normals)),
             rods=poses_along(
                 grasp.positions - tip * grasp.normals,
-                grasp.normals if grasp.approach_directions is None else grasp.approach_directions,
+                approaches(grasp),
             ),
             rod_length=length,
             figures=_figures(plan, grasp),

@@ -19,15 +19,16 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.checked import coefficient
+from grasp_core.checked import coefficient, instance
 from grasp_core.cones.spanning import angles_between
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import SAME_SHARE, first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.hands import PosedHand, hand_shapes
-from scenes.drawing.painting import Shape, cone_rim, cone_sides, feature_edges, tube
+from scenes.drawing.hands import PosedHand, hand_shapes, numbers_behind, view_of_hand
+from scenes.drawing.painting import Shape, feature_edges
 from scenes.drawing.sheets import closed
-from scenes.drawing.views import Extent
+from scenes.drawing.views import Extent, View, approaches, best_view
 
 RULINGS = 40
 PARALLEL = 1e-9
@@ -35,6 +36,8 @@ PARALLEL = 1e-9
 squared reach."""
 BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
 """Length and radius of a finger's bar, in finger sizes."""
+NUMBER_BEYOND = 0.12
+"""Distance of a finger's number from the end of its bar, in finger sizes."""
 CONE_LENGTH = 0.42
 """Length of a cone's sides, in finger sizes."""
 STOUT = 1.3
@@ -53,6 +56,8 @@ SLACK_RAD = 1e-6
 POLYGON = 3
 MOST_TRIANGLES = 2500
 """Largest number of triangles drawn for the object; finer surfaces are simplified first."""
+SIDES = 20
+"""Number of corners of the polygons that replace circles."""
 
 
 def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
@@ -91,29 +96,46 @@ def between(segments: Sequence[Array]) -> tuple[Array, ...]:
     return tuple(quads)
 
 
-def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
-    """List the shapes that show an object with a grasp."""
-    coefficient(friction)
+def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None = None) -> None:
+    """Refuse an object, grasp, friction or view that cannot be drawn."""
     check_on_faces(body, grasp)
-    shapes = [*glass(body)]
-    for finger in range(len(grasp.contacts)):
-        shapes += _finger(body, grasp, finger, math.atan(friction))
-    shapes += _family(body, grasp)
-    return (*shapes, Shape("contact", points=grasp.positions))
+    coefficient(friction)
+    if view is not None:
+        instance(view, View, "view", "View.of_angles makes one")
 
 
-def drawing_with_hand(
-    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand
+def drawing_of(
+    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
 ) -> tuple[Shape, ...]:
-    """List the shapes that show an object in a hand: no bars, and cones where the hand touches."""
-    coefficient(friction)
-    check_on_faces(body, grasp)
+    """List the shapes that show an object with a grasp.
+
+    A hand takes the place of bars, force cones and lines; friction cones are where it touches.
+    """
+    check_drawn(body, grasp, friction)
+    half_angle, fingers = math.atan(friction), range(len(grasp.contacts))
     shapes = [*glass(body)]
+    if held is None:
+        for finger in fingers:
+            shapes += _finger(body, grasp, finger, half_angle)
+        return (*shapes, *_family(body, grasp), Shape("contact", points=grasp.positions))
     for finger, contact in enumerate(held.contacts):
-        shapes.append(_friction_cone(body, contact, finger, math.atan(friction)))
-    for finger in range(len(grasp.contacts)):
+        shapes.append(_friction_cone(body, contact, finger, half_angle))
+    for finger in fingers:
         shapes += _region(grasp, finger)
     return (*shapes, *hand_shapes(held), Shape("contact", points=held.positions))
+
+
+def numbers_of(body: Extent, grasp: Grasp, held: PosedHand | None = None) -> Array:
+    """Return where the fingers' numbers are written, behind their bars or tips, (k, 3) [m]."""
+    if held is not None:
+        return numbers_behind(held)
+    beyond = (BAR_LENGTH + NUMBER_BEYOND) * finger_size(body)
+    return grasp.positions - beyond * approaches(grasp)
+
+
+def view_of(body: Polyhedron, grasp: Grasp, held: PosedHand | None = None) -> View:
+    """Choose a view in which a grasp is seen well, or the hand in it."""
+    return best_view(body, grasp) if held is None else view_of_hand(body, held)
 
 
 def finger_size(body: Extent) -> float:
@@ -159,8 +181,7 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
 
 def _finger(body: Extent, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
     contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
-    tip, ways, size = contact.position, grasp.approach_directions, finger_size(body)
-    inward = contact.normal if ways is None else ways[finger]
+    tip, inward, size = contact.position, approaches(grasp)[finger], finger_size(body)
     shapes = [
         Shape("finger", finger, polygons=bar(tip, inward, size)),
         _friction_cone(body, contact, finger, half_angle),
@@ -223,3 +244,33 @@ def _regulus(body: Extent, grasp: Grasp) -> list[Shape]:
 
 def _unit(vector: Array) -> Array:
     return vector / max(float(np.linalg.norm(vector)), np.finfo(np.float64).tiny)
+
+
+def ring(center: Array, axis: Array, radius: float) -> Array:
+    """Return points of a circle around a unit axis, (SIDES, 3)."""
+    # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
+    side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
+    side /= np.linalg.norm(side)
+    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    return center + radius * around
+
+
+def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
+    """Make the sides and the two ends of a round bar between two points."""
+    axis = (end - start) / np.linalg.norm(end - start)
+    low, high = ring(start, axis, radius), ring(end, axis, radius)
+    sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
+    return (*sides, low[::-1], high)
+
+
+def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
+    """Return the circle at the wide end of a cone with sides of a given length, (SIDES, 3)."""
+    height = length * math.cos(half_angle)
+    return ring(tip + height * axis, axis, length * math.sin(half_angle))
+
+
+def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tuple[Array, ...]:
+    """Make the triangles between the tip of a cone and its rim."""
+    rim = cone_rim(tip, axis, half_angle, length)
+    return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))

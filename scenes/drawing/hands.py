@@ -17,27 +17,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.checked import instance
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.reach import with_balls
+from grasp_core.hands.reach import HandReach, with_balls
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.painting import Role, Shape
 from scenes.drawing.views import DISTANCE, SAME_MERIT, Alone, View, edge_on, least_gaps, views_at
-
-if TYPE_CHECKING:
-    from grasp_core.hands.reach import HandReach
 
 STEPS = 3
 """Number of sides along a quarter of a circle."""
@@ -145,29 +144,29 @@ def _grid() -> tuple[Array, Truths]:
     return ways, signs > 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PosedHand:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PosedHand(Declared):
     """A hand in a pose in which its fingertips touch an object."""
 
     hand: Hand
-    joints: Array
+    joints: Annotated[Array, ArrayShape(None)]
     """Joint angles in the order of `hand.joints`, (j,) [rad]."""
-    palm_pose: Array
+    palm_pose: Annotated[Array, ArrayShape(POSE, POSE)]
     """Pose of the palm in the object's frame, (4, 4)."""
     fingers: tuple[int, ...]
     contacts: tuple[Contact, ...]
 
-    def __post_init__(self) -> None:
-        instance(self.hand, Hand, "hand", "load_hand makes one")
-        used = frozen_indices(self.fingers, (len(self.contacts),), "fingers")
-        object.__setattr__(self, "fingers", tuple(used.tolist()))
+    def _check_together(self) -> None:
         joints, known = len(self.hand.joints), range(len(self.hand.fingers))
-        object.__setattr__(self, "joints", frozen(self.joints, (joints,), "joints"))
-        object.__setattr__(self, "palm_pose", frozen(self.palm_pose, (POSE, POSE), "palm_pose"))
-        if len(set(self.fingers)) < len(self.fingers) or not set(self.fingers) <= set(known):
+        if len(self.joints) != joints:
+            raise InputError(
+                f"joints must hold the {joints} angles of the hand, got {len(self.joints)}"
+            )
+        used = set(self.fingers)
+        if not len(used) == len(self.fingers) == len(self.contacts) or not used <= set(known):
             raise InputError(
                 f"fingers must be different fingers of the hand, numbered from 0 to {known[-1]}, "
-                f"got {list(self.fingers)}"
+                f"one for each of {len(self.contacts)} contacts, got {list(self.fingers)}"
             )
 
     @property
@@ -192,10 +191,8 @@ class PosedHand:
         return np.array([contact.position for contact in self.contacts]).reshape(-1, 3)
 
 
-def posed_hand(hand: Hand, reach: "HandReach", grasp: Grasp) -> PosedHand:
+def posed_hand(hand: Hand, reach: HandReach, grasp: Grasp) -> PosedHand:
     """Take the pose from what `reach_with` found."""
-    from grasp_core.hands.reach import HandReach  # drawings without a hand need no search for one
-
     instance(hand, Hand, "hand", "load_hand makes one")
     instance(reach, HandReach, "reach", "reach_with finds one")
     if (reach.hand, reach.grasp) != (hand.name, grasp.id):

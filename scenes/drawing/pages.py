@@ -13,12 +13,12 @@ a second. Figures that a grasp has put off are left out, because the first of th
 
 import importlib
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from functools import cache
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -27,21 +27,14 @@ from grasp_core.checked import path_of
 from grasp_core.declared import ByValue
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.values import Grasp
-from scenes.drawing.drawings import drawing_of, drawing_with_hand, glass
-from scenes.drawing.hands import PosedHand, numbers_behind, view_of_hand
-from scenes.drawing.painting import LOOKS, SOLIDS, Role, Shape, colour_of
-from scenes.drawing.pictures import check_drawn, held_by, number_places
-from scenes.drawing.views import best_view
-
-if TYPE_CHECKING:
-    from grasp_core.hands.reach import HandReach
-from collections.abc import Iterable, Sequence
-
 from grasp_core.planning.result import Plan
-from scenes.drawing.drawings import bar, coarse
-from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, sheet_of
+from grasp_core.values import Grasp
+from scenes.drawing.drawings import bar, check_drawn, coarse, drawing_of, glass, numbers_of, view_of
+from scenes.drawing.hands import PosedHand
+from scenes.drawing.painting import Shape, look_of
+from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, held_by, sheet_of
 from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import Alone, Extent, View
 from scenes.mujoco.closure_scene import Scene
@@ -140,7 +133,7 @@ class Turntable(ByValue):
 
 def show(
     body: Polyhedron, grasp: Grasp, friction: float = 0.5, *, hand: Hand | None = None,
-    reach: "HandReach | None" = None,
+    reach: HandReach | None = None,
 ) -> Turntable:  # fmt: skip
     """Draw a grasp on its object, or with a hand, so that it can be turned with the mouse.
 
@@ -158,7 +151,7 @@ def show(
         InputError: The grasp does not lie on the body, the friction is out of range, or `reach`
             holds no pose of this hand in this grasp.
     """
-    check_drawn(body, grasp, friction, None)
+    check_drawn(body, grasp, friction)
     held = held_by(hand, reach, grasp)
     return Turntable(body.name, grasp.id, turntable_page(body, grasp, friction, held))
 
@@ -178,22 +171,17 @@ def grasp_data(
     """
     plain = len(glass(body))
     planned = drawing_of(body, grasp, friction)[plain:]
-    if held is None:
-        view, numbers = best_view(body, grasp), number_places(body, grasp)
-        shapes, hidden = planned, set[Role]()
-    else:
-        view, numbers = view_of_hand(body, held), numbers_behind(held)
-        shown = drawing_with_hand(body, grasp, friction, held)[plain:]
-        seen = {shape.role for shape in shown}
-        more = [shape for shape in planned if shape.role not in seen]
-        shapes, hidden = (*shown, *more), {shape.role for shape in more}
+    shown = planned if held is None else drawing_of(body, grasp, friction, held)[plain:]
+    roles = {shape.role for shape in shown}
+    more = [shape for shape in planned if shape.role not in roles]
+    view = view_of(body, grasp, held)
     return {
-        "shapes": [_shape(shape, body) for shape in shapes],
-        "numbers": _whole(numbers, body),
+        "shapes": [_shape(shape, body) for shape in (*shown, *more)],
+        "numbers": _whole(numbers_of(body, grasp, held), body),
         "axes": np.round(view.axes, 4).tolist(),
         "middle": _whole(view.center, body),
         "distance": round(UNITS * view.distance / body.radius),
-        "hidden": sorted(hidden),
+        "hidden": sorted({shape.role for shape in more}),
     }
 
 
@@ -242,19 +230,12 @@ def as_text(data: object) -> str:
 
 
 def _shape(shape: Shape, body: Polyhedron) -> dict[str, Any]:
-    look = LOOKS[shape.role]
+    look = look_of(shape)
     points = np.empty((0, 3)) if shape.points is None else shape.points
     return {
         "role": shape.role,
         "finger": shape.finger,
-        "colour": colour_of(shape),
-        "fill": look.fill,
-        "line": look.line,
-        "dot": look.dot,
-        "opacity": look.opacity,
-        "shaded": look.shaded,
-        "dashed": look.dashed,
-        "solid": shape.role in SOLIDS,
+        **asdict(look),
         "polygons": [_whole(polygon, body) for polygon in shape.polygons] if look.fill else [],
         "lines": [_whole(line, body) for line in shape.lines] if look.line else [],
         "points": _whole(points, body),
@@ -337,8 +318,8 @@ def _alone(body: Polyhedron) -> str:
 def _plan(plan: Plan) -> str:
     body, drawing = plan.body, ""
     if len(plan):
-        shapes, numbers = drawing_of(body, plan[0], plan.friction), number_places(body, plan[0])
-        drawing = picture(shapes, body, best_view(body, plan[0]), numbers)
+        shapes, numbers = drawing_of(body, plan[0], plan.friction), numbers_of(body, plan[0])
+        drawing = picture(shapes, body, view_of(body, plan[0]), numbers)
     count = f"{len(plan)} grasp{'' if len(plan) == 1 else 's'}"
     title = f"{count} of {plan.body.name} at friction {plan.friction:g}"
     if not len(plan):

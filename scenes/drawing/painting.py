@@ -12,14 +12,14 @@ viewer and one that does not, it is the outline of the surface from there, and i
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, frozen
+from grasp_core.arrays import Array, Indices, Polygon
+from grasp_core.declared import Declared
 from grasp_core.geometry.polygons import convex_hull
-from grasp_core.solvers.ties import SAME_SHARE, first_best
 from scenes.drawing.sheets import FINGERS, FOCUS, GLASS, HAND, INK, SURFACE, hexed, rgb
 from scenes.drawing.views import View
 
@@ -27,28 +27,19 @@ Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
     "plane", "ruled surface", "contact", "hand", "fingertip",
 ]  # fmt: skip
-SIDES = 20
-"""Number of corners of the polygons that replace circles."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Shape(Declared):
     """One thing to draw: polygons, lines and points in the object's frame, with a role."""
 
     role: Role
     finger: int | None = None
-    polygons: tuple[Array, ...] = ()
+    polygons: tuple[Polygon, ...] = ()
     """Flat or nearly flat polygons, corners in order, each (k, 3) [m]."""
-    lines: tuple[Array, ...] = ()
-    points: Array | None = None
+    lines: tuple[Polygon, ...] = ()
+    points: Polygon | None = None
     """Single points, (k, 3) [m]; None if the shape has none."""
-
-    def __post_init__(self) -> None:
-        for name in ("polygons", "lines"):
-            parts = tuple(frozen(part, (None, 3), name) for part in getattr(self, name))
-            object.__setattr__(self, name, parts)
-        if self.points is not None:
-            object.__setattr__(self, "points", frozen(self.points, (None, 3), "points"))
 
     def vertices(self) -> Array:
         """Return all points of the shape, (n, 3) [m]."""
@@ -61,40 +52,12 @@ def extent_of(shapes: Iterable[Shape]) -> Array:
     return np.vstack([shape.vertices() for shape in shapes])
 
 
-def ring(center: Array, axis: Array, radius: float) -> Array:
-    """Return points of a circle around a unit axis, (SIDES, 3)."""
-    # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
-    side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
-    side /= np.linalg.norm(side)
-    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
-    return center + radius * around
-
-
-def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
-    """Make the sides and the two ends of a round bar between two points."""
-    axis = (end - start) / np.linalg.norm(end - start)
-    low, high = ring(start, axis, radius), ring(end, axis, radius)
-    sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
-    return (*sides, low[::-1], high)
-
-
-def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
-    """Return the circle at the wide end of a cone with sides of a given length, (SIDES, 3)."""
-    height = length * math.cos(half_angle)
-    return ring(tip + height * axis, axis, length * math.sin(half_angle))
-
-
-def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tuple[Array, ...]:
-    """Make the triangles between the tip of a cone and its rim."""
-    rim = cone_rim(tip, axis, half_angle, length)
-    return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))
-
-
 @dataclass(frozen=True, slots=True)
 class Look:
     """How shapes of one role, such as force cones, are drawn."""
 
+    colour: str = INK
+    """Colour of shapes that are no finger's."""
     fill: float = 0.0
     """Opacity of polygons, from 0 to 1."""
     line: float = 0.0
@@ -106,30 +69,31 @@ class Look:
     shaded: bool = False
     """Whether polygons are darker where they face away from the light."""
     dashed: bool = False
-    colour: str = INK
-    """Colour of shapes that are no finger's."""
+    solid: bool = False
+    """Whether shapes are convex bodies that nothing shines through."""
 
 
 LOOKS: dict[Role, Look] = {
-    "object": Look(fill=0.13, shaded=True, colour=GLASS),
+    "object": Look(GLASS, fill=0.13, shaded=True),
     "edge": Look(line=0.18, opacity=0.75),
-    "finger": Look(fill=1.0, shaded=True),
+    "finger": Look(fill=1.0, shaded=True, solid=True),
     "friction cone": Look(line=0.16, opacity=0.9),
     "force cone": Look(fill=0.28),
     "region": Look(fill=0.6),
     "line of force": Look(line=0.3, dashed=True),
-    "focus": Look(dot=1.9, colour=FOCUS),
-    "plane": Look(fill=0.16, line=0.3, colour=SURFACE),
-    "ruled surface": Look(fill=0.1, line=0.1, opacity=0.5, colour=SURFACE),
+    "focus": Look(FOCUS, dot=1.9),
+    "plane": Look(SURFACE, fill=0.16, line=0.3),
+    "ruled surface": Look(SURFACE, fill=0.1, line=0.1, opacity=0.5),
     "contact": Look(dot=1.2),
-    "hand": Look(fill=1.0, shaded=True, colour=HAND),
-    "fingertip": Look(fill=1.0, shaded=True, colour=HAND),
+    "hand": Look(HAND, fill=1.0, shaded=True, solid=True),
+    "fingertip": Look(HAND, fill=1.0, shaded=True, solid=True),
 }
 
 
-def colour_of(shape: Shape) -> str:
-    """Return the colour of a shape, written as #rrggbb."""
-    return LOOKS[shape.role].colour if shape.finger is None else FINGERS[shape.finger]
+def look_of(shape: Shape) -> Look:
+    """Return how a shape is drawn: as others of its role, in the colour of its finger."""
+    look = LOOKS[shape.role]
+    return look if shape.finger is None else replace(look, colour=FINGERS[shape.finger])
 
 
 SMOOTH_DEG = 20.0
@@ -155,8 +119,6 @@ SHADES = 7
 clear glass."""
 WHOLE: tuple[Role, ...] = ("friction cone",)
 """Roles whose lines are short, so that each is drawn whole."""
-SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
-"""Roles whose shapes are convex bodies that nothing shines through."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -295,34 +257,32 @@ def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Patch, .
 
 
 def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
-    look = LOOKS[shape.role]
+    look = look_of(shape)
     if look.fill and shape.polygons:
-        yield from FILLED.get(shape.role, _each)(shape, look, view)
+        paint = _solid if look.solid else FILLED.get(shape.role, _each)
+        yield from paint(shape, look, view)
     if shape.role == "object" and shape.polygons:
-        edge = Shape("edge")
-        for line in (*shape.lines, *outline(Surface.of(shape.polygons), view.camera)):
-            yield from _line(line, LOOKS["edge"], colour_of(edge), view, width)
-    elif shape.role in WHOLE:
-        for line in shape.lines:
+        for line in outline(Surface.of(shape.polygons), view.camera):
+            yield from _line(line, LOOKS["edge"], view, width)
+    for line in shape.lines if look.line else ():
+        if shape.role in WHOLE:
             flat, near = view.seen(line)
-            yield Patch((flat,), float(near.mean()), colour_of(shape), look.opacity,
+            yield Patch((flat,), float(near.mean()), look.colour, look.opacity,
                         width=0.01 * look.line * width)  # fmt: skip
-    elif look.line:
-        for line in shape.lines:
-            yield from _line(line, look, colour_of(shape), view, width)
+        else:
+            yield from _line(line, look, view, width)
     for point in () if shape.points is None else shape.points:
         place, (near,) = view.seen(point[None])
         # A dot is drawn in front of what it marks.
-        yield Patch((place,), float(near) + 0.02 * width, colour_of(shape), look.opacity,
+        yield Patch((place,), float(near) + 0.02 * width, look.colour, look.opacity,
                     radius=0.005 * look.dot * width)  # fmt: skip
 
 
 def _each(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
-    colour = colour_of(shape)
     for polygon in shape.polygons:
         flat, near = view.seen(polygon)
         shade = float(_brightness(_normal(polygon)[None], view)[0]) if look.shaded else 1.0
-        yield Patch((flat,), float(near.mean()), _shaded(colour, shade), look.fill)
+        yield Patch((flat,), float(near.mean()), _shaded(look.colour, shade), look.fill)
 
 
 def _glass(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
@@ -341,7 +301,7 @@ def _glass(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         for level in np.unique(levels[front == side]).tolist():
             loops = joined(surface, (front == side) & (levels == level))
             yield Patch(tuple(view.seen(loop)[0] for loop in loops), depth,
-                        _shaded(colour_of(shape), _shade(level)), look.fill)  # fmt: skip
+                        _shaded(look.colour, _shade(level)), look.fill)  # fmt: skip
 
 
 def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
@@ -349,7 +309,7 @@ def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
     corners = shape.vertices()
     middle = corners.mean(axis=0)
     flat, near = view.seen(corners)
-    depth, colour = float(near.mean()), colour_of(shape)
+    depth = float(near.mean())
     sides = list[tuple[Array, int]]()
     for polygon in shape.polygons:
         normal = _normal(polygon)
@@ -357,24 +317,23 @@ def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         if normal @ (view.camera - polygon[0]) > 0.0:
             sides.append((polygon, int(_levels(_brightness(normal[None], view))[0])))
     mean = round(float(np.mean([level for _, level in sides] or [SHADES - 1])))
-    yield Patch((convex_hull(flat),), depth, _shaded(colour, _shade(mean)), look.fill)
+    yield Patch((convex_hull(flat),), depth, _shaded(look.colour, _shade(mean)), look.fill)
     for level in sorted({level for _, level in sides} - {mean}):
         alike = tuple(view.seen(polygon)[0] for polygon, other in sides if other == level)
-        yield Patch(alike, depth, _shaded(colour, _shade(level)), look.fill)
+        yield Patch(alike, depth, _shaded(look.colour, _shade(level)), look.fill)
 
 
 def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
     flat, near = view.seen(shape.vertices())
     for part in (convex_hull(flat), view.seen(rim)[0]):
-        yield Patch((part,), float(near.mean()), colour_of(shape), look.fill)
+        yield Patch((part,), float(near.mean()), look.colour, look.fill)
 
 
 FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
-    "object": _glass,
-    "force cone": _cone,
-    **dict.fromkeys(SOLIDS, _solid),
-}
+    "object": _glass, "force cone": _cone,
+}  # fmt: skip
+"""How areas of some roles are drawn, other than each on its own."""
 
 
 def _normal(polygon: Array) -> Array:
@@ -410,7 +369,7 @@ def _shaded(colour: str, shade: float) -> str:
     return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
 
 
-def _line(line: Array, look: Look, colour: str, view: View, width: float) -> Iterator[Patch]:
+def _line(line: Array, look: Look, view: View, width: float) -> Iterator[Patch]:
     flat, near = view.seen(line)
     thick = 0.01 * look.line * width
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
@@ -419,7 +378,7 @@ def _line(line: Array, look: Look, colour: str, view: View, width: float) -> Ite
             for low, high in _spans(length / width, look):
                 ends = np.array([start + low * (end - start), start + high * (end - start)])
                 depth = float(first + 0.5 * (low + high) * (last - first)) + 0.5 * thick
-                yield Patch((ends,), depth, colour, look.opacity, width=thick)
+                yield Patch((ends,), depth, look.colour, look.opacity, width=thick)
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:

@@ -3,21 +3,20 @@
 from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import coefficient, instance, path_of, switch
+from grasp_core.checked import path_of, switch
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import BAR_LENGTH, drawing_of, drawing_with_hand, finger_size, glass
-from scenes.drawing.hands import PosedHand, numbers_behind, posed_hand, view_of_hand
-from scenes.drawing.painting import LOOKS, Patch, Role, Shape, colour_of, extent_of, painted
+from scenes.drawing.drawings import check_drawn, drawing_of, glass, numbers_of, view_of
+from scenes.drawing.hands import PosedHand, posed_hand
+from scenes.drawing.painting import LOOKS, Patch, Role, Shape, extent_of, painted
 from scenes.drawing.panels import ROW, Entry, keyed, thinned
 from scenes.drawing.sheets import (
     FINGERS,
@@ -31,10 +30,7 @@ from scenes.drawing.sheets import (
     format_of,
     numbered,
 )
-from scenes.drawing.views import Extent, View, best_view
-
-if TYPE_CHECKING:
-    from grasp_core.hands.reach import HandReach
+from scenes.drawing.views import Extent, View
 
 SIDE = 500
 """Width of a picture, and its height without the key [pixels]."""
@@ -53,8 +49,6 @@ MARGIN = 0.04
 """Width of the empty margin, as a share of the picture's width."""
 FARTHEST = 2.0
 """Distance from the object's centre beyond which points may be cut off, in object radii."""
-NUMBER_BEYOND = 0.12
-"""Distance of a finger's number from the end of its bar, in finger sizes."""
 EXPLAINED: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
     "ruled surface", "hand",
@@ -71,7 +65,7 @@ def write_picture(
     *,
     view: View | None = None,
     hand: Hand | None = None,
-    reach: "HandReach | None" = None,
+    reach: HandReach | None = None,
 ) -> Path:
     """Draw a grasp in the style of the paper, or with the hand in it, and write it to a file.
 
@@ -88,11 +82,8 @@ def write_picture(
         InputError: The ending is unknown, the grasp does not lie on the body, the friction is out
             of range, or `reach` holds no pose of this hand in this grasp.
     """
-    path = path_of(path, "path")
-    format_of(path)
-    held = held_by(hand, reach, grasp)
-    sheet = grasp_sheet(body, grasp, friction, view=view, legend=True, held=held)
-    return sheet.write(path)
+    format_of(path_of(path, "path"))  # before the work
+    return grasp_figure(body, grasp, friction, view=view, hand=hand, reach=reach).write(path)
 
 
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
@@ -124,7 +115,7 @@ def _middle(face: Face) -> Array:
 
 def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
-    legend: bool = True, hand: Hand | None = None, reach: "HandReach | None" = None,
+    legend: bool = True, hand: Hand | None = None, reach: HandReach | None = None,
 ) -> Sheet:  # fmt: skip
     """Draw a grasp as `write_picture` does, as a sheet that a notebook shows.
 
@@ -143,12 +134,10 @@ def grasp_sheet(
     check_drawn(body, grasp, friction, view)
     switch(legend, "legend")
     name = f"Grasp {grasp.id} of {body.name}"
-    if held is None:
-        shapes, numbers = drawing_of(body, grasp, friction), number_places(body, grasp)
-        view = view or best_view(body, grasp)
-    else:
-        shapes, numbers = drawing_with_hand(body, grasp, friction, held), numbers_behind(held)
-        view, name = view or view_of_hand(body, held), f"{name} with the hand {held.hand.name}"
+    if held is not None:
+        name += f" with the hand {held.hand.name}"
+    shapes, numbers = drawing_of(body, grasp, friction, held), numbers_of(body, grasp, held)
+    view = view or view_of(body, grasp, held)
     sheet = sheet_of(shapes, body, view, name, numbers=numbers, side=SIDE)
     if not legend:
         return sheet
@@ -207,15 +196,7 @@ def _together(marks: Iterable[Mark]) -> Iterable[Mark]:
             yield Line(lines, *look)
 
 
-def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None) -> None:
-    """Refuse an object, grasp, friction or view that cannot be drawn."""
-    check_on_faces(body, grasp)
-    coefficient(friction)
-    if view is not None:
-        instance(view, View, "view", "View.of_angles makes one")
-
-
-def held_by(hand: Hand | None, reach: "HandReach | None", grasp: Grasp) -> PosedHand | None:
+def held_by(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
     """Take a hand in its pose from what a user gave; None if nothing was given."""
     if hand is None and reach is None:
         return None
@@ -226,12 +207,6 @@ def held_by(hand: Hand | None, reach: "HandReach | None", grasp: Grasp) -> Posed
             "reach = gc.reach_with(hand, body, grasp, friction)"
         )
     return posed_hand(hand, reach, grasp)
-
-
-def number_places(body: Extent, grasp: Grasp) -> Array:
-    """Return where the fingers' numbers are written, behind their bars, (4, 3) [m]."""
-    ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
-    return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * finger_size(body) * ways
 
 
 def frame_around(
@@ -257,7 +232,7 @@ def _entries(shapes: Sequence[Shape]) -> list[Entry]:
         if role not in found:
             continue
         look, shape = LOOKS[role], found[role]
-        colour = NEUTRAL if shape.finger is not None else colour_of(shape)
+        colour = NEUTRAL if shape.finger is not None else look.colour
         if look.dot:
             entries.append(Entry(role, colour, "disc"))
         elif look.fill == 1.0:

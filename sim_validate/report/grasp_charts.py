@@ -25,8 +25,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
+from scenes.drawing.drawings import check_drawn
 from scenes.drawing.panels import ROW, SMALL, Entry, Panel, Scale, keyed, thinned, ticks_in
-from scenes.drawing.pictures import check_drawn
 from scenes.drawing.sheets import (
     BAD,
     GOOD,
@@ -120,7 +120,7 @@ def margins(
     body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
 ) -> tuple[Array, Array]:
     """Compute the largest force [N] and torque [mN m] resisted, (LATITUDES, LONGITUDES) each."""
-    check_drawn(body, grasp, friction, None)
+    check_drawn(body, grasp, friction)
     positive(max_normal_force_n, "max_normal_force_n")
     certificate = force_closure(grasp, friction=friction)
     if certificate.forces is None:
