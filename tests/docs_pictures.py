@@ -110,12 +110,7 @@ def misplaced():
     header, _, *rows = kept_by_distance()
     distances = np.array([float(cell) for cell in header[1:]])
     panel = Panel(70.0, 28.0, 500.0, 240.0, Scale(0.0, float(distances.max())), Scale(0.0, 1.02))
-    marks = [
-        *panel.frame(
-            [(each, f"{each:g}") for each in distances.tolist()],
-            [(share, f"{share:.0%}") for share in (0.0, 0.25, 0.5, 0.75, 1.0)],
-        )
-    ]
+    marks = [*panel.frame(distances.tolist(), (0.0, 0.25, 0.5, 0.75, 1.0), ".0%")]
     for colour, (_, *cells) in zip(FINGERS, rows, strict=True):
         counts = np.array([[int(part) for part in cell.split(" of ")] for cell in cells])
         shares = counts[:, 0] / counts[:, 1]

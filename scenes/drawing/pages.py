@@ -45,6 +45,26 @@ ASSETS = Path(__file__).parent / "assets"
 NOTHING = "-"
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""
+UNITS = 1000.0
+"""Number of units of length in one object radius."""
+MILLI = 1e3
+WIDTH, HEIGHT = 900, 640
+Fact: TypeAlias = tuple[str, str, str]
+"""Name, value and meaning of a figure on a page."""
+DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
+CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
+MARGIN = "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
+QUALITY = (
+    "largest wrench resisted in every direction, with normal forces of sum 1 N; torques over the "
+    "object's radius"
+)
+SIDE = 260
+MOST_CORNERS = 20_000
+"""Largest number of points that are drawn: they take a third of a second, and a megabyte."""
+ROWS = 5
+COLUMNS = 4
+CM3 = 1e6
+Row = Sequence[str]
 
 
 def filled(template: str, folder: Path = ASSETS, **values: object) -> str:
@@ -86,21 +106,6 @@ def number(value: float | None, digits: int = 3) -> str:
         return NOTHING
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e+0" in text and abs(value) < MILLION else text
-
-
-UNITS = 1000.0
-"""Number of units of length in one object radius."""
-MILLI = 1e3
-WIDTH, HEIGHT = 900, 640
-Fact: TypeAlias = tuple[str, str, str]
-"""Name, value and meaning of a figure on a page."""
-DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
-CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
-MARGIN = "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
-QUALITY = (
-    "largest wrench resisted in every direction, with normal forces of sum 1 N; torques over the "
-    "object's radius"
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -247,15 +252,6 @@ def _whole(points: Array, body: Polyhedron) -> Any:
     return np.rint(UNITS / body.radius * (points - body.center_of_mass)).astype(int).tolist()
 
 
-SIDE = 260
-MOST_CORNERS = 20_000
-"""Largest number of points that are drawn: they take a third of a second, and a megabyte."""
-ROWS = 5
-COLUMNS = 4
-MM, CM3 = 1e3, 1e6
-Row = Sequence[str]
-
-
 def html_of(value: object) -> str | None:
     """Return a picture of a value with its figures; None for a value that has no picture."""
     if isinstance(value, Plan):
@@ -268,7 +264,7 @@ def html_of(value: object) -> str | None:
     return card(_alone(value), value.name, [
         ("faces" if value.patches is None else "patches", str(len(value.faces))),
         ("triangles", str(len(value.triangles))),
-        ("radius", f"{MM * value.radius:.4g} mm"),
+        ("radius", f"{MILLI * value.radius:.4g} mm"),
         ("volume" if value.surface.closed else "volume of the hull",
          f"{CM3 * value.volume:.4g} cm³"),
     ])  # fmt: skip
@@ -326,7 +322,12 @@ def _plan(plan: Plan) -> str:
         return card(_alone(body), title, [(plan.absence or "",)])
     rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
     rows += [
-        (g.id, g.family, f"{MM * g.radius:.3g} mm" if g.radius else "-", f"{g.closure_margin:.4g}")
+        (
+            g.id,
+            g.family,
+            f"{MILLI * g.radius:.3g} mm" if g.radius else "-",
+            f"{g.closure_margin:.4g}",
+        )
         for g in plan[:ROWS]
     ]
     return card(drawing, title, [*rows, ("...",)] if len(plan) > ROWS else rows)

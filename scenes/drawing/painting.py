@@ -27,6 +27,29 @@ Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
     "plane", "ruled surface", "contact", "hand", "fingertip",
 ]  # fmt: skip
+SMOOTH_DEG = 20.0
+"""Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
+MOST_EDGES = 1500
+"""Largest number of edges drawn; of more, as scans have them, only the sharpest are drawn."""
+SAME_POINT = 1e-6
+"""Distance up to which two corners count as one, relative to the size of the surface."""
+LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
+"""Direction towards the light, as (right, up, towards the viewer): from the left, above and in
+front."""
+DARKEST = 0.55
+"""Brightness of a side that faces away from the light, as a share of its colour."""
+DASHES = 24
+"""Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
+PIECES = 8
+"""Number of parts in a solid line as long as the picture is wide; each part has its own depth."""
+FEW = 100
+"""Number of polygons of a surface up to which each has its own depth; of more, those that are
+equally bright and on the same side are joined."""
+SHADES = 7
+"""Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
+clear glass."""
+WHOLE: tuple[Role, ...] = ("friction cone",)
+"""Roles whose lines are short, so that each is drawn whole."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -94,31 +117,6 @@ def look_of(shape: Shape) -> Look:
     """Return how a shape is drawn: as others of its role, in the colour of its finger."""
     look = LOOKS[shape.role]
     return look if shape.finger is None else replace(look, colour=FINGERS[shape.finger])
-
-
-SMOOTH_DEG = 20.0
-"""Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
-MOST_EDGES = 1500
-"""Largest number of edges drawn; of more, as scans have them, only the sharpest are drawn."""
-SAME_POINT = 1e-6
-"""Distance up to which two corners count as one, relative to the size of the surface."""
-LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
-"""Direction towards the light, as (right, up, towards the viewer): from the left, above and in
-front."""
-DARKEST = 0.55
-"""Brightness of a side that faces away from the light, as a share of its colour."""
-DASHES = 24
-"""Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
-PIECES = 8
-"""Number of parts in a solid line as long as the picture is wide; each part has its own depth."""
-FEW = 100
-"""Number of polygons of a surface up to which each has its own depth; of more, those that are
-equally bright and on the same side are joined."""
-SHADES = 7
-"""Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
-clear glass."""
-WHOLE: tuple[Role, ...] = ("friction cone",)
-"""Roles whose lines are short, so that each is drawn whole."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,7 +26,7 @@ from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
 from scenes.drawing.drawings import check_drawn
-from scenes.drawing.panels import ROW, SMALL, Entry, Panel, Scale, keyed, thinned, ticks_in
+from scenes.drawing.panels import SMALL, Entry, Panel, Scale, thinned, ticks_in
 from scenes.drawing.sheets import (
     BAD,
     GOOD,
@@ -51,7 +51,7 @@ from scenes.mujoco.fingertips import FingerSettings
 
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
-MAP_WIDTH, MAP_HEIGHT = 440.0, 300.0
+WIDTH, HEIGHT = 440.0, 300.0
 EDGE = 12.0
 """Width of the margins beside the scale of colours [pixels]."""
 MIDDLE, HALF = np.array([220.0, 130.0]), 100.0
@@ -72,7 +72,8 @@ NAMED = {
     "+x": (0.0, 0.0), "+y": (90.0, 0.0), "-y": (-90.0, 0.0), "+z": (0.0, 80.0), "-z": (0.0, -80.0),
     "-x": (172.0, 0.0),
 }  # fmt: skip
-WIDTH, HEIGHT = 300.0, 338.0
+SHADOW_SIZE = 300.0, 338.0
+"""Width and height of a panel [pixels]."""
 PLACE = (62.0, 28.0, 224.0)
 """Left and upper border of the square in which a panel draws, and its side [pixels]."""
 AROUND = 0.55
@@ -190,16 +191,16 @@ def _map(values: Array, kind: str, unit: str) -> Sheet:
         x, y = middle.tolist()
         marks += [Area((BOX + middle,), PAPER, 0.85), Words(x, y, name, "middle", SMALL)]
     marks += [outlined([circle(least, 6.0)], PAPER, 5.0), outlined([circle(least, 6.0)], BAD, 2.5)]
-    return Sheet(MAP_WIDTH, MAP_HEIGHT, title, (*marks, *_scale(low, high)))
+    return Sheet(WIDTH, HEIGHT, title, (*marks, *_scale(low, high)))
 
 
 def _scale(low: float, high: float) -> Iterator[Mark]:
     """Draw the colours of a map from its least to its largest value, and what its circle marks."""
-    top, long = MIDDLE[1] + HALF + 12.0, MAP_WIDTH - 2.0 * EDGE
+    top, long = MIDDLE[1] + HALF + 12.0, WIDTH - 2.0 * EDGE
     yield Image(EDGE, top, long, 10.0, np.arange(LEVELS)[None])
     ends = f"{low:.3g}", f"{high:.3g}"
     yield Words(EDGE, top + 20.0, ends[0], "start", SMALL)
-    yield Words(MAP_WIDTH - EDGE, top + 20.0, ends[1], "end", SMALL)
+    yield Words(WIDTH - EDGE, top + 20.0, ends[1], "end", SMALL)
     inside = [tick for tick in ticks_in(low, high) if low < tick < high] if high > low else []
     between = [
         tick for tick in inside if APART < (tick - low) / (high - low) < 1.0 - APART
@@ -331,9 +332,7 @@ def _shadow(
     x, y = (Scale(float(each - half), float(each + half)) for each in middle)
     panel = Panel(PLACE[0], PLACE[1], PLACE[2], PLACE[2], x, y)
     disc = circle(np.zeros(2), ball)
-    marks: list[Mark] = [*panel.frame(*(
-        [(tick, f"{tick:g}") for tick in ticks_in(scale.low, scale.high)] for scale in (x, y)
-    ))]  # fmt: skip
+    marks = [*panel.frame(ticks_in(x.low, x.high), ticks_in(y.low, y.high))]
     area = thinned(panel.at(*border.T))
     marks += [Area((area,), GOOD, 0.25), outlined([area], GOOD), *_hatched(panel, ball)]
     marks += [outlined([panel.at(*disc.T)], INK, 1.2)]
@@ -342,8 +341,7 @@ def _shadow(
     marks.append(Line(tuple(center + 4.0 * np.array(arm) for arm in CROSS), INK, 1.4))
     entries = [Entry("can be applied", GOOD, "area"), Entry("largest ball", INK)]
     entries += [Entry("limiting facet", BAD)] if facet else []
-    key, _ = keyed(entries, 8.0, HEIGHT - 2.0 * ROW, WIDTH - 8.0)
-    return Sheet(WIDTH, HEIGHT, names[0], (*marks, *panel.named(*names), *key))
+    return panel.sheet(SHADOW_SIZE, names, marks, entries)
 
 
 def _hatched(panel: Panel, radius: float) -> list[Mark]:

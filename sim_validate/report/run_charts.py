@@ -5,12 +5,11 @@ simulated over predicted values should lie on the line of equal values.
 """
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.panels import ROW, Entry, Panel, Scale, keyed, marker, ticks_between, ticks_in
+from scenes.drawing.panels import ROW, Entry, Panel, Scale, marker, ticks_between, ticks_in
 from scenes.drawing.sheets import (
     BAD,
     FINGERS,
@@ -28,7 +27,9 @@ from sim_validate.closure.replaying import Replayed
 from sim_validate.closure.verdict import AGREEMENT
 from sim_validate.report.agreement import Agreement
 
-WIDTH, HEIGHT = 300.0, 316.0
+SIZE = 300.0, 316.0
+"""Width and height of a panel of motion [pixels]."""
+TIME = "time since friction was lowered [s]"
 PLACE = (50.0, 28.0, 236.0, 180.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 KEY = 3.0 * ROW + 6.0
@@ -42,7 +43,7 @@ LEAST_UM = 1e-4
 """Displacement at which the chart's logarithmic axis begins [um]."""
 LEAST_PUSH = 1e-3
 """Share of a finger's largest push below which its use of friction is not shown."""
-PAIRS_WIDTH, PAIRS_HEIGHT = 360.0, 388.0
+PAIRS_SIZE = 360.0, 388.0
 PAIRS_PLACE = (70.0, 28.0, 280.0, 280.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 LEAST_SHOWN = 0.5
@@ -68,7 +69,7 @@ def _moved(found: Replayed, threshold_m: float) -> Sheet:
     steps = 10.0 ** np.arange(-4, math.log10(highest), 2)
     slips = list(zip(FINGERS, trace.slips_m.T, strict=False))
     marks = [
-        *panel.frame(_seconds(panel.x), [(step, f"{step:g}") for step in steps.tolist()]),
+        *panel.frame(ticks_in(panel.x.low, panel.x.high, 4), steps.tolist()),
         *(panel.curve(trace.times_s, MICRO * slip, colour) for colour, slip in slips),
         panel.curve(trace.times_s, MICRO * trace.displacements_m, INK, 1.8),
         panel.level(MICRO * threshold_m, BAD),
@@ -77,7 +78,7 @@ def _moved(found: Replayed, threshold_m: float) -> Sheet:
         Entry("object", INK), Entry("counts as moved", BAD, "dashes"),
         *(Entry(f"{place} slid", colour) for place, (colour, _) in enumerate(slips)),
     ]  # fmt: skip
-    return _sheet(panel, "displacement [µm]", marks, key)
+    return panel.sheet(SIZE, ("displacement [µm]", TIME, ""), marks, key, key_height=KEY)
 
 
 def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str] | None) -> Sheet:
@@ -85,10 +86,9 @@ def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str
     top = max(1.1 * float(finite.max(initial=0.0)), 1e-9)
     low = min(0.0, float(finite.min(initial=0.0)))
     panel = _panel(times, Scale(low, top if limit is None else MOST_SHARE * limit[0]))
-    ticks = [(tick, f"{tick:g}") for tick in ticks_in(panel.y.low, panel.y.high)]
     curves = list(zip(FINGERS, values.T, strict=False))
     marks = [
-        *panel.frame(_seconds(panel.x), ticks),
+        *panel.frame(ticks_in(panel.x.low, panel.x.high, 4), ticks_in(panel.y.low, panel.y.high)),
         *(panel.curve(times, np.where(np.isfinite(each), each, np.nan), colour)
           for colour, each in curves),
         panel.upright(0.0, NEUTRAL, dashed=True),
@@ -97,22 +97,12 @@ def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str
     if limit is not None:
         marks.append(panel.level(limit[0], BAD))
         key.append(Entry(limit[1], BAD, "dashes"))
-    return _sheet(panel, title, marks, key)
+    return panel.sheet(SIZE, (title, TIME, ""), marks, key, key_height=KEY)
 
 
 def _panel(times: Array, y: Scale) -> Panel:
     low, high = float(times.min(initial=0.0)), float(times.max(initial=0.0))
     return Panel(*PLACE, Scale(low, high if high > low else low + 1.0), y)
-
-
-def _seconds(x: Scale) -> list[tuple[float, str]]:
-    return [(tick, f"{tick:g}") for tick in ticks_in(x.low, x.high, 4)]
-
-
-def _sheet(panel: Panel, title: str, marks: Sequence[Mark], entries: Sequence[Entry]) -> Sheet:
-    below, _ = keyed(entries, 8.0, HEIGHT - KEY, WIDTH - 8.0)
-    names = panel.named(title, "time since friction was lowered [s]", "")
-    return Sheet(WIDTH, HEIGHT, title, (*marks, *names, *below))
 
 
 def friction_used(pushes: Array, friction: Array) -> Array:
@@ -130,21 +120,21 @@ def friction_used(pushes: Array, friction: Array) -> Array:
 def fidelity_panel(agreement: Agreement) -> Sheet:
     """Draw simulated over predicted values of a quantity on logarithmic axes."""
     name = f"{agreement.quantity}: simulated over predicted"
+    names = agreement.quantity, "predicted", "simulated"
     pairs = np.array(agreement.pairs).reshape(-1, 2)
     if not (pairs > 0.0).any():
         panel = Panel(*PAIRS_PLACE, Scale(0.0, 1.0), Scale(0.0, 1.0))
         left, top, wide, high = PAIRS_PLACE
         nothing = Words(left + 0.5 * wide, top + 0.5 * high, "none measured", "middle")
-        labels = panel.named(agreement.quantity, "predicted", "simulated")
-        return Sheet(PAIRS_WIDTH, PAIRS_HEIGHT, name, (*panel.frame([], []), *labels, nothing))
+        return Sheet(*PAIRS_SIZE, name, (*panel.frame([], []), *panel.named(*names), nothing))
     pairs = np.maximum(pairs, LEAST_SHOWN * pairs[pairs > 0.0].min())
     ends = np.array([0.7 * pairs.min(), 1.4 * pairs.max()])
     scale = Scale(float(ends[0]), float(ends[1]), log=True)
     panel = Panel(*PAIRS_PLACE, scale, scale)
-    labels = [(tick, f"{tick:g}") for tick in ticks_between(scale.low, scale.high)]
+    ticks = ticks_between(scale.low, scale.high)
     low, high = (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends
     band = np.vstack([panel.at(ends, low), panel.at(ends, high)[::-1]])
-    marks: list[Mark] = [*panel.frame(labels, labels), Area((band,), NEUTRAL, 0.3)]
+    marks: list[Mark] = [*panel.frame(ticks, ticks), Area((band,), NEUTRAL, 0.3)]
     marks.append(Line((panel.at(ends, ends),), NEUTRAL, 1.0))
     key = [Entry("identity", NEUTRAL), Entry(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
     off = np.array(agreement.differ())
@@ -154,9 +144,7 @@ def fidelity_panel(agreement: Agreement) -> Sheet:
     if off.any():
         marks += [marker("cross", place, 5.0, BAD) for place in _pairs_on_sheet(panel, pairs[off])]
         key.append(Entry(f"{int(off.sum())} differ", BAD, "cross"))
-    below, _ = keyed(key, 8.0, PAIRS_HEIGHT - 2.0 * ROW, PAIRS_WIDTH - 8.0)
-    names = panel.named(agreement.quantity, "predicted", "simulated")
-    return Sheet(PAIRS_WIDTH, PAIRS_HEIGHT, name, (*marks, *names, *below))
+    return panel.sheet(PAIRS_SIZE, names, marks, key, name=name)
 
 
 def _pairs_on_sheet(panel: Panel, pairs: Array) -> Array:
