@@ -61,11 +61,7 @@ SIDES = 20
 
 
 def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
-    """Cut the transversals of three lines to segments inside a ball.
-
-    Takes `points` (k, 3) [m]; `directions` (k, 3); `center` (3,) [m]; `reach` [m]. Gives ends of
-    each segment, (2, 3) [m], with neighbouring segments next to each other.
-    """
+    """Cut the transversals of three lines to segments in a ball, (2, 3) each, in their order."""
     segments = list[Array]()
     for along in np.linspace(-reach, reach, RULINGS):
         start = points[0] + along * directions[0]
@@ -73,18 +69,13 @@ def rulings(points: Array, directions: Array, center: Array, reach: float) -> tu
         way = np.cross(planes[0], planes[1])
         length = float(np.linalg.norm(way))
         if length > PARALLEL * reach**2:
-            segments += _inside(start, way / length, center, reach)
+            way = way / length
+            middle = float((center - start) @ way)
+            room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
+            if room > 0.0:
+                ends = middle - math.sqrt(room), middle + math.sqrt(room)
+                segments.append(np.array([start + end * way for end in ends]))
     return tuple(segments)
-
-
-def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array]:
-    """Return the part of a line inside a ball, as a list with one segment or none."""
-    middle = float((center - start) @ way)
-    room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
-    if room <= 0.0:
-        return []
-    half = math.sqrt(room)
-    return [np.array([start + (middle - half) * way, start + (middle + half) * way])]
 
 
 def between(segments: Sequence[Array]) -> tuple[Array, ...]:
@@ -140,7 +131,7 @@ def view_of(body: Polyhedron, grasp: Grasp, held: PosedHand | None = None) -> Vi
 
 def finger_size(body: Extent) -> float:
     """Return the length by which bars and cones are measured [m]: at most the object's radius."""
-    volume = getattr(body, "volume", math.inf)
+    volume = body.volume if isinstance(body, Polyhedron) else math.inf
     return float(min(body.radius, STOUT * math.cbrt(0.75 * volume / math.pi)))
 
 
@@ -155,13 +146,9 @@ def glass(body: Polyhedron) -> tuple[Shape, ...]:
 
 
 def coarse(vertices: Array, triangles: Indices) -> Array:
-    """Return the triangles of a surface, (t, 3, 3) [m], fewer and larger ones if they are many.
-
-    A fine surface is simplified by joining vertices on a grid, without tearing it. Each vertex
-    moves to the mean of the vertices in its cell. Triangles that then have no area are dropped.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3).
-    """
+    """Return the triangles of a surface, (t, 3, 3) [m], fewer and larger ones if they are many."""
+    # vertices are joined on a grid, each to the mean of its cell, which does not tear the surface;
+    # triangles that then have no area are dropped
     if len(triangles) <= MOST_TRIANGLES:
         return vertices[triangles]
     cells = math.sqrt(MOST_TRIANGLES) / 2.0

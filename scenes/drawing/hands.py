@@ -72,10 +72,9 @@ contact."""
 
 
 def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
-    """Make the sides of a rounded box, or of a piece of one that is cut across its axes.
+    """Make the flat sides of a rounded box, (k, 3) each [m], counter-clockwise from outside.
 
-    Takes `low`, `high` (3,) [m]; `radius` [m]; `outer` (2, 3). Gives flat sides in the axes of the
-    box, (k, 3) each [m], corners counter-clockwise as seen from outside.
+    Of a piece that is cut across the axes of the box, `outer` (2, 3) tells which ends are its own.
     """
     first, last, long = (tuple(each.tolist()) for each in (*outer, high > low))
     sides = _sides(long, radius > 0.0, first, last)
@@ -124,11 +123,7 @@ def _around() -> Iterator[Indices]:
 
 @cache
 def _grid() -> tuple[Array, Truths]:
-    """Return the points of a ball, from its upper pole to its lower one, and their octants.
-
-    Gives unit vectors, (rows, columns, 3), and whether each belongs to the upper half along each
-    axis, of the same shape.
-    """
+    """Return the points of a ball, (rows, columns, 3), and whether they are above on each axis."""
     quarter = np.linspace(0.0, 0.5 * np.pi, STEPS + 1)
     heights = np.concatenate([quarter[::-1], -quarter])
     above = np.repeat([1.0, -1.0], STEPS + 1)
@@ -265,10 +260,7 @@ def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
 
 
 def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, ...]]:
-    """Yield the sides of a rounded box, cut into pieces about as long as the box is thick.
-
-    Takes `half` (3,) [m]; `radius`, `least` [m].
-    """
+    """Yield the sides of a rounded box, cut into pieces about as long as the box is thick."""
     lengths = 2.0 * (half + radius)
     piece = max(LONG * float(lengths.min()), least)
     counts = np.clip(np.rint(lengths / piece), 1, MOST_PIECES).astype(int)

@@ -20,13 +20,29 @@ import numpy as np
 from grasp_core.arrays import Array, Indices, Polygon
 from grasp_core.declared import Declared
 from grasp_core.geometry.polygons import convex_hull
-from scenes.drawing.sheets import FINGERS, FOCUS, GLASS, HAND, INK, SURFACE, hexed, rgb
+from scenes.drawing.sheets import (
+    FINGERS,
+    FOCUS,
+    GLASS,
+    HAND,
+    INK,
+    SURFACE,
+    Area,
+    Dots,
+    Line,
+    hexed,
+    rgb,
+)
 from scenes.drawing.views import View
 
 Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
     "plane", "ruled surface", "contact", "hand", "fingertip",
 ]  # fmt: skip
+Part: TypeAlias = Area | Line | Dots
+"""A flat part of a picture, in metres from its middle, with y upwards."""
+Near: TypeAlias = tuple[float, Part]
+"""A part and its position along the line of sight [m]; larger values are nearer to the viewer."""
 SMOOTH_DEG = 20.0
 """Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
 MOST_EDGES = 1500
@@ -152,12 +168,7 @@ class Surface:
         return _followers(self.owners, np.bincount(self.owners))
 
     def edges(self) -> tuple[Indices, Indices]:
-        """Pair the edges of polygons that meet.
-
-        Returns:
-            Places of the first corners of edges in one polygon, and of the same edges, which run
-            the other way, in another.
-        """
+        """Pair the edges of polygons that meet: first corners in one and, reversed, in another."""
         first, second = self.names, self.names[self.following()]
         count = int(self.names.max()) + 1
         ahead, back = first * count + second, second * count + first
@@ -232,29 +243,13 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     return tuple(loops)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Patch:
-    """One flat part of a picture, with its depth and colour: an area, a line or a dot."""
-
-    loops: tuple[Array, ...]
-    """Borders of the area, the two ends of the line, or the middle of the dot, (k, 2) each [m]."""
-    nearness: float
-    """Position along the line of sight [m]; larger values are nearer to the viewer."""
-    colour: str
-    opacity: float
-    width: float = 0.0
-    """Width of the line [m]; 0 for areas and dots."""
-    radius: float = 0.0
-    """Radius of the dot [m]; 0 for areas and lines."""
-
-
-def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Patch, ...]:
+def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Part, ...]:
     """Return the parts of a picture of a given width [m], in the order to draw them."""
-    patches = [patch for shape in shapes for patch in _patches(shape, view, width)]
-    return tuple(sorted(patches, key=lambda patch: patch.nearness))
+    parts = [part for shape in shapes for part in _parts(shape, view, width)]
+    return tuple(part for _, part in sorted(parts, key=lambda each: each[0]))
 
 
-def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
+def _parts(shape: Shape, view: View, width: float) -> Iterator[Near]:
     look = look_of(shape)
     if look.fill and shape.polygons:
         paint = _solid if look.solid else FILLED.get(shape.role, _each)
@@ -262,28 +257,28 @@ def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
     if shape.role == "object" and shape.polygons:
         for line in outline(Surface.of(shape.polygons), view.camera):
             yield from _line(line, LOOKS["edge"], view, width)
+    thick = 0.01 * look.line * width
     for line in shape.lines if look.line else ():
         if shape.role in WHOLE:
             flat, near = view.seen(line)
-            yield Patch((flat,), float(near.mean()), look.colour, look.opacity,
-                        width=0.01 * look.line * width)  # fmt: skip
+            yield float(near.mean()), Line((flat,), look.colour, thick, look.opacity)
         else:
             yield from _line(line, look, view, width)
     for point in () if shape.points is None else shape.points:
         place, (near,) = view.seen(point[None])
         # A dot is drawn in front of what it marks.
-        yield Patch((place,), float(near) + 0.02 * width, look.colour, look.opacity,
-                    radius=0.005 * look.dot * width)  # fmt: skip
+        dot = Dots(place, look.colour, 0.005 * look.dot * width, look.opacity)
+        yield float(near) + 0.02 * width, dot
 
 
-def _each(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+def _each(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     for polygon in shape.polygons:
         flat, near = view.seen(polygon)
         shade = float(_brightness(_normal(polygon)[None], view)[0]) if look.shaded else 1.0
-        yield Patch((flat,), float(near.mean()), _shaded(look.colour, shade), look.fill)
+        yield float(near.mean()), Area((flat,), _shaded(look.colour, shade), look.fill)
 
 
-def _glass(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+def _glass(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     """Draw a clear surface; of many polygons, those that look alike are joined."""
     if len(shape.polygons) <= FEW:
         yield from _each(shape, look, view)
@@ -298,11 +293,11 @@ def _glass(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         depth = float(near.mean()) if len(near) else 0.0
         for level in np.unique(levels[front == side]).tolist():
             loops = joined(surface, (front == side) & (levels == level))
-            yield Patch(tuple(view.seen(loop)[0] for loop in loops), depth,
-                        _shaded(look.colour, _shade(level)), look.fill)  # fmt: skip
+            flat = tuple(view.seen(loop)[0] for loop in loops)
+            yield depth, Area(flat, _shaded(look.colour, _shade(level)), look.fill)
 
 
-def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+def _solid(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     """Draw a convex body: its outline, and on it the sides that face the viewer."""
     corners = shape.vertices()
     middle = corners.mean(axis=0)
@@ -315,20 +310,20 @@ def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         if normal @ (view.camera - polygon[0]) > 0.0:
             sides.append((polygon, int(_levels(_brightness(normal[None], view))[0])))
     mean = round(float(np.mean([level for _, level in sides] or [SHADES - 1])))
-    yield Patch((convex_hull(flat),), depth, _shaded(look.colour, _shade(mean)), look.fill)
+    yield depth, Area((convex_hull(flat),), _shaded(look.colour, _shade(mean)), look.fill)
     for level in sorted({level for _, level in sides} - {mean}):
         alike = tuple(view.seen(polygon)[0] for polygon, other in sides if other == level)
-        yield Patch(alike, depth, _shaded(look.colour, _shade(level)), look.fill)
+        yield depth, Area(alike, _shaded(look.colour, _shade(level)), look.fill)
 
 
-def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+def _cone(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
     flat, near = view.seen(shape.vertices())
     for part in (convex_hull(flat), view.seen(rim)[0]):
-        yield Patch((part,), float(near.mean()), look.colour, look.fill)
+        yield float(near.mean()), Area((part,), look.colour, look.fill)
 
 
-FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
+FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Near]]] = {
     "object": _glass, "force cone": _cone,
 }  # fmt: skip
 """How areas of some roles are drawn, other than each on its own."""
@@ -367,7 +362,7 @@ def _shaded(colour: str, shade: float) -> str:
     return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
 
 
-def _line(line: Array, look: Look, view: View, width: float) -> Iterator[Patch]:
+def _line(line: Array, look: Look, view: View, width: float) -> Iterator[Near]:
     flat, near = view.seen(line)
     thick = 0.01 * look.line * width
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
@@ -376,7 +371,7 @@ def _line(line: Array, look: Look, view: View, width: float) -> Iterator[Patch]:
             for low, high in _spans(length / width, look):
                 ends = np.array([start + low * (end - start), start + high * (end - start)])
                 depth = float(first + 0.5 * (low + high) * (last - first)) + 0.5 * thick
-                yield Patch((ends,), depth, look.colour, look.opacity, width=thick)
+                yield depth, Line((ends,), look.colour, thick, look.opacity)
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:

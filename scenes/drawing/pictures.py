@@ -1,6 +1,7 @@
 """Draws a grasp in the style of the paper, or an object alone."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from grasp_core.objects.surface import Face
 from grasp_core.values import Grasp
 from scenes.drawing.drawings import check_drawn, drawing_of, glass, numbers_of, view_of
 from scenes.drawing.hands import PosedHand, posed_hand
-from scenes.drawing.painting import LOOKS, Patch, Role, Shape, extent_of, painted
+from scenes.drawing.painting import LOOKS, Part, Role, Shape, extent_of, painted
 from scenes.drawing.panels import ROW, Entry, keyed, thinned
 from scenes.drawing.sheets import (
     FINGERS,
@@ -150,14 +151,11 @@ def sheet_of(
     numbers: Array | None = None, side: int,
     labels: Sequence[tuple[str, str]] = FINGER_LABELS,
 ) -> Sheet:  # fmt: skip
-    """Draw shapes on a square sheet.
-
-    Takes `numbers` (k, 3) [m]; `side` [pixels].
-    """
+    """Draw shapes on a square sheet, with labels at the places of numbers, (k, 3) [m]."""
     places = np.empty((0, 3)) if numbers is None else numbers
     low, high = frame_around(shapes, places, extent, view)
     scale = side / float(high[0] - low[0])
-    patches = painted(shapes, view, float(high[0] - low[0]))
+    parts = painted(shapes, view, float(high[0] - low[0]))
 
     def place(points: Array) -> Array:
         return np.array([0.0, side]) + np.array([scale, -scale]) * (points - low)
@@ -168,19 +166,22 @@ def sheet_of(
         for (text, colour), middle in zip(labels, place(view.seen(places)[0]), strict=False)
         for mark in numbered(middle, radius, text, colour)
     ]
-    moved = [_moved(patch, place, scale) for patch in patches]
-    return Sheet(side, side, name, (*_together(moved), *marks))
+    drawn = _together(_on_sheet(part, place, scale) for part in parts)
+    return Sheet(side, side, name, (*drawn, *marks))
 
 
-def _moved(patch: Patch, place: Callable[[Array], Array], scale: float) -> Mark:
-    loops = tuple(place(loop) for loop in patch.loops)
-    if patch.radius:
-        return Dots(loops[0], patch.colour, scale * patch.radius, patch.opacity)
-    if patch.width:
-        return Line(loops, patch.colour, round(scale * patch.width, 3), patch.opacity)
-    if sum(map(len, loops)) > MANY:
-        loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
-    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), patch.colour, patch.opacity)
+def _on_sheet(part: Part, place: Callable[[Array], Array], scale: float) -> Mark:
+    match part:
+        case Dots():
+            return replace(part, points=place(part.points), radius=scale * part.radius)
+        case Line():
+            width = round(scale * part.width, 3)
+            return replace(part, lines=tuple(map(place, part.lines)), width=width)
+        case Area():
+            loops = tuple(map(place, part.loops))
+            if sum(map(len, loops)) > MANY:
+                loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
+            return replace(part, loops=tuple(loop for loop in loops if len(loop) >= POLYGON))
 
 
 def _together(marks: Iterable[Mark]) -> Iterable[Mark]:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Protocol, Self
+from typing import Annotated, Self, TypeAlias
 
 import numpy as np
 
@@ -29,26 +29,16 @@ FORESHORTENED = 0.8
 """Cosine of the angle to the line of sight above which a finger points at the viewer."""
 
 
-class Extent(Protocol):
-    """The place and size of what is drawn: an object, or a grasp alone."""
-
-    @property
-    def center_of_mass(self) -> Array:
-        """Return the point around which everything is drawn, (3,) [m]."""
-        ...
-
-    @property
-    def radius(self) -> float:
-        """Return the length by which bars and cones are measured [m]."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Alone:
     """The extent of what is drawn beside an object, as a ball around it."""
 
     center_of_mass: Array
     radius: float
+
+
+Extent: TypeAlias = Polyhedron | Alone
+"""The place and size of what is drawn: of an object, or of a grasp or hand beside it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -299,12 +299,9 @@ def _weakest_plane(wrenches: WrenchSet, direction: Array) -> Array:
 
 
 def shadow_of(wrenches: WrenchSet, plane: Array) -> Array:
-    """Compute the border of the projection of an `l1` wrench set onto a plane.
+    """Compute the border of an `l1` wrench set's projection onto a plane (2, 6), (TURNS, 2).
 
-    Each point of the border is the wrench of one contact alone, whose force is at the rim of its
-    cone.
-
-    Takes `plane` (2, 6). Gives points of the border, (TURNS, 2), counter-clockwise.
+    Each point of it is the wrench of one contact alone, whose force is at the rim of its cone.
     """
     angles = np.linspace(0.0, 2.0 * np.pi, TURNS)
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)

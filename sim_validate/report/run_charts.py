@@ -106,10 +106,7 @@ def _panel(times: Array, y: Scale) -> Panel:
 
 
 def friction_used(pushes: Array, friction: Array) -> Array:
-    """Compute tangential over normal force, over friction, (n, k); NaN if fingers hardly push.
-
-    Takes `pushes` (normal, tangent, tangent) or (n, k, 3) [N]; `friction` (n,).
-    """
+    """Compute tangential over normal force, over friction, (n, k); NaN if fingers hardly push."""
     normal = pushes[..., 0]
     tangential = np.hypot(pushes[..., 1], pushes[..., 2])
     pushing = normal > LEAST_PUSH * max(float(normal.max(initial=0.0)), 1e-12)
