@@ -24,7 +24,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import path_of
-from grasp_core.declared import ByValue
+from grasp_core.declared import ByValue, counted
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
@@ -45,9 +45,11 @@ ASSETS = Path(__file__).parent / "assets"
 NOTHING = "-"
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""
+OF_OBJECT = ("object", "edge")
+"""Roles of what the grasps of one object share."""
 UNITS = 1000.0
 """Number of units of length in one object radius."""
-MILLI = 1e3
+MM, CM3 = 1e3, 1e6
 WIDTH, HEIGHT = 900, 640
 Fact: TypeAlias = tuple[str, str, str]
 """Name, value and meaning of a figure on a page."""
@@ -63,7 +65,6 @@ MOST_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
 ROWS = 5
 COLUMNS = 4
-CM3 = 1e6
 Row = Sequence[str]
 
 
@@ -174,10 +175,10 @@ def grasp_data(
     With a hand, the reader first sees what the picture with the hand shows, and can have the bars
     and lines of the paper's picture shown, too.
     """
-    plain = len(glass(body))
-    planned = drawing_of(body, grasp, friction)[plain:]
-    shown = planned if held is None else drawing_of(body, grasp, friction, held)[plain:]
-    roles = {shape.role for shape in shown}
+    every = drawing_of(body, grasp, friction, held)
+    roles = {shape.role for shape in every}
+    planned = () if held is None else drawing_of(body, grasp, friction)
+    shown = [shape for shape in every if shape.role not in OF_OBJECT]
     more = [shape for shape in planned if shape.role not in roles]
     view = view_of(body, grasp, held)
     return {
@@ -219,7 +220,7 @@ def grasp_facts(
         "Faces" if body.patches is None else "Patches",
         ", ".join(map(str, grasp.faces)), "numbers of those that the fingers stand on, by finger",
     )  # fmt: skip
-    disc = f"{number(MILLI * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
+    disc = f"{number(MM * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
     yield "Smallest independent disc", disc, DISC
     yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}", CRITICAL
     yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN
@@ -264,7 +265,7 @@ def html_of(value: object) -> str | None:
     return card(_alone(value), value.name, [
         ("faces" if value.patches is None else "patches", str(len(value.faces))),
         ("triangles", str(len(value.triangles))),
-        ("radius", f"{MILLI * value.radius:.4g} mm"),
+        ("radius", f"{MM * value.radius:.4g} mm"),
         ("volume" if value.surface.closed else "volume of the hull",
          f"{CM3 * value.volume:.4g} cm³"),
     ])  # fmt: skip
@@ -316,18 +317,12 @@ def _plan(plan: Plan) -> str:
     if len(plan):
         shapes, numbers = drawing_of(body, plan[0], plan.friction), numbers_of(body, plan[0])
         drawing = picture(shapes, body, view_of(body, plan[0]), numbers)
-    count = f"{len(plan)} grasp{'' if len(plan) == 1 else 's'}"
-    title = f"{count} of {plan.body.name} at friction {plan.friction:g}"
+    title = f"{counted(len(plan), 'grasp')} of {body.name} at friction {plan.friction:g}"
     if not len(plan):
         return card(_alone(body), title, [(plan.absence or "",)])
     rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
     rows += [
-        (
-            g.id,
-            g.family,
-            f"{MILLI * g.radius:.3g} mm" if g.radius else "-",
-            f"{g.closure_margin:.4g}",
-        )
+        (g.id, g.family, f"{MM * g.radius:.3g} mm" if g.radius else "-", f"{g.closure_margin:.4g}")
         for g in plan[:ROWS]
     ]
     return card(drawing, title, [*rows, ("...",)] if len(plan) > ROWS else rows)

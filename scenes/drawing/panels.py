@@ -23,7 +23,9 @@ SMALL = 11.0
 ROW, SAMPLE = 16.0, 18.0
 EVEN = 0.2
 """Distance by which a drawn curve may miss its points [pixels]."""
-Shape: TypeAlias = Literal["disc", "square", "cross"]
+Marker: TypeAlias = Literal["disc", "square", "cross"]
+Kind: TypeAlias = Literal["line", "dashes", "area"] | Marker
+"""What stands beside a text of a key."""
 CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
     "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
     "cross": ((-0.5, 0.0), (-1.0, -0.5), (-0.5, -1.0), (0.0, -0.5), (0.5, -1.0), (1.0, -0.5),
@@ -80,7 +82,7 @@ class Entry:
 
     text: str
     colour: str
-    kind: Literal["line", "dashes", "area"] | Shape = "line"
+    kind: Kind = "line"
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +181,7 @@ def _sample(entry: Entry, x: float, y: float) -> Iterable[Mark]:
     return [marker(entry.kind, np.array([x + 0.5 * SAMPLE, y]), 4.0, entry.colour)]
 
 
-def marker(kind: Shape, center: Array, size: float, colour: str) -> Mark:
+def marker(kind: Marker, center: Array, size: float, colour: str) -> Mark:
     """Draw a marker of a shape."""
     if kind == "disc":
         return Dots(center[None], colour, size)

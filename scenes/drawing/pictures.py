@@ -18,7 +18,7 @@ from grasp_core.values import Grasp
 from scenes.drawing.drawings import check_drawn, drawing_of, glass, numbers_of, view_of
 from scenes.drawing.hands import PosedHand, posed_hand
 from scenes.drawing.painting import LOOKS, Part, Role, Shape, extent_of, painted
-from scenes.drawing.panels import ROW, Entry, keyed, thinned
+from scenes.drawing.panels import ROW, Entry, Kind, keyed, thinned
 from scenes.drawing.sheets import (
     FINGERS,
     NEUTRAL,
@@ -228,18 +228,17 @@ def frame_around(
 
 def _entries(shapes: Sequence[Shape]) -> list[Entry]:
     found = {shape.role: shape for shape in reversed(shapes)}
-    entries = list[Entry]()
-    for role in EXPLAINED:
-        if role not in found:
-            continue
-        look, shape = LOOKS[role], found[role]
-        colour = NEUTRAL if shape.finger is not None else look.colour
-        if look.dot:
-            entries.append(Entry(role, colour, "disc"))
-        elif look.fill == 1.0:
-            entries.append(Entry(role, colour, "square"))
-        elif look.fill:
-            entries.append(Entry(role, colour, "area"))
-        else:
-            entries.append(Entry(role, colour, "dashes" if look.dashed else "line"))
-    return entries
+    return [
+        Entry(role, LOOKS[role].colour if found[role].finger is None else NEUTRAL, _kind(role))
+        for role in EXPLAINED if role in found
+    ]  # fmt: skip
+
+
+def _kind(role: Role) -> Kind:
+    """Return how a key shows what shapes of a role look like."""
+    look = LOOKS[role]
+    if look.dot:
+        return "disc"
+    if look.fill:
+        return "square" if look.solid else "area"
+    return "dashes" if look.dashed else "line"
