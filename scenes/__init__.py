@@ -13,7 +13,7 @@ __getattr__, __dir__, __all__ = names_in_stub(__name__, __file__)
 
 
 def _html_of(value: Any) -> str | None:
-    from scenes.drawing.in_notebooks import html_of
+    from scenes.drawing.pages import html_of
 
     return html_of(value)
 

@@ -1,8 +1,8 @@
+from scenes.drawing.pages import Turntable as Turntable
+from scenes.drawing.pages import show as show
 from scenes.drawing.pictures import grasp_figure as grasp_figure
 from scenes.drawing.pictures import write_picture as write_picture
 from scenes.drawing.sheets import Sheet as Sheet
-from scenes.drawing.turntable import Turntable as Turntable
-from scenes.drawing.turntable import show as show
 from scenes.example_objects import example_names as example_names
 from scenes.example_objects import example_object as example_object
 from scenes.exports import export_grasps as export_grasps

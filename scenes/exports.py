@@ -26,7 +26,8 @@ from grasp_core.frames import poses_along
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import FINGERS, Grasp
-from scenes.drawing import colours
+from scenes.drawing import sheets
+from scenes.drawing.views import approaches
 from scenes.mujoco.fingertips import fitting_radius
 
 ROD_LENGTH = 0.5
@@ -83,7 +84,7 @@ def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedG
             tip_radius=(tip := radius or fitting_radius(plan.body, grasp.positions, grasp.normals)),
             rods=poses_along(
                 grasp.positions - tip * grasp.normals,
-                grasp.normals if grasp.approach_directions is None else grasp.approach_directions,
+                approaches(grasp),
             ),
             rod_length=length,
             figures=_figures(plan, grasp),
@@ -206,7 +207,7 @@ def glb(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> bytes:
     """Return the bytes of a GLB file; equal grasps give equal bytes."""
     trimesh: Any = importlib.import_module("trimesh")
     scene = trimesh.Scene()
-    scene.geometry["object"] = _painted(trimesh, body.to_trimesh(), colours.GLASS)
+    scene.geometry["object"] = _painted(trimesh, body.to_trimesh(), sheets.GLASS)
     for place, placed in enumerate(grasps):
         _add_grasp(trimesh, scene, f"grasp_{place}", placed)
     return scene.export(file_type="glb")
@@ -232,18 +233,18 @@ def _shapes(trimesh: Any, scene: Any, placed: PlacedGrasp, finger: int) -> tuple
     if tip not in scene.geometry:
         ball = trimesh.creation.uv_sphere(radius=radius, count=[SECTIONS // 2, SECTIONS])
         ball.apply_translation([0.0, 0.0, -radius])  # it touches the origin of the contact's frame
-        scene.geometry[tip] = _painted(trimesh, ball, colours.FINGERS[finger])
+        scene.geometry[tip] = _painted(trimesh, ball, sheets.FINGERS[finger])
     if bar not in scene.geometry:
         segment = [[0.0, 0.0, -length], [0.0, 0.0, 0.0]]
         made = trimesh.creation.cylinder(radius=radius, segment=segment, sections=SECTIONS)
-        scene.geometry[bar] = _painted(trimesh, made, colours.FINGERS[finger])
+        scene.geometry[bar] = _painted(trimesh, made, sheets.FINGERS[finger])
     return tip, bar
 
 
 def _painted(trimesh: Any, mesh: Any, colour: str) -> Any:
     material = trimesh.visual.material.PBRMaterial(
         name=colour,
-        baseColorFactor=[*colours.rgb(colour), 1.0],
+        baseColorFactor=[*sheets.rgb(colour), 1.0],
         metallicFactor=0.0,
         roughnessFactor=ROUGHNESS,
     )

@@ -34,8 +34,8 @@ from sim_validate.protocols.judging import judge_hand_by as judge_hand_by
 from sim_validate.protocols.published import PublishedProtocol as PublishedProtocol
 from sim_validate.protocols.published import protocol as protocol
 from sim_validate.protocols.published import protocol_names as protocol_names
-from sim_validate.report.charts.margin_charts import margin_figure as margin_figure
-from sim_validate.report.charts.wrench_charts import wrench_figure as wrench_figure
+from sim_validate.report.grasp_charts import margin_figure as margin_figure
+from sim_validate.report.grasp_charts import wrench_figure as wrench_figure
 from sim_validate.report.report import write_report as write_report
 from sim_validate.settings.executions import ExecutionSettings as ExecutionSettings
 from sim_validate.settings.trials import HoldProtocol as HoldProtocol

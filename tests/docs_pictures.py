@@ -15,17 +15,14 @@ from PIL import Image
 
 import grasp_core as gc
 import scenes
-from scenes.drawing.colours import FINGERS
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
 from scenes.drawing.pictures import grasp_figure, grasp_sheet
-from scenes.drawing.sheets import Dots, Sheet, Words, beside, moved, png_of
+from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, png_of
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.report.agreement import Agreement
-from sim_validate.report.charts.margin_charts import margin_figure
-from sim_validate.report.charts.motion_charts import motion_panels
-from sim_validate.report.charts.run_charts import fidelity_panel
-from sim_validate.report.charts.wrench_charts import wrench_figure
+from sim_validate.report.grasp_charts import margin_figure, wrench_figure
+from sim_validate.report.run_charts import fidelity_panel, motion_panels
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
@@ -113,12 +110,7 @@ def misplaced():
     header, _, *rows = kept_by_distance()
     distances = np.array([float(cell) for cell in header[1:]])
     panel = Panel(70.0, 28.0, 500.0, 240.0, Scale(0.0, float(distances.max())), Scale(0.0, 1.02))
-    marks = [
-        *panel.frame(
-            [(each, f"{each:g}") for each in distances.tolist()],
-            [(share, f"{share:.0%}") for share in (0.0, 0.25, 0.5, 0.75, 1.0)],
-        )
-    ]
+    marks = [*panel.frame(distances.tolist(), (0.0, 0.25, 0.5, 0.75, 1.0), ".0%")]
     for colour, (_, *cells) in zip(FINGERS, rows, strict=True):
         counts = np.array([[int(part) for part in cell.split(" of ")] for cell in cells])
         shares = counts[:, 0] / counts[:, 1]

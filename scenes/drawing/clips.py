@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.text_files import write_parts
-from scenes.drawing.colours import FINGERS, rgb
+from scenes.drawing.sheets import FINGERS, rgb
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.held_mjcf import HeldScene
 
@@ -54,11 +54,14 @@ class GraphicsError(GraspError):
 def write_clip(
     scene: Scene, joints: Array, path: Path, caption: str, *, angles_deg: ArrayLike = ANGLES_DEG
 ) -> Path:
-    """Draw the motion of a scene, one frame for each sample.
-
-    Takes `joints` (n, 7 + 3k) [m]; `angles_deg` (2,) or (n, 2).
-    """
-    shown = _reach(scene, joints)
+    """Draw the motion of a scene, joints (n, 7 + 3k), one frame for each sample."""
+    layout = scene.layout
+    slides = np.zeros((1, len(layout.contacts), 3))
+    if joints.shape[1] > RIGID:
+        slides = joints[:, RIGID:].reshape(len(joints), len(layout.contacts), 3)
+    tips = layout.tip_centers + np.einsum("kij,nkj->nki", layout.frames, slides)
+    farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
+    shown = max(layout.radius_m, NEARER * farthest)
     return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,
                     angles=np.broadcast_to(angles_deg, (len(joints), 2)))  # fmt: skip
 
@@ -77,10 +80,7 @@ def write_held_clip(
     scene: HeldScene, joints: Array, path: Path, caption: str, *,
     table: tuple[Array, Array] | None = None, up: Array = UP,
 ) -> Path:  # fmt: skip
-    """Draw the motion of a held object and its palm, one frame for each sample.
-
-    Takes `joints` (n, 13 + 3k); `table` (3,) or (4,); `up` (3,).
-    """
+    """Draw the motion of a held object and its palm, joints (n, 13 + 3k)."""
     layout = scene.layout
     rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
     turn = rotation.align_vectors(UP[None], up[None])[0]
@@ -124,17 +124,6 @@ def _written(path: Path, **job_parts: Any) -> Path:
                 return write_parts(path, [out.read_bytes()])
             said = said or f"{graphics}: nothing was drawn"
     raise GraphicsError(f"MuJoCo cannot draw on this machine: {said}; {remedy()}")
-
-
-def _reach(scene: Scene, joints: Array) -> float:
-    """Return how far from the object's centre the scene has anything to show [m]."""
-    layout = scene.layout
-    slides = np.zeros((1, len(layout.contacts), 3))
-    if joints.shape[1] > RIGID:
-        slides = joints[:, RIGID:].reshape(len(joints), len(layout.contacts), 3)
-    tips = layout.tip_centers + np.einsum("kij,nkj->nki", layout.frames, slides)
-    farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
-    return max(layout.radius_m, NEARER * farthest)
 
 
 def available_graphics() -> str:
@@ -190,11 +179,9 @@ def _run_frames(graphics: str, arguments: list[str]) -> str:
 
 
 def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
-    """Magnify motions until they can be seen.
+    """Magnify motions since the first sample, (n, 7 + 3k), until they can be seen.
 
-    Takes `joints` (n, 7 + 3k). Gives joint positions that begin at the planned pose, with every
-    motion since the first sample multiplied by one factor, and that factor: a number of one
-    significant digit, at least 1.
+    Gives also the one factor by which they are larger: of one significant digit, at least 1.
     """
     center, size = scene.layout.center, scene.layout.grasp_size_m
     rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation

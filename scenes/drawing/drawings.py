@@ -19,16 +19,16 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.checked import coefficient
+from grasp_core.checked import coefficient, instance
 from grasp_core.cones.spanning import angles_between
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import SAME_SHARE, first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.hands import PosedHand, hand_shapes
-from scenes.drawing.painting import feature_edges
-from scenes.drawing.shapes import Shape, cone_rim, cone_sides, tube
+from scenes.drawing.hands import PosedHand, hand_shapes, numbers_behind, view_of_hand
+from scenes.drawing.painting import Shape, feature_edges
 from scenes.drawing.sheets import closed
-from scenes.drawing.views import Extent
+from scenes.drawing.views import Extent, View, approaches, best_view
 
 RULINGS = 40
 PARALLEL = 1e-9
@@ -36,6 +36,8 @@ PARALLEL = 1e-9
 squared reach."""
 BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
 """Length and radius of a finger's bar, in finger sizes."""
+NUMBER_BEYOND = 0.12
+"""Distance of a finger's number from the end of its bar, in finger sizes."""
 CONE_LENGTH = 0.42
 """Length of a cone's sides, in finger sizes."""
 STOUT = 1.3
@@ -54,14 +56,12 @@ SLACK_RAD = 1e-6
 POLYGON = 3
 MOST_TRIANGLES = 2500
 """Largest number of triangles drawn for the object; finer surfaces are simplified first."""
+SIDES = 20
+"""Number of corners of the polygons that replace circles."""
 
 
 def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
-    """Cut the transversals of three lines to segments inside a ball.
-
-    Takes `points` (k, 3) [m]; `directions` (k, 3); `center` (3,) [m]; `reach` [m]. Gives ends of
-    each segment, (2, 3) [m], with neighbouring segments next to each other.
-    """
+    """Cut the transversals of three lines to segments in a ball, (2, 3) each, in their order."""
     segments = list[Array]()
     for along in np.linspace(-reach, reach, RULINGS):
         start = points[0] + along * directions[0]
@@ -69,18 +69,13 @@ def rulings(points: Array, directions: Array, center: Array, reach: float) -> tu
         way = np.cross(planes[0], planes[1])
         length = float(np.linalg.norm(way))
         if length > PARALLEL * reach**2:
-            segments += _inside(start, way / length, center, reach)
+            way = way / length
+            middle = float((center - start) @ way)
+            room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
+            if room > 0.0:
+                ends = middle - math.sqrt(room), middle + math.sqrt(room)
+                segments.append(np.array([start + end * way for end in ends]))
     return tuple(segments)
-
-
-def _inside(start: Array, way: Array, center: Array, reach: float) -> list[Array]:
-    """Return the part of a line inside a ball, as a list with one segment or none."""
-    middle = float((center - start) @ way)
-    room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
-    if room <= 0.0:
-        return []
-    half = math.sqrt(room)
-    return [np.array([start + (middle - half) * way, start + (middle + half) * way])]
 
 
 def between(segments: Sequence[Array]) -> tuple[Array, ...]:
@@ -92,34 +87,51 @@ def between(segments: Sequence[Array]) -> tuple[Array, ...]:
     return tuple(quads)
 
 
-def drawing_of(body: Polyhedron, grasp: Grasp, friction: float) -> tuple[Shape, ...]:
-    """List the shapes that show an object with a grasp."""
-    coefficient(friction)
+def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None = None) -> None:
+    """Refuse an object, grasp, friction or view that cannot be drawn."""
     check_on_faces(body, grasp)
-    shapes = [*glass(body)]
-    for finger in range(len(grasp.contacts)):
-        shapes += _finger(body, grasp, finger, math.atan(friction))
-    shapes += _family(body, grasp)
-    return (*shapes, Shape("contact", points=grasp.positions))
+    coefficient(friction)
+    if view is not None:
+        instance(view, View, "view", "View.of_angles makes one")
 
 
-def drawing_with_hand(
-    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand
+def drawing_of(
+    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
 ) -> tuple[Shape, ...]:
-    """List the shapes that show an object in a hand: no bars, and cones where the hand touches."""
-    coefficient(friction)
-    check_on_faces(body, grasp)
+    """List the shapes that show an object with a grasp.
+
+    A hand takes the place of bars, force cones and lines; friction cones are where it touches.
+    """
+    check_drawn(body, grasp, friction)
+    half_angle, fingers = math.atan(friction), range(len(grasp.contacts))
     shapes = [*glass(body)]
+    if held is None:
+        for finger in fingers:
+            shapes += _finger(body, grasp, finger, half_angle)
+        return (*shapes, *_family(body, grasp), Shape("contact", points=grasp.positions))
     for finger, contact in enumerate(held.contacts):
-        shapes.append(_friction_cone(body, contact, finger, math.atan(friction)))
-    for finger in range(len(grasp.contacts)):
+        shapes.append(_friction_cone(body, contact, finger, half_angle))
+    for finger in fingers:
         shapes += _region(grasp, finger)
     return (*shapes, *hand_shapes(held), Shape("contact", points=held.positions))
 
 
+def numbers_of(body: Extent, grasp: Grasp, held: PosedHand | None = None) -> Array:
+    """Return where the fingers' numbers are written, behind their bars or tips, (k, 3) [m]."""
+    if held is not None:
+        return numbers_behind(held)
+    beyond = (BAR_LENGTH + NUMBER_BEYOND) * finger_size(body)
+    return grasp.positions - beyond * approaches(grasp)
+
+
+def view_of(body: Polyhedron, grasp: Grasp, held: PosedHand | None = None) -> View:
+    """Choose a view in which a grasp is seen well, or the hand in it."""
+    return best_view(body, grasp) if held is None else view_of_hand(body, held)
+
+
 def finger_size(body: Extent) -> float:
     """Return the length by which bars and cones are measured [m]: at most the object's radius."""
-    volume = getattr(body, "volume", math.inf)
+    volume = body.volume if isinstance(body, Polyhedron) else math.inf
     return float(min(body.radius, STOUT * math.cbrt(0.75 * volume / math.pi)))
 
 
@@ -134,13 +146,9 @@ def glass(body: Polyhedron) -> tuple[Shape, ...]:
 
 
 def coarse(vertices: Array, triangles: Indices) -> Array:
-    """Return the triangles of a surface, (t, 3, 3) [m], fewer and larger ones if they are many.
-
-    A fine surface is simplified by joining vertices on a grid, without tearing it. Each vertex
-    moves to the mean of the vertices in its cell. Triangles that then have no area are dropped.
-
-    Takes `vertices` (n, 3) [m]; `triangles` (t, 3).
-    """
+    """Return the triangles of a surface, (t, 3, 3) [m], fewer and larger ones if they are many."""
+    # vertices are joined on a grid, each to the mean of its cell, which does not tear the surface;
+    # triangles that then have no area are dropped
     if len(triangles) <= MOST_TRIANGLES:
         return vertices[triangles]
     cells = math.sqrt(MOST_TRIANGLES) / 2.0
@@ -160,8 +168,7 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
 
 def _finger(body: Extent, grasp: Grasp, finger: int, half_angle: float) -> list[Shape]:
     contact, cone = grasp.contacts[finger], grasp.force_cones[finger]
-    tip, ways, size = contact.position, grasp.approach_directions, finger_size(body)
-    inward = contact.normal if ways is None else ways[finger]
+    tip, inward, size = contact.position, approaches(grasp)[finger], finger_size(body)
     shapes = [
         Shape("finger", finger, polygons=bar(tip, inward, size)),
         _friction_cone(body, contact, finger, half_angle),
@@ -224,3 +231,33 @@ def _regulus(body: Extent, grasp: Grasp) -> list[Shape]:
 
 def _unit(vector: Array) -> Array:
     return vector / max(float(np.linalg.norm(vector)), np.finfo(np.float64).tiny)
+
+
+def ring(center: Array, axis: Array, radius: float) -> Array:
+    """Return points of a circle around a unit axis, (SIDES, 3)."""
+    # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
+    side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
+    side /= np.linalg.norm(side)
+    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    return center + radius * around
+
+
+def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
+    """Make the sides and the two ends of a round bar between two points."""
+    axis = (end - start) / np.linalg.norm(end - start)
+    low, high = ring(start, axis, radius), ring(end, axis, radius)
+    sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
+    return (*sides, low[::-1], high)
+
+
+def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
+    """Return the circle at the wide end of a cone with sides of a given length, (SIDES, 3)."""
+    height = length * math.cos(half_angle)
+    return ring(tip + height * axis, axis, length * math.sin(half_angle))
+
+
+def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tuple[Array, ...]:
+    """Make the triangles between the tip of a cone and its rim."""
+    rim = cone_rim(tip, axis, half_angle, length)
+    return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))

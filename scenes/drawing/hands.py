@@ -17,27 +17,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices, frozen, frozen_indices
+from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.checked import instance
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.reach import with_balls
+from grasp_core.hands.reach import HandReach, with_balls
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.shapes import Role, Shape
+from scenes.drawing.painting import Role, Shape
 from scenes.drawing.views import DISTANCE, SAME_MERIT, Alone, View, edge_on, least_gaps, views_at
-
-if TYPE_CHECKING:
-    from grasp_core.hands.reach import HandReach
 
 STEPS = 3
 """Number of sides along a quarter of a circle."""
@@ -73,10 +72,9 @@ contact."""
 
 
 def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
-    """Make the sides of a rounded box, or of a piece of one that is cut across its axes.
+    """Make the flat sides of a rounded box, (k, 3) each [m], counter-clockwise from outside.
 
-    Takes `low`, `high` (3,) [m]; `radius` [m]; `outer` (2, 3). Gives flat sides in the axes of the
-    box, (k, 3) each [m], corners counter-clockwise as seen from outside.
+    Of a piece that is cut across the axes of the box, `outer` (2, 3) tells which ends are its own.
     """
     first, last, long = (tuple(each.tolist()) for each in (*outer, high > low))
     sides = _sides(long, radius > 0.0, first, last)
@@ -125,11 +123,7 @@ def _around() -> Iterator[Indices]:
 
 @cache
 def _grid() -> tuple[Array, Truths]:
-    """Return the points of a ball, from its upper pole to its lower one, and their octants.
-
-    Gives unit vectors, (rows, columns, 3), and whether each belongs to the upper half along each
-    axis, of the same shape.
-    """
+    """Return the points of a ball, (rows, columns, 3), and whether they are above on each axis."""
     quarter = np.linspace(0.0, 0.5 * np.pi, STEPS + 1)
     heights = np.concatenate([quarter[::-1], -quarter])
     above = np.repeat([1.0, -1.0], STEPS + 1)
@@ -145,29 +139,29 @@ def _grid() -> tuple[Array, Truths]:
     return ways, signs > 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PosedHand:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PosedHand(Declared):
     """A hand in a pose in which its fingertips touch an object."""
 
     hand: Hand
-    joints: Array
+    joints: Annotated[Array, ArrayShape(None)]
     """Joint angles in the order of `hand.joints`, (j,) [rad]."""
-    palm_pose: Array
+    palm_pose: Annotated[Array, ArrayShape(POSE, POSE)]
     """Pose of the palm in the object's frame, (4, 4)."""
     fingers: tuple[int, ...]
     contacts: tuple[Contact, ...]
 
-    def __post_init__(self) -> None:
-        instance(self.hand, Hand, "hand", "load_hand makes one")
-        used = frozen_indices(self.fingers, (len(self.contacts),), "fingers")
-        object.__setattr__(self, "fingers", tuple(used.tolist()))
+    def _check_together(self) -> None:
         joints, known = len(self.hand.joints), range(len(self.hand.fingers))
-        object.__setattr__(self, "joints", frozen(self.joints, (joints,), "joints"))
-        object.__setattr__(self, "palm_pose", frozen(self.palm_pose, (POSE, POSE), "palm_pose"))
-        if len(set(self.fingers)) < len(self.fingers) or not set(self.fingers) <= set(known):
+        if len(self.joints) != joints:
+            raise InputError(
+                f"joints must hold the {joints} angles of the hand, got {len(self.joints)}"
+            )
+        used = set(self.fingers)
+        if not len(used) == len(self.fingers) == len(self.contacts) or not used <= set(known):
             raise InputError(
                 f"fingers must be different fingers of the hand, numbered from 0 to {known[-1]}, "
-                f"got {list(self.fingers)}"
+                f"one for each of {len(self.contacts)} contacts, got {list(self.fingers)}"
             )
 
     @property
@@ -192,10 +186,8 @@ class PosedHand:
         return np.array([contact.position for contact in self.contacts]).reshape(-1, 3)
 
 
-def posed_hand(hand: Hand, reach: "HandReach", grasp: Grasp) -> PosedHand:
+def posed_hand(hand: Hand, reach: HandReach, grasp: Grasp) -> PosedHand:
     """Take the pose from what `reach_with` found."""
-    from grasp_core.hands.reach import HandReach  # drawings without a hand need no search for one
-
     instance(hand, Hand, "hand", "load_hand makes one")
     instance(reach, HandReach, "reach", "reach_with finds one")
     if (reach.hand, reach.grasp) != (hand.name, grasp.id):
@@ -268,10 +260,7 @@ def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
 
 
 def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, ...]]:
-    """Yield the sides of a rounded box, cut into pieces about as long as the box is thick.
-
-    Takes `half` (3,) [m]; `radius`, `least` [m].
-    """
+    """Yield the sides of a rounded box, cut into pieces about as long as the box is thick."""
     lengths = 2.0 * (half + radius)
     piece = max(LONG * float(lengths.min()), least)
     counts = np.clip(np.rint(lengths / piece), 1, MOST_PIECES).astype(int)

@@ -1,19 +1,71 @@
-"""Fills page templates with values; the only module that uses jinja2.
+"""Writes drawings as HTML: pages on which a reader turns a grasp, and cards for notebooks.
 
-Values are escaped and lose unprintable characters, because names of files and objects come from
-anywhere.
+This is the only module that uses jinja2. Values in templates are escaped and lose unprintable
+characters, because names of files and objects come from anywhere.
+
+Lengths on a page are whole thousandths of the object's radius from its centre of mass. That is
+finer than a screen shows, and takes a tenth of the text of full numbers.
+
+A card is a small picture of an object, plan or scene with its figures. It takes some hundredths of
+a second. Figures that a grasp has put off are left out, because the first of them may take seconds;
+`repr` shows them.
 """
 
 import importlib
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from functools import cache
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.checked import path_of
+from grasp_core.declared import ByValue, counted
+from grasp_core.files.text_files import write_parts
+from grasp_core.hands.hand import Hand
+from grasp_core.hands.reach import HandReach
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.result import Plan
+from grasp_core.values import Grasp
+from scenes.drawing.drawings import bar, check_drawn, coarse, drawing_of, glass, numbers_of, view_of
+from scenes.drawing.hands import PosedHand
+from scenes.drawing.painting import Shape, look_of
+from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, held_by, sheet_of
+from scenes.drawing.sheets import svg_of
+from scenes.drawing.views import Alone, Extent, View
+from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.layout import Layout
 
 ASSETS = Path(__file__).parent / "assets"
 """Folder of the templates, styles and scripts of single drawings."""
 NOTHING = "-"
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""
+OF_OBJECT = ("object", "edge")
+"""Roles of what the grasps of one object share."""
+UNITS = 1000.0
+"""Number of units of length in one object radius."""
+MM, CM3 = 1e3, 1e6
+WIDTH, HEIGHT = 900, 640
+Fact: TypeAlias = tuple[str, str, str]
+"""Name, value and meaning of a figure on a page."""
+DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
+CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
+MARGIN = "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
+QUALITY = (
+    "largest wrench resisted in every direction, with normal forces of sum 1 N; torques over the "
+    "object's radius"
+)
+SIDE = 260
+MOST_CORNERS = 20_000
+"""Largest number of points that are drawn: they take a third of a second, and a megabyte."""
+ROWS = 5
+COLUMNS = 4
+Row = Sequence[str]
 
 
 def filled(template: str, folder: Path = ASSETS, **values: object) -> str:
@@ -55,3 +107,222 @@ def number(value: float | None, digits: int = 3) -> str:
         return NOTHING
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e+0" in text and abs(value) < MILLION else text
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Turntable(ByValue):
+    """A drawing of a grasp that a reader can turn, in a notebook or in a browser."""
+
+    object: str
+    """Name of the object."""
+    grasp: str
+    """Id of the grasp."""
+    page: str
+    """Text of a web page that needs no other file."""
+
+    def write(self, path: str | Path) -> Path:
+        """Write the page to a file, which a browser opens from disk.
+
+        Raises:
+            InputError: The value is not a path.
+            OSError: The file cannot be written.
+        """
+        return write_parts(path_of(path, "path"), [self.page.encode()])
+
+    def _repr_html_(self) -> str:
+        """Return the page in a frame of its own, whose scripts cannot reach the notebook."""
+        return (
+            f'<iframe sandbox="allow-scripts" width="{WIDTH}" height="{HEIGHT}" '
+            f'style="border:0;max-width:100%" srcdoc="{escape(self.page)}"></iframe>'
+        )
+
+
+def show(
+    body: Polyhedron, grasp: Grasp, friction: float = 0.5, *, hand: Hand | None = None,
+    reach: HandReach | None = None,
+) -> Turntable:  # fmt: skip
+    """Draw a grasp on its object, or with a hand, so that it can be turned with the mouse.
+
+    A notebook shows the drawing at the end of a cell; elsewhere `show(...).write("grasp.html")`
+    writes it as a page.
+
+    Args:
+        body: The object.
+        grasp: A grasp on the faces of `body`.
+        friction: Coulomb coefficient of the friction cones.
+        hand: A hand to draw in place of straight fingers, with `reach`.
+        reach: The pose in which it stands in the grasp, as `gc.reach_with` finds it.
+
+    Raises:
+        InputError: The grasp does not lie on the body, the friction is out of range, or `reach`
+            holds no pose of this hand in this grasp.
+    """
+    check_drawn(body, grasp, friction)
+    held = held_by(hand, reach, grasp)
+    return Turntable(body.name, grasp.id, turntable_page(body, grasp, friction, held))
+
+
+def object_data(body: Polyhedron) -> list[dict[str, Any]]:
+    """Return the drawing of an object, which all of its grasps share."""
+    return [_shape(shape, body) for shape in glass(body)]
+
+
+def grasp_data(
+    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
+) -> dict[str, Any]:
+    """Return the drawing of a grasp without the object, and the view in which it is first seen.
+
+    With a hand, the reader first sees what the picture with the hand shows, and can have the bars
+    and lines of the paper's picture shown, too.
+    """
+    every = drawing_of(body, grasp, friction, held)
+    roles = {shape.role for shape in every}
+    planned = () if held is None else drawing_of(body, grasp, friction)
+    shown = [shape for shape in every if shape.role not in OF_OBJECT]
+    more = [shape for shape in planned if shape.role not in roles]
+    view = view_of(body, grasp, held)
+    return {
+        "shapes": [_shape(shape, body) for shape in (*shown, *more)],
+        "numbers": _whole(numbers_of(body, grasp, held), body),
+        "axes": np.round(view.axes, 4).tolist(),
+        "middle": _whole(view.center, body),
+        "distance": round(UNITS * view.distance / body.radius),
+        "hidden": sorted({shape.role for shape in more}),
+    }
+
+
+def turntable_page(
+    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
+) -> str:
+    """Write a page that needs no other file and on which a reader can rotate a grasp."""
+    return filled(
+        "turntable.html",
+        id=grasp.id,
+        object=body.name,
+        family=grasp.family,
+        friction=friction,
+        facts=[*grasp_facts(body, grasp), *([] if held is None else [
+            (f"Fingers of {held.hand.name}", ", ".join(held.finger_names),
+             "that touch, by finger of the grasp"),
+        ])],
+        style=text_of("style.css"),
+        script=text_of("turntable.js"),
+        object_drawing=as_text(object_data(body)),
+        drawing=as_text(grasp_data(body, grasp, friction, held)),
+    )  # fmt: skip
+
+
+def grasp_facts(
+    body: Polyhedron, grasp: Grasp, *, at_plan: str = "", in_simulation: str = ""
+) -> Iterator[Fact]:
+    """Yield the figures of a grasp; `at_plan` says at which friction most of them are."""
+    yield (
+        "Faces" if body.patches is None else "Patches",
+        ", ".join(map(str, grasp.faces)), "numbers of those that the fingers stand on, by finger",
+    )  # fmt: skip
+    disc = f"{number(MM * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
+    yield "Smallest independent disc", disc, DISC
+    yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}", CRITICAL
+    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN
+    lower, upper = map(number, grasp.ferrari_canny)
+    between = lower if lower == upper else f"{lower} to {upper}"
+    yield "Ferrari-Canny quality", f"{between} N{at_plan}", QUALITY
+
+
+def as_text(data: object) -> str:
+    """Write JSON that can stand inside a page: no HTML tag can begin in it."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _shape(shape: Shape, body: Polyhedron) -> dict[str, Any]:
+    look = look_of(shape)
+    points = np.empty((0, 3)) if shape.points is None else shape.points
+    return {
+        "role": shape.role,
+        "finger": shape.finger,
+        **asdict(look),
+        "polygons": [_whole(polygon, body) for polygon in shape.polygons] if look.fill else [],
+        "lines": [_whole(line, body) for line in shape.lines] if look.line else [],
+        "points": _whole(points, body),
+    }
+
+
+def _whole(points: Array, body: Polyhedron) -> Any:
+    """Write points in units of the drawing, as lists of any depth."""
+    return np.rint(UNITS / body.radius * (points - body.center_of_mass)).astype(int).tolist()
+
+
+def html_of(value: object) -> str | None:
+    """Return a picture of a value with its figures; None for a value that has no picture."""
+    if isinstance(value, Plan):
+        return _plan(value)
+    if isinstance(value, Scene):
+        layout = value.layout
+        return card(placed(layout), layout.name, [("friction", f"{layout.friction:g}")])
+    if not isinstance(value, Polyhedron):
+        return None
+    return card(_alone(value), value.name, [
+        ("faces" if value.patches is None else "patches", str(len(value.faces))),
+        ("triangles", str(len(value.triangles))),
+        ("radius", f"{MM * value.radius:.4g} mm"),
+        ("volume" if value.surface.closed else "volume of the hull",
+         f"{CM3 * value.volume:.4g} cm³"),
+    ])  # fmt: skip
+
+
+def card(drawing: str, title: str, rows: Iterable[Row]) -> str:
+    """Put a title and a table beside a drawing."""
+    cells = "".join(f"<tr>{_cells(row)}</tr>" for row in rows)
+    return (
+        '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:center">'
+        f"{drawing}<div><b>{escape(title)}</b><table>{cells}</table></div></div>"
+    )
+
+
+def _cells(row: Row) -> str:
+    if len(row) == 1:
+        return f'<td colspan="{COLUMNS}" style="text-align:left">{escape(row[0])}</td>'
+    return "".join(f"<td>{escape(cell)}</td>" for cell in row)
+
+
+def picture(
+    shapes: Sequence[Shape], extent: Extent, view: View, numbers: Array | None = None
+) -> str:
+    """Draw shapes as a small SVG element; nothing where there are too many of them."""
+    if sum(len(shape.vertices()) for shape in shapes) > MOST_CORNERS:
+        return ""
+    return svg_of(sheet_of(shapes, extent, view, "picture", numbers=numbers, side=SIDE), paper=True)
+
+
+def placed(layout: Layout) -> str:
+    """Draw the object of a scene with the bars of its fingers as a small SVG element."""
+    size, inward = layout.radius_m, layout.frames[:, :, 0]
+    extent = Alone(np.zeros(3), size)
+    bars = [
+        Shape("finger", finger, polygons=bar(tip, way, size))
+        for finger, (tip, way) in enumerate(zip(layout.contacts, inward, strict=True))
+    ]
+    surface = Shape("object", polygons=tuple(coarse(layout.vertices, layout.triangles)))
+    view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, extent)
+    return picture([surface, *bars, Shape("contact", points=layout.contacts)], extent, view)
+
+
+def _alone(body: Polyhedron) -> str:
+    return picture(glass(body), body, View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body))
+
+
+def _plan(plan: Plan) -> str:
+    body, drawing = plan.body, ""
+    if len(plan):
+        shapes, numbers = drawing_of(body, plan[0], plan.friction), numbers_of(body, plan[0])
+        drawing = picture(shapes, body, view_of(body, plan[0]), numbers)
+    title = f"{counted(len(plan), 'grasp')} of {body.name} at friction {plan.friction:g}"
+    if not len(plan):
+        return card(_alone(body), title, [(plan.absence or "",)])
+    rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
+    rows += [
+        (g.id, g.family, f"{MM * g.radius:.3g} mm" if g.radius else "-", f"{g.closure_margin:.4g}")
+        for g in plan[:ROWS]
+    ]
+    return card(drawing, title, [*rows, ("...",)] if len(plan) > ROWS else rows)

@@ -1,4 +1,4 @@
-"""Projects shapes to flat coloured parts, sorted so that the farthest is drawn first.
+"""Describes shapes in space, and projects them to flat coloured parts, the farthest first.
 
 Lines are cut into pieces, so that one order by depth holds for everything: a finger in front of a
 line of force hides it, and glass in front of the line lets it show through. Solid bodies are
@@ -12,16 +12,37 @@ viewer and one that does not, it is the outline of the surface from there, and i
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array, Indices, Polygon
+from grasp_core.declared import Declared
 from grasp_core.geometry.polygons import convex_hull
-from scenes.drawing.colours import hexed, rgb
-from scenes.drawing.shapes import LOOKS, Look, Role, Shape, colour_of
+from scenes.drawing.sheets import (
+    FINGERS,
+    FOCUS,
+    GLASS,
+    HAND,
+    INK,
+    SURFACE,
+    Area,
+    Dots,
+    Line,
+    hexed,
+    rgb,
+)
 from scenes.drawing.views import View
 
+Role: TypeAlias = Literal[
+    "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
+    "plane", "ruled surface", "contact", "hand", "fingertip",
+]  # fmt: skip
+Part: TypeAlias = Area | Line | Dots
+"""A flat part of a picture, in metres from its middle, with y upwards."""
+Near: TypeAlias = tuple[float, Part]
+"""A part and its position along the line of sight [m]; larger values are nearer to the viewer."""
 SMOOTH_DEG = 20.0
 """Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
 MOST_EDGES = 1500
@@ -45,8 +66,73 @@ SHADES = 7
 clear glass."""
 WHOLE: tuple[Role, ...] = ("friction cone",)
 """Roles whose lines are short, so that each is drawn whole."""
-SOLIDS: tuple[Role, ...] = ("finger", "hand", "fingertip")
-"""Roles whose shapes are convex bodies that nothing shines through."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Shape(Declared):
+    """One thing to draw: polygons, lines and points in the object's frame, with a role."""
+
+    role: Role
+    finger: int | None = None
+    polygons: tuple[Polygon, ...] = ()
+    """Flat or nearly flat polygons, corners in order, each (k, 3) [m]."""
+    lines: tuple[Polygon, ...] = ()
+    points: Polygon | None = None
+    """Single points, (k, 3) [m]; None if the shape has none."""
+
+    def vertices(self) -> Array:
+        """Return all points of the shape, (n, 3) [m]."""
+        alone = [] if self.points is None else [self.points]
+        return np.vstack([np.empty((0, 3)), *self.polygons, *self.lines, *alone])
+
+
+def extent_of(shapes: Iterable[Shape]) -> Array:
+    """Return all points of several shapes, (n, 3) [m]."""
+    return np.vstack([shape.vertices() for shape in shapes])
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How shapes of one role, such as force cones, are drawn."""
+
+    colour: str = INK
+    """Colour of shapes that are no finger's."""
+    fill: float = 0.0
+    """Opacity of polygons, from 0 to 1."""
+    line: float = 0.0
+    """Width of lines, in hundredths of the picture's width."""
+    dot: float = 0.0
+    """Diameter of points, in hundredths of the picture's width."""
+    opacity: float = 1.0
+    """Opacity of lines and points."""
+    shaded: bool = False
+    """Whether polygons are darker where they face away from the light."""
+    dashed: bool = False
+    solid: bool = False
+    """Whether shapes are convex bodies that nothing shines through."""
+
+
+LOOKS: dict[Role, Look] = {
+    "object": Look(GLASS, fill=0.13, shaded=True),
+    "edge": Look(line=0.18, opacity=0.75),
+    "finger": Look(fill=1.0, shaded=True, solid=True),
+    "friction cone": Look(line=0.16, opacity=0.9),
+    "force cone": Look(fill=0.28),
+    "region": Look(fill=0.6),
+    "line of force": Look(line=0.3, dashed=True),
+    "focus": Look(FOCUS, dot=1.9),
+    "plane": Look(SURFACE, fill=0.16, line=0.3),
+    "ruled surface": Look(SURFACE, fill=0.1, line=0.1, opacity=0.5),
+    "contact": Look(dot=1.2),
+    "hand": Look(HAND, fill=1.0, shaded=True, solid=True),
+    "fingertip": Look(HAND, fill=1.0, shaded=True, solid=True),
+}
+
+
+def look_of(shape: Shape) -> Look:
+    """Return how a shape is drawn: as others of its role, in the colour of its finger."""
+    look = LOOKS[shape.role]
+    return look if shape.finger is None else replace(look, colour=FINGERS[shape.finger])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,12 +168,7 @@ class Surface:
         return _followers(self.owners, np.bincount(self.owners))
 
     def edges(self) -> tuple[Indices, Indices]:
-        """Pair the edges of polygons that meet.
-
-        Returns:
-            Places of the first corners of edges in one polygon, and of the same edges, which run
-            the other way, in another.
-        """
+        """Pair the edges of polygons that meet: first corners in one and, reversed, in another."""
         first, second = self.names, self.names[self.following()]
         count = int(self.names.max()) + 1
         ahead, back = first * count + second, second * count + first
@@ -162,60 +243,42 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     return tuple(loops)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Patch:
-    """One flat part of a picture, with its depth and colour: an area, a line or a dot."""
-
-    loops: tuple[Array, ...]
-    """Borders of the area, the two ends of the line, or the middle of the dot, (k, 2) each [m]."""
-    nearness: float
-    """Position along the line of sight [m]; larger values are nearer to the viewer."""
-    colour: str
-    opacity: float
-    width: float = 0.0
-    """Width of the line [m]; 0 for areas and dots."""
-    radius: float = 0.0
-    """Radius of the dot [m]; 0 for areas and lines."""
-
-
-def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Patch, ...]:
+def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Part, ...]:
     """Return the parts of a picture of a given width [m], in the order to draw them."""
-    patches = [patch for shape in shapes for patch in _patches(shape, view, width)]
-    return tuple(sorted(patches, key=lambda patch: patch.nearness))
+    parts = [part for shape in shapes for part in _parts(shape, view, width)]
+    return tuple(part for _, part in sorted(parts, key=lambda each: each[0]))
 
 
-def _patches(shape: Shape, view: View, width: float) -> Iterator[Patch]:
-    look = LOOKS[shape.role]
+def _parts(shape: Shape, view: View, width: float) -> Iterator[Near]:
+    look = look_of(shape)
     if look.fill and shape.polygons:
-        yield from FILLED.get(shape.role, _each)(shape, look, view)
+        paint = _solid if look.solid else FILLED.get(shape.role, _each)
+        yield from paint(shape, look, view)
     if shape.role == "object" and shape.polygons:
-        edge = Shape("edge")
-        for line in (*shape.lines, *outline(Surface.of(shape.polygons), view.camera)):
-            yield from _line(line, LOOKS["edge"], colour_of(edge), view, width)
-    elif shape.role in WHOLE:
-        for line in shape.lines:
+        for line in outline(Surface.of(shape.polygons), view.camera):
+            yield from _line(line, LOOKS["edge"], view, width)
+    thick = 0.01 * look.line * width
+    for line in shape.lines if look.line else ():
+        if shape.role in WHOLE:
             flat, near = view.seen(line)
-            yield Patch((flat,), float(near.mean()), colour_of(shape), look.opacity,
-                        width=0.01 * look.line * width)  # fmt: skip
-    elif look.line:
-        for line in shape.lines:
-            yield from _line(line, look, colour_of(shape), view, width)
+            yield float(near.mean()), Line((flat,), look.colour, thick, look.opacity)
+        else:
+            yield from _line(line, look, view, width)
     for point in () if shape.points is None else shape.points:
         place, (near,) = view.seen(point[None])
         # A dot is drawn in front of what it marks.
-        yield Patch((place,), float(near) + 0.02 * width, colour_of(shape), look.opacity,
-                    radius=0.005 * look.dot * width)  # fmt: skip
+        dot = Dots(place, look.colour, 0.005 * look.dot * width, look.opacity)
+        yield float(near) + 0.02 * width, dot
 
 
-def _each(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
-    colour = colour_of(shape)
+def _each(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     for polygon in shape.polygons:
         flat, near = view.seen(polygon)
         shade = float(_brightness(_normal(polygon)[None], view)[0]) if look.shaded else 1.0
-        yield Patch((flat,), float(near.mean()), _shaded(colour, shade), look.fill)
+        yield float(near.mean()), Area((flat,), _shaded(look.colour, shade), look.fill)
 
 
-def _glass(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+def _glass(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     """Draw a clear surface; of many polygons, those that look alike are joined."""
     if len(shape.polygons) <= FEW:
         yield from _each(shape, look, view)
@@ -230,16 +293,16 @@ def _glass(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         depth = float(near.mean()) if len(near) else 0.0
         for level in np.unique(levels[front == side]).tolist():
             loops = joined(surface, (front == side) & (levels == level))
-            yield Patch(tuple(view.seen(loop)[0] for loop in loops), depth,
-                        _shaded(colour_of(shape), _shade(level)), look.fill)  # fmt: skip
+            flat = tuple(view.seen(loop)[0] for loop in loops)
+            yield depth, Area(flat, _shaded(look.colour, _shade(level)), look.fill)
 
 
-def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+def _solid(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     """Draw a convex body: its outline, and on it the sides that face the viewer."""
     corners = shape.vertices()
     middle = corners.mean(axis=0)
     flat, near = view.seen(corners)
-    depth, colour = float(near.mean()), colour_of(shape)
+    depth = float(near.mean())
     sides = list[tuple[Array, int]]()
     for polygon in shape.polygons:
         normal = _normal(polygon)
@@ -247,24 +310,23 @@ def _solid(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
         if normal @ (view.camera - polygon[0]) > 0.0:
             sides.append((polygon, int(_levels(_brightness(normal[None], view))[0])))
     mean = round(float(np.mean([level for _, level in sides] or [SHADES - 1])))
-    yield Patch((convex_hull(flat),), depth, _shaded(colour, _shade(mean)), look.fill)
+    yield depth, Area((convex_hull(flat),), _shaded(look.colour, _shade(mean)), look.fill)
     for level in sorted({level for _, level in sides} - {mean}):
         alike = tuple(view.seen(polygon)[0] for polygon, other in sides if other == level)
-        yield Patch(alike, depth, _shaded(colour, _shade(level)), look.fill)
+        yield depth, Area(alike, _shaded(look.colour, _shade(level)), look.fill)
 
 
-def _cone(shape: Shape, look: Look, view: View) -> Iterator[Patch]:
+def _cone(shape: Shape, look: Look, view: View) -> Iterator[Near]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
     flat, near = view.seen(shape.vertices())
     for part in (convex_hull(flat), view.seen(rim)[0]):
-        yield Patch((part,), float(near.mean()), colour_of(shape), look.fill)
+        yield float(near.mean()), Area((part,), look.colour, look.fill)
 
 
-FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Patch]]] = {
-    "object": _glass,
-    "force cone": _cone,
-    **dict.fromkeys(SOLIDS, _solid),
-}
+FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Near]]] = {
+    "object": _glass, "force cone": _cone,
+}  # fmt: skip
+"""How areas of some roles are drawn, other than each on its own."""
 
 
 def _normal(polygon: Array) -> Array:
@@ -300,7 +362,7 @@ def _shaded(colour: str, shade: float) -> str:
     return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
 
 
-def _line(line: Array, look: Look, colour: str, view: View, width: float) -> Iterator[Patch]:
+def _line(line: Array, look: Look, view: View, width: float) -> Iterator[Near]:
     flat, near = view.seen(line)
     thick = 0.01 * look.line * width
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
@@ -309,7 +371,7 @@ def _line(line: Array, look: Look, colour: str, view: View, width: float) -> Ite
             for low, high in _spans(length / width, look):
                 ends = np.array([start + low * (end - start), start + high * (end - start)])
                 depth = float(first + 0.5 * (low + high) * (last - first)) + 0.5 * thick
-                yield Patch((ends,), depth, colour, look.opacity, width=thick)
+                yield depth, Line((ends,), look.colour, thick, look.opacity)
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:

@@ -8,8 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from scenes.drawing.colours import NEUTRAL
-from scenes.drawing.sheets import LETTER, Area, Dots, Line, Mark, Words, ink_line
+from scenes.drawing.sheets import LETTER, NEUTRAL, Area, Dots, Line, Mark, Sheet, Words, ink_line
 
 NARROW, WIDE = set("ijl.,:;|'!fItr()[] -"), set("mwMW@%+=<>≤")
 NARROW_WIDTH, USUAL_WIDTH, WIDE_WIDTH = 0.42, 0.66, 1.0
@@ -24,7 +23,9 @@ SMALL = 11.0
 ROW, SAMPLE = 16.0, 18.0
 EVEN = 0.2
 """Distance by which a drawn curve may miss its points [pixels]."""
-Shape: TypeAlias = Literal["disc", "square", "cross"]
+Marker: TypeAlias = Literal["disc", "square", "cross"]
+Kind: TypeAlias = Literal["line", "dashes", "area"] | Marker
+"""What stands beside a text of a key."""
 CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
     "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
     "cross": ((-0.5, 0.0), (-1.0, -0.5), (-0.5, -1.0), (0.0, -0.5), (0.5, -1.0), (1.0, -0.5),
@@ -81,7 +82,7 @@ class Entry:
 
     text: str
     colour: str
-    kind: Literal["line", "dashes", "area"] | Shape = "line"
+    kind: Kind = "line"
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,20 +121,20 @@ class Panel:
         return Line((ends,), colour, 1.2, dashed=dashed)
 
     def frame(
-        self, x_ticks: Sequence[tuple[float, str]], y_ticks: Sequence[tuple[float, str]]
+        self, x_ticks: Iterable[float], y_ticks: Iterable[float], y_form: str = "g"
     ) -> Iterator[Mark]:
         """Draw both axes with ticks and their numbers."""
         low, left, right = self.top + self.height, self.left, self.left + self.width
         yield ink_line([(left, self.top), (left, low), (right, low)])
         faint = list[Array]()
-        for value, text in x_ticks:
+        for value in x_ticks:
             x = left + self.width * float(self.x.shares(np.array(value)))
             yield ink_line([(x, low), (x, low + TICK)])
-            yield Words(x, low + TICK + 0.8 * SMALL, text, "middle", SMALL)
-        for value, text in y_ticks:
+            yield Words(x, low + TICK + 0.8 * SMALL, f"{value:g}", "middle", SMALL)
+        for value in y_ticks:
             y = low - self.height * float(self.y.shares(np.array(value)))
             yield ink_line([(left - TICK, y), (left, y)])
-            yield Words(left - TICK - 2.0, y, text, "end", SMALL)
+            yield Words(left - TICK - 2.0, y, f"{value:{y_form}}", "end", SMALL)
             faint.append(np.array([[left, y], [right, y]]))
         yield Line(tuple(faint), NEUTRAL, 0.5, 0.35)
 
@@ -146,6 +147,15 @@ class Panel:
             yield Words(middle, low, across, "middle", SMALL)
         if up:
             yield Words(SMALL, self.top + 0.5 * self.height, up, "middle", SMALL, upwards=True)
+
+    def sheet(
+        self, size: tuple[float, float], names: tuple[str, str, str], marks: Iterable[Mark],
+        entries: Sequence[Entry], *, key_height: float = 2.0 * ROW, name: str = "",
+    ) -> Sheet:  # fmt: skip
+        """Put marks, names and a key at the bottom on a sheet [pixels], called as the panel is."""
+        width, height = size
+        key, _ = keyed(entries, 8.0, height - key_height, width - 8.0)
+        return Sheet(width, height, name or names[0], (*marks, *self.named(*names), *key))
 
 
 def keyed(entries: Sequence[Entry], left: float, top: float, wide: float) -> tuple[list[Mark], int]:
@@ -171,7 +181,7 @@ def _sample(entry: Entry, x: float, y: float) -> Iterable[Mark]:
     return [marker(entry.kind, np.array([x + 0.5 * SAMPLE, y]), 4.0, entry.colour)]
 
 
-def marker(kind: Shape, center: Array, size: float, colour: str) -> Mark:
+def marker(kind: Marker, center: Array, size: float, colour: str) -> Mark:
     """Draw a marker of a shape."""
     if kind == "disc":
         return Dots(center[None], colour, size)

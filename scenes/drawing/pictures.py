@@ -1,31 +1,37 @@
 """Draws a grasp in the style of the paper, or an object alone."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import coefficient, instance, path_of, switch
+from grasp_core.checked import path_of, switch
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
-from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.values import Grasp
-from scenes.drawing.colours import FINGERS, NEUTRAL
-from scenes.drawing.drawings import BAR_LENGTH, drawing_of, drawing_with_hand, finger_size, glass
-from scenes.drawing.hands import PosedHand, numbers_behind, posed_hand, view_of_hand
-from scenes.drawing.painting import Patch, painted
-from scenes.drawing.panels import ROW, Entry, keyed, thinned
-from scenes.drawing.shapes import LOOKS, Role, Shape, colour_of, extent_of
-from scenes.drawing.sheets import Area, Dots, Line, Mark, Sheet, closed, format_of, numbered
-from scenes.drawing.views import Extent, View, best_view
-
-if TYPE_CHECKING:
-    from grasp_core.hands.reach import HandReach
+from scenes.drawing.drawings import check_drawn, drawing_of, glass, numbers_of, view_of
+from scenes.drawing.hands import PosedHand, posed_hand
+from scenes.drawing.painting import LOOKS, Part, Role, Shape, extent_of, painted
+from scenes.drawing.panels import ROW, Entry, Kind, keyed, thinned
+from scenes.drawing.sheets import (
+    FINGERS,
+    NEUTRAL,
+    Area,
+    Dots,
+    Line,
+    Mark,
+    Sheet,
+    closed,
+    format_of,
+    numbered,
+)
+from scenes.drawing.views import Extent, View
 
 SIDE = 500
 """Width of a picture, and its height without the key [pixels]."""
@@ -44,8 +50,6 @@ MARGIN = 0.04
 """Width of the empty margin, as a share of the picture's width."""
 FARTHEST = 2.0
 """Distance from the object's centre beyond which points may be cut off, in object radii."""
-NUMBER_BEYOND = 0.12
-"""Distance of a finger's number from the end of its bar, in finger sizes."""
 EXPLAINED: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
     "ruled surface", "hand",
@@ -62,7 +66,7 @@ def write_picture(
     *,
     view: View | None = None,
     hand: Hand | None = None,
-    reach: "HandReach | None" = None,
+    reach: HandReach | None = None,
 ) -> Path:
     """Draw a grasp in the style of the paper, or with the hand in it, and write it to a file.
 
@@ -79,11 +83,8 @@ def write_picture(
         InputError: The ending is unknown, the grasp does not lie on the body, the friction is out
             of range, or `reach` holds no pose of this hand in this grasp.
     """
-    path = path_of(path, "path")
-    format_of(path)
-    held = held_by(hand, reach, grasp)
-    sheet = grasp_sheet(body, grasp, friction, view=view, legend=True, held=held)
-    return sheet.write(path)
+    format_of(path_of(path, "path"))  # before the work
+    return grasp_figure(body, grasp, friction, view=view, hand=hand, reach=reach).write(path)
 
 
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
@@ -115,7 +116,7 @@ def _middle(face: Face) -> Array:
 
 def grasp_figure(
     body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
-    legend: bool = True, hand: Hand | None = None, reach: "HandReach | None" = None,
+    legend: bool = True, hand: Hand | None = None, reach: HandReach | None = None,
 ) -> Sheet:  # fmt: skip
     """Draw a grasp as `write_picture` does, as a sheet that a notebook shows.
 
@@ -134,12 +135,10 @@ def grasp_sheet(
     check_drawn(body, grasp, friction, view)
     switch(legend, "legend")
     name = f"Grasp {grasp.id} of {body.name}"
-    if held is None:
-        shapes, numbers = drawing_of(body, grasp, friction), number_places(body, grasp)
-        view = view or best_view(body, grasp)
-    else:
-        shapes, numbers = drawing_with_hand(body, grasp, friction, held), numbers_behind(held)
-        view, name = view or view_of_hand(body, held), f"{name} with the hand {held.hand.name}"
+    if held is not None:
+        name += f" with the hand {held.hand.name}"
+    shapes, numbers = drawing_of(body, grasp, friction, held), numbers_of(body, grasp, held)
+    view = view or view_of(body, grasp, held)
     sheet = sheet_of(shapes, body, view, name, numbers=numbers, side=SIDE)
     if not legend:
         return sheet
@@ -152,14 +151,11 @@ def sheet_of(
     numbers: Array | None = None, side: int,
     labels: Sequence[tuple[str, str]] = FINGER_LABELS,
 ) -> Sheet:  # fmt: skip
-    """Draw shapes on a square sheet.
-
-    Takes `numbers` (k, 3) [m]; `side` [pixels].
-    """
+    """Draw shapes on a square sheet, with labels at the places of numbers, (k, 3) [m]."""
     places = np.empty((0, 3)) if numbers is None else numbers
     low, high = frame_around(shapes, places, extent, view)
     scale = side / float(high[0] - low[0])
-    patches = painted(shapes, view, float(high[0] - low[0]))
+    parts = painted(shapes, view, float(high[0] - low[0]))
 
     def place(points: Array) -> Array:
         return np.array([0.0, side]) + np.array([scale, -scale]) * (points - low)
@@ -170,19 +166,22 @@ def sheet_of(
         for (text, colour), middle in zip(labels, place(view.seen(places)[0]), strict=False)
         for mark in numbered(middle, radius, text, colour)
     ]
-    moved = [_moved(patch, place, scale) for patch in patches]
-    return Sheet(side, side, name, (*_together(moved), *marks))
+    drawn = _together(_on_sheet(part, place, scale) for part in parts)
+    return Sheet(side, side, name, (*drawn, *marks))
 
 
-def _moved(patch: Patch, place: Callable[[Array], Array], scale: float) -> Mark:
-    loops = tuple(place(loop) for loop in patch.loops)
-    if patch.radius:
-        return Dots(loops[0], patch.colour, scale * patch.radius, patch.opacity)
-    if patch.width:
-        return Line(loops, patch.colour, round(scale * patch.width, 3), patch.opacity)
-    if sum(map(len, loops)) > MANY:
-        loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
-    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), patch.colour, patch.opacity)
+def _on_sheet(part: Part, place: Callable[[Array], Array], scale: float) -> Mark:
+    match part:
+        case Dots():
+            return replace(part, points=place(part.points), radius=scale * part.radius)
+        case Line():
+            width = round(scale * part.width, 3)
+            return replace(part, lines=tuple(map(place, part.lines)), width=width)
+        case Area():
+            loops = tuple(map(place, part.loops))
+            if sum(map(len, loops)) > MANY:
+                loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
+            return replace(part, loops=tuple(loop for loop in loops if len(loop) >= POLYGON))
 
 
 def _together(marks: Iterable[Mark]) -> Iterable[Mark]:
@@ -198,15 +197,7 @@ def _together(marks: Iterable[Mark]) -> Iterable[Mark]:
             yield Line(lines, *look)
 
 
-def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None) -> None:
-    """Refuse an object, grasp, friction or view that cannot be drawn."""
-    check_on_faces(body, grasp)
-    coefficient(friction)
-    if view is not None:
-        instance(view, View, "view", "View.of_angles makes one")
-
-
-def held_by(hand: Hand | None, reach: "HandReach | None", grasp: Grasp) -> PosedHand | None:
+def held_by(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
     """Take a hand in its pose from what a user gave; None if nothing was given."""
     if hand is None and reach is None:
         return None
@@ -217,12 +208,6 @@ def held_by(hand: Hand | None, reach: "HandReach | None", grasp: Grasp) -> Posed
             "reach = gc.reach_with(hand, body, grasp, friction)"
         )
     return posed_hand(hand, reach, grasp)
-
-
-def number_places(body: Extent, grasp: Grasp) -> Array:
-    """Return where the fingers' numbers are written, behind their bars, (4, 3) [m]."""
-    ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
-    return grasp.positions - (BAR_LENGTH + NUMBER_BEYOND) * finger_size(body) * ways
 
 
 def frame_around(
@@ -243,18 +228,17 @@ def frame_around(
 
 def _entries(shapes: Sequence[Shape]) -> list[Entry]:
     found = {shape.role: shape for shape in reversed(shapes)}
-    entries = list[Entry]()
-    for role in EXPLAINED:
-        if role not in found:
-            continue
-        look, shape = LOOKS[role], found[role]
-        colour = NEUTRAL if shape.finger is not None else colour_of(shape)
-        if look.dot:
-            entries.append(Entry(role, colour, "disc"))
-        elif look.fill == 1.0:
-            entries.append(Entry(role, colour, "square"))
-        elif look.fill:
-            entries.append(Entry(role, colour, "area"))
-        else:
-            entries.append(Entry(role, colour, "dashes" if look.dashed else "line"))
-    return entries
+    return [
+        Entry(role, LOOKS[role].colour if found[role].finger is None else NEUTRAL, _kind(role))
+        for role in EXPLAINED if role in found
+    ]  # fmt: skip
+
+
+def _kind(role: Role) -> Kind:
+    """Return how a key shows what shapes of a role look like."""
+    look = LOOKS[role]
+    if look.dot:
+        return "disc"
+    if look.fill:
+        return "square" if look.solid else "area"
+    return "dashes" if look.dashed else "line"

@@ -3,12 +3,14 @@
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol, Self
+from typing import Annotated, Self, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen
-from grasp_core.checked import number, positive
+from grasp_core.arrays import Array, Point, Shape
+from grasp_core.checked import number
+from grasp_core.declared import Declared
+from grasp_core.kinds import Quantity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
@@ -27,20 +29,6 @@ FORESHORTENED = 0.8
 """Cosine of the angle to the line of sight above which a finger points at the viewer."""
 
 
-class Extent(Protocol):
-    """The place and size of what is drawn: an object, or a grasp alone."""
-
-    @property
-    def center_of_mass(self) -> Array:
-        """Return the point around which everything is drawn, (3,) [m]."""
-        ...
-
-    @property
-    def radius(self) -> float:
-        """Return the length by which bars and cones are measured [m]."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Alone:
     """The extent of what is drawn beside an object, as a ball around it."""
@@ -49,19 +37,18 @@ class Alone:
     radius: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
+Extent: TypeAlias = Polyhedron | Alone
+"""The place and size of what is drawn: of an object, or of a grasp or hand beside it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class View(Declared):
     """A camera that looks at a point, with z of the object's frame upwards."""
 
-    axes: Array
+    axes: Annotated[Array, Shape(3, 3)]
     """Unit vectors to the right, up and towards the viewer, (3, 3), rows."""
-    center: Array
-    distance: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "axes", frozen(self.axes, (3, 3), "axes"))
-        object.__setattr__(self, "center", frozen(self.center, (3,), "center"))
-        positive(self.distance, "distance")
+    center: Point
+    distance: Quantity
 
     @classmethod
     def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Extent) -> Self:
@@ -91,30 +78,28 @@ def _axes(azimuth: float, elevation: float) -> Array:
     return np.array([right, np.cross(towards, right), towards])
 
 
+def approaches(grasp: Grasp) -> Array:
+    """Return the directions in which the fingers of a grasp come in, (4, 3)."""
+    return grasp.normals if grasp.approach_directions is None else grasp.approach_directions
+
+
 def best_view(body: Polyhedron, grasp: Grasp) -> View:
     """Choose a view that keeps contacts and fingers apart and shows few faces edge-on."""
-    _, axes = views_at(ELEVATIONS)
-    return _clearest(body, grasp, 0.5 * edge_on(body, axes))
+    outward = -approaches(grasp)
+    ends = grasp.positions + body.radius * outward
+    angles, axes = views_at(ELEVATIONS)
+    fingers = axes[:, 2] @ outward.T
+    apart = least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
+    pointing = np.maximum(np.abs(fingers) - FORESHORTENED, 0.0).sum(axis=1)
+    in_front = (fingers > SAME_MERIT).mean(axis=1)
+    merits = apart + 0.1 * in_front - 2.0 * pointing - 0.5 * edge_on(body, axes)
+    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], body)
 
 
 def edge_on(body: Polyhedron, axes: Array) -> Array:
     """Return the share of an object's surface that is seen nearly as lines in each view, (n,)."""
     areas = np.array([face.area for face in body.faces])
     return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
-
-
-def _clearest(body: Extent, grasp: Grasp, faults: Array) -> View:
-    """Return the view with fingers best apart, less the faults (n,) of each view."""
-    outward = -grasp.normals if grasp.approach_directions is None else -grasp.approach_directions
-    ends = grasp.positions + body.radius * outward
-    angles, axes = views_at(ELEVATIONS)
-    towards = axes[:, 2]
-    fingers = towards @ outward.T
-    apart = least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
-    pointing = np.maximum(np.abs(fingers) - FORESHORTENED, 0.0).sum(axis=1)
-    in_front = (fingers > SAME_MERIT).mean(axis=1)
-    merits = apart + 0.1 * in_front - 2.0 * pointing - faults
-    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], body)
 
 
 @cache

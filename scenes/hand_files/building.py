@@ -15,10 +15,9 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.couplings import Coupling
-from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.hand import PALM, Hand, HandFinger, Joint, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
-from scenes.hand_files.couplings import followers
-from scenes.hand_files.fingers import Chains, TipBall, chains, frames, tip_ball
+from scenes.hand_files.fingers import Chains, chains, followers, joint_name, tip_of
 from scenes.hand_files.model import HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text
 
@@ -34,18 +33,17 @@ def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
     read, name = model_text(path), str(path)
     model = compiled_hand(read, name)
     found = chains(model, fingertips, name)
-    placed = frames(model, found)
-    balls = _balls(model, found, placed, name)
-    shapes = _shapes(model, found, placed, balls)
-    coupled = followers(model, found, name)
-    fingers = [
-        HandFinger(tip.name, _links(model, found, placed, shapes, chain, coupled.ranges), ball)
-        for tip, chain, (ball, _) in zip(found.tips, found.joints, balls, strict=True)
+    tips = [
+        tip_of(model, tip, found.frames[chain[-1]], name)
+        for tip, chain in zip(found.tips, found.joints, strict=True)
     ]
-    rules = tuple(
-        Coupling(_joint_name(model, joint), _joint_name(model, line.root), line.ratio, line.offset)
-        for joint, line in sorted(coupled.lines.items())
-    )
+    covers = {tip.geom: cover for tip, (_, cover) in zip(found.tips, tips, strict=True)}
+    shapes = _shapes(model, found, covers)
+    rules, ranges, coupled = followers(model, found, name)
+    fingers = [
+        HandFinger(tip.name, _links(model, found, shapes, chain, ranges), made)
+        for tip, chain, (made, _) in zip(found.tips, found.joints, tips, strict=True)
+    ]
     own_fingers, couplings, originals = own_chains(fingers, rules)
     common = sorted(set(originals.values()))
     shared = [f"links that fingers have in common: {', '.join(common)}"] if common else []
@@ -54,7 +52,7 @@ def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
         path.stem, palm, own_fingers, (f"{path.name}; {AS_BOXES}",),
         f"{path.name}; None where it states none",
         couplings=couplings,
-        notes=(*read.notes, *model.notes, *coupled.notes, *shared, *_tips_elsewhere(model, found)),
+        notes=(*read.notes, *model.notes, *coupled, *shared, *_tips_elsewhere(model, found)),
     )  # fmt: skip
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
     pairs = _excluded(model, found) | (middle & _close_by(hand, originals))
@@ -71,51 +69,36 @@ def _tips_elsewhere(model: HandModel, found: Chains) -> tuple[str, ...]:
     return (f"fingertips without shapes are the nearest shape of their link: {', '.join(names)}",)
 
 
+def _named_pair(one: str, other: str) -> tuple[str, str]:
+    """Return two names in the order in which a hand lists pairs of links."""
+    return min(one, other), max(one, other)
+
+
 def _close_by(hand: Hand, originals: dict[str, str]) -> set[tuple[str, str]]:
     """Return names of links at most two joints apart in a finger, or from the palm."""
     pairs = set[tuple[str, str]]()
     for finger in hand.fingers:
         chain = [PALM, *(originals.get(link.name, link.name) for link in finger.links)]
         for apart in range(1, CLOSE_BY + 1):
-            pairs |= {(min(p), max(p)) for p in zip(chain, chain[apart:], strict=False)}
+            pairs |= set(map(_named_pair, chain, chain[apart:]))
     return pairs
 
 
-def _balls(
-    model: HandModel, found: Chains, frames: dict[int, tuple[Array, Array]], name: str
-) -> list[tuple[Fingertip, TipBall]]:
-    balls = list[tuple[Fingertip, TipBall]]()
-    for tip, chain in zip(found.tips, found.joints, strict=True):
-        R, p = model.rotations[tip.body], model.positions[tip.body]
-        turned, origin = frames[chain[-1]]
-        ball = tip_ball(model, tip, R.T @ (origin - p), name)
-        center = turned.T @ (p + R @ ball.center - origin)
-        corners = None if ball.corners is None else (p + ball.corners @ R.T - origin) @ turned
-        balls.append((Fingertip(center, ball.radius, corners, ball.rounding), ball))
-    return balls
-
-
 def _shapes(
-    model: HandModel, found: Chains, frames: dict[int, tuple[Array, Array]],
-    balls: list[tuple[Fingertip, TipBall]],
-) -> dict[int, list[LinkShape]]:  # fmt: skip
+    model: HandModel, found: Chains, covers: dict[int | None, LinkShape | None]
+) -> dict[int, list[LinkShape]]:
     """Collect the shapes that collide, by the joint that moves them, in the links' frames."""
-    covers = {
-        tip.geom: ball.cover
-        for tip, (_, ball) in zip(found.tips, balls, strict=True)
-        if tip.geom is not None and ball.cover is not None
-    }
     shapes: dict[int, list[LinkShape]] = {}
-    for g in sorted(range(len(model.geom_kinds)), key=covers.__contains__):  # covers come last
+    geoms = range(len(model.geom_kinds))
+    for g in sorted(geoms, key=lambda g: covers.get(g) is not None):  # covers come last
         body = int(model.raw.geom_bodyid[g])
-        owner, kind = found.owners[body], model.geom_kinds[g]
-        named = any(tip.geom == g for tip in found.tips)
-        if owner not in frames or kind in {"plane", "hfield"}:
+        owner = found.owners[body]
+        if owner not in found.frames or model.geom_kinds[g] in {"plane", "hfield"}:
             continue
-        if not (model.geom_bits[g].any() or named):
+        if not (model.geom_bits[g].any() or g in covers):
             continue
         shape = covers.get(g) or _shape(model, g)
-        turned, origin = frames[owner]
+        turned, origin = found.frames[owner]
         R, p = model.rotations[body], model.positions[body]
         shapes.setdefault(owner, []).append(
             LinkShape(
@@ -143,60 +126,46 @@ def _shape(model: HandModel, g: int) -> LinkShape:
 
 
 def _links(
-    model: HandModel, found: Chains, frames: dict[int, tuple[Array, Array]],
-    shapes: dict[int, list[LinkShape]], chain: tuple[int, ...],
-    ranges: dict[int, tuple[float, float]],
+    model: HandModel, found: Chains, shapes: dict[int, list[LinkShape]], chain: tuple[int, ...],
+    ranges: Array,
 ) -> tuple[Link, ...]:  # fmt: skip
     links, before = list[Link](), -1
     for joint in chain:
-        turned, origin = frames[joint]
-        old, start = frames[before]
-        mass, center = _mass(model, found, joint, turned, origin)
-        low, high = model.joint_ranges[joint].tolist()
-        ends = ranges.get(joint, (low, high))
-        links.append(
-            Link(
-                _link_name(model, joint),
-                _joint(model, joint, old.T @ (origin - start), old.T @ turned, ends),
-                tuple(shapes.get(joint, ())),
-                mass,
-                center,
-            )
-        )
+        turned, origin = found.frames[joint]
+        old, start = found.frames[before]
+        mass, center = _mass(model, found, joint)
+        place = old.T @ (origin - start), old.T @ turned
+        moved = _joint(model, joint, *place, ranges[joint])
+        own = tuple(shapes.get(joint, ()))
+        links.append(Link(_link_name(model, joint), moved, own, mass, center))
         before = joint
     return tuple(links)
 
 
 def _link_name(model: HandModel, joint: int) -> str:
     """Name a link: like its body, or like its joint where the body has several or no name."""
+    if joint < 0:
+        return PALM
     body = int(model.raw.jnt_bodyid[joint])
     shared = int((model.raw.jnt_bodyid == body).sum()) > 1
     name = model.joint_names[joint] if shared else model.body_names[body]
     return name if name and name != PALM else f"link{joint}"
 
 
-def _joint_name(model: HandModel, joint: int) -> str:
-    return model.joint_names[joint] or f"joint{joint}"
-
-
-def _joint(
-    model: HandModel, joint: int, position: Array, rotation: Array, ends: tuple[float, float]
-) -> Joint:
+def _joint(model: HandModel, joint: int, position: Array, rotation: Array, ends: Array) -> Joint:
     """Make a joint whose angle zero is the file's zero, not the pose in which the file draws it."""
-    axis = model.raw.jnt_axis[joint]
+    axis = model.raw.jnt_axis[joint] / np.linalg.norm(model.raw.jnt_axis[joint])
     low, high = np.where(np.isnan(ends), (-FULL_TURN, FULL_TURN), ends).tolist()
     # the frames are those at the reference angle; the same axis turns them to the angle zero
-    back = rotation_about(axis / np.linalg.norm(axis), -float(model.references[joint]))
+    back = rotation_about(axis, -float(model.references[joint]))
     torque = float(model.torques[joint])
     return Joint(
-        _joint_name(model, joint), position, _squared(rotation @ back),
-        axis / np.linalg.norm(axis), low, high, None if np.isnan(torque) else torque,
+        joint_name(model, joint), position, _squared(rotation @ back),
+        axis, low, high, None if np.isnan(torque) else torque,
     )  # fmt: skip
 
 
-def _mass(
-    model: HandModel, found: Chains, joint: int, turned: Array, origin: Array
-) -> tuple[float, Array]:
+def _mass(model: HandModel, found: Chains, joint: int) -> tuple[float, Array]:
     """Sum the masses of the bodies that a joint moves, and find their middle in its frame."""
     bodies = [b for b, owner in enumerate(found.owners) if owner == joint]
     masses = model.raw.body_mass[bodies]
@@ -206,23 +175,20 @@ def _mass(
     places = model.positions[bodies] + np.einsum(
         "bij,bj->bi", model.rotations[bodies], model.raw.body_ipos[bodies]
     )
+    turned, origin = found.frames[joint]
     return total, turned.T @ (masses @ places / total - origin)
 
 
 def _excluded(model: HandModel, found: Chains) -> set[tuple[str, str]]:
     """Return the names of links that the file lets overlap."""
-    pairs = set[tuple[str, str]]()
-    for both in model.raw.exclude_signature.tolist():
-        owners = found.owners[int(both) >> 16], found.owners[int(both) & 0xFFFF]
-        if min(owners) >= -1 and owners[0] != owners[1]:
-            named = [PALM if j < 0 else _link_name(model, j) for j in owners]
-            pairs.add((min(named), max(named)))
+    pairs = [
+        (found.owners[int(both) >> 16], found.owners[int(both) & 0xFFFF])
+        for both in model.raw.exclude_signature.tolist()
+    ]
+    kept = [(one, other) for one, other in pairs if min(one, other) >= -1 and one != other]
     links = sorted({owner for owner in found.owners if owner >= -1})
-    for one, other in combinations(links, 2):
-        if not _may_meet(model, found, one, other):
-            named = [PALM if j < 0 else _link_name(model, j) for j in (one, other)]
-            pairs.add((min(named), max(named)))
-    return pairs
+    kept += [pair for pair in combinations(links, 2) if not _may_meet(model, found, *pair)]
+    return {_named_pair(_link_name(model, one), _link_name(model, other)) for one, other in kept}
 
 
 def _may_meet(model: HandModel, found: Chains, one: int, other: int) -> bool:
@@ -254,9 +220,7 @@ def own_chains(
             own = leaders.get(link.joint.name, Coupling(joint, link.joint.name, 1.0))
             added.append(replace(own, joint=joint))
             originals[name] = link.name
-            links.append(
-                Link(name, replace(link.joint, name=joint), (), 0.0, np.zeros(3))
-            )  # fmt: skip
+            links.append(Link(name, replace(link.joint, name=joint), (), 0.0, np.zeros(3)))
         seen |= {link.name for link in finger.links}
         kept.append(replace(finger, links=tuple(links)))
     return tuple(kept), (*couplings, *added), originals

@@ -1,4 +1,4 @@
-"""Finds the palm, the fingers and the fingertips of a compiled model from the fingertips' names.
+"""Finds palm, fingers, fingertips and coupled joints of a compiled model from fingertips' names.
 
 The palm is the last body that all fingertips hang on. Each body below it belongs to the link of the
 nearest joint on the way to a fingertip; what hangs on no such way, and what is above the palm,
@@ -9,12 +9,18 @@ is farther from the last joint. Any other geom is a block: a mesh the hull of it
 else its box. A block has sharp edges, so that its corners are given a rounding, by which it is
 larger all around. The ball that stands for it lies in its box, at the end that is farther from the
 last joint.
+
+Rules that hold a joint at a linear function of another (`<mimic>` of URDF, `<equality><joint>` of
+MJCF) are followed to a joint that follows none. Of joints that move together one is the hand's free
+joint: that one, if it is on the way to a fingertip and has a motor or no other has; otherwise the
+first with a motor, or the first. Joints off the way to a fingertip count by their ranges. Other
+rules are refused.
 """
 
 import importlib
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -22,8 +28,10 @@ from grasp_core.arrays import Array
 from grasp_core.checked import shown
 from grasp_core.errors import InputError
 from grasp_core.hands.collisions import beyond_hull
-from grasp_core.hands.hand import SAME, LinkShape
-from scenes.hand_files.model import HandModel, mesh_points
+from grasp_core.hands.couplings import Coupling
+from grasp_core.hands.hand import SAME, Fingertip, LinkShape
+from scenes.hand_files.model import HandModel, JointRule, mesh_points
+from scenes.hand_files.model_text import listed
 
 WORLD = 0
 ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
@@ -32,6 +40,10 @@ ROUNDING = 1e-4
 """Least rounding of a block [m]."""
 MOST_WAYS = 180
 """Number of directions in which the corners of a mesh are taken that has more of them."""
+
+
+Frame: TypeAlias = tuple[Array, Array]
+"""Axes of a link as columns, (3, 3), and its origin, (3,) [m], in the world."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +66,8 @@ class Chains:
     """For each finger its joints, from the palm outwards; the first may be common."""
     owners: tuple[int, ...]
     """For each body, the joint that moves it, -1 for the palm's, -2 where it is no part of it."""
+    frames: dict[int, Frame]
+    """Frame of each joint's link, with the axes of its body; -1 is the palm's."""
 
 
 def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
@@ -84,7 +98,12 @@ def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
                 f"{name}: fingers may share some joints, but must end with one of their own; "
                 f"{model.joint_names[chain[-1]]} moves {tip.name} and another fingertip"
             )
-    return Chains(palm, tips, joints, _owners(model, palm, {j for each in joints for j in each}))
+    frames = {-1: (model.rotations[palm], model.positions[palm])}
+    for joint in (joint for chain in joints for joint in chain):
+        body = int(model.raw.jnt_bodyid[joint])
+        R = model.rotations[body]
+        frames[joint] = R, model.positions[body] + R @ model.raw.jnt_pos[joint]
+    return Chains(palm, tips, joints, _owners(model, palm, set(frames)), frames)
 
 
 def _tip(model: HandModel, name: str, file: str) -> Tip:
@@ -155,58 +174,51 @@ def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
     return tuple(found)
 
 
-def frames(model: HandModel, found: Chains) -> dict[int, tuple[Array, Array]]:
-    """Return axes and origin of each joint's link, as its body's; -1 is the palm's body."""
-    placed = {-1: (model.rotations[found.palm], model.positions[found.palm])}
-    for joint in (joint for chain in found.joints for joint in chain):
-        body = int(model.raw.jnt_bodyid[joint])
-        R = model.rotations[body]
-        placed[joint] = R, model.positions[body] + R @ model.raw.jnt_pos[joint]
-    return placed
+def tip_of(
+    model: HandModel, tip: Tip, frame: Frame, name: str
+) -> tuple[Fingertip, LinkShape | None]:
+    """Make a fingertip in the frame of its link.
 
+    Gives also the box that covers a block, in place of its geom and in the frame of its body.
+    """
+    axes, origin = frame
+    R, p = model.rotations[tip.body], model.positions[tip.body]
 
-@dataclass(frozen=True, slots=True)
-class TipBall:
-    """A fingertip in the frame of its body: its ball, and its block if it is one."""
+    def ball(center: Array, radius: float, corners: Array | None = None) -> Fingertip:
+        placed = axes.T @ (p + R @ center - origin)
+        if corners is None:
+            return Fingertip(placed, radius)
+        return Fingertip(placed, radius, (p + corners @ R.T - origin) @ axes, rounding)
 
-    center: Array
-    radius: float
-    corners: Array | None = None  # of the block, (m, 3) [m]; None for a ball
-    rounding: float = 0.0
-    cover: LinkShape | None = None  # box that covers the block, in place of its geom
-
-
-def tip_ball(model: HandModel, tip: Tip, joint: Array, name: str) -> TipBall:
-    """Find the ball of a fingertip."""
     if tip.site is not None:
         radius = float(model.raw.site_size[tip.site, 0])
         if radius <= 0.0:
             raise InputError(f"{name}: site {tip.name} must have a size, the ball's radius")
-        return TipBall(model.raw.site_pos[tip.site], radius, None)
-    geom = int(tip.geom or 0)
-    R, kind = model.geom_rotations[geom], model.geom_kinds[geom]
+        return ball(model.raw.site_pos[tip.site], radius), None
+    geom, joint = int(tip.geom or 0), R.T @ (origin - p)
+    place, turned, kind = (
+        model.raw.geom_pos[geom],
+        model.geom_rotations[geom],
+        model.geom_kinds[geom],
+    )
     if kind == "sphere":
-        return TipBall(model.raw.geom_pos[geom], float(model.raw.geom_size[geom, 0]), None)
-    middle = model.raw.geom_pos[geom] + R @ model.raw.geom_aabb[geom, :3]
+        return ball(place, float(model.raw.geom_size[geom, 0])), None
+    middle = place + turned @ model.raw.geom_aabb[geom, :3]
     half = model.raw.geom_aabb[geom, 3:].copy()
     if kind == "capsule":
         axis, radius = 2, float(model.raw.geom_size[geom, 0])
     else:
-        axis = int(np.argmax(np.abs(R.T @ (middle - joint))))
+        axis = int(np.argmax(np.abs(turned.T @ (middle - joint))))
         radius = float(half[list(ACROSS[axis])].min())
         half[axis] = max(half[axis], radius)
-    sign = 1.0 if R[:, axis] @ (middle - joint) >= 0.0 else -1.0
-    center = middle + sign * (half[axis] - radius) * R[:, axis]
+    sign = 1.0 if turned[:, axis] @ (middle - joint) >= 0.0 else -1.0
+    center = middle + sign * (half[axis] - radius) * turned[:, axis]
     if kind == "capsule":
-        return TipBall(center, radius, None)
+        return ball(center, radius), None
     corners, rounding = _corners(model, geom)
     low, high = corners.min(axis=0) - rounding, corners.max(axis=0) + rounding
-    cover = LinkShape(
-        model.raw.geom_pos[geom] + R @ (0.5 * (low + high)), R, 0.5 * (high - low) + SAME, 0.0
-    )
-    return TipBall(
-        center, radius, model.raw.geom_pos[geom] + corners @ R.T, rounding, cover
-    )  # fmt: skip
+    cover = LinkShape(place + turned @ (0.5 * (low + high)), turned, 0.5 * (high - low) + SAME, 0.0)
+    return ball(center, radius, place + corners @ turned.T), cover
 
 
 def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
@@ -221,3 +233,114 @@ def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
     ways = np.random.default_rng(0).normal(size=(MOST_WAYS, 3))
     kept = points[np.unique(np.argmax(points @ ways.T, axis=0))]
     return kept, ROUNDING + max(beyond_hull(kept, points))
+
+
+def followers(
+    model: HandModel, found: Chains, name: str
+) -> tuple[tuple[Coupling, ...], Array, tuple[str, ...]]:
+    """Find which joints follow others: couplings on the way to fingertips, ranges, and notes.
+
+    Ranges are those of all joints, (j, 2) [rad], narrowed by what follows them; NaN for none.
+    """
+    used = {joint for chain in found.joints for joint in chain}
+    _refuse_loops(model, used, name)
+    lines = _lines(model, used, name)
+    roots = {rule.leader for joint, rule in lines.items() if joint in used and rule.leader >= 0}
+    kept = list[JointRule]()
+    ranges = model.joint_ranges.copy()
+    for joint in used & lines.keys():
+        if (constant := lines[joint]).leader < 0:
+            ranges[joint] = constant.offset
+    aside = list[str]()
+    for root in sorted(roots):
+        own = [JointRule(root, root, 0.0, 1.0)]
+        own += [rule for _, rule in sorted(lines.items()) if rule.leader == root]
+        members = [rule for rule in own if rule.joint in used]
+        driven = (rule for rule in members if not np.isnan(model.torques[rule.joint]))
+        free = next(driven, members[0])  # the first is the one that others follow
+        turned = list[JointRule]()
+        for rule in own:  # by the angle of the free joint
+            ratio = rule.ratio / free.ratio
+            offset = rule.offset - ratio * free.offset
+            turned.append(JointRule(rule.joint, free.joint, offset, ratio))
+        kept += [rule for rule in turned if rule.joint in used and rule.joint != free.joint]
+        if others := [rule for rule in turned if rule.joint not in used]:
+            aside += [model.joint_names[rule.joint] for rule in others]
+            for rule in others:  # which are not the hand's, and stay in their ranges
+                ends = (model.joint_ranges[rule.joint] - rule.offset) / rule.ratio
+                low, high = ranges[free.joint]
+                ranges[free.joint] = np.fmax(low, ends.min()), np.fmin(high, ends.max())
+    couplings = tuple(
+        Coupling(joint_name(model, rule.joint), joint_name(model, rule.leader), rule.ratio,
+                 rule.offset)
+        for rule in sorted(kept)
+    )  # fmt: skip
+    return couplings, ranges, _notes(model, used, aside)
+
+
+def _lines(model: HandModel, used: set[int], name: str) -> dict[int, JointRule]:
+    """Follow each rule to a joint that follows none, or to a constant."""
+    rules = {rule.joint: rule for rule in model.joint_rules}
+    if len(rules) < len(model.joint_rules):
+        listed_twice = [rule.joint for rule in model.joint_rules]
+        _refuse(model, {j for j in rules if listed_twice.count(j) > 1}, name, "follow two others")
+    lines = dict[int, JointRule]()
+    for joint in rules:
+        line, passed = JointRule(joint, joint, 0.0, 1.0), [joint]
+        while line.leader in rules:
+            rule = rules[line.leader]
+            if not rule.is_linear:
+                _refuse(model, {joint} & used and {joint, rule.leader}, name, "are on a curve")
+                break
+            offset = line.offset + line.ratio * rule.offset
+            leader = rule.leader if rule.ratio else -1
+            line = JointRule(joint, leader, offset, line.ratio * rule.ratio)
+            if leader in passed:
+                _refuse(model, set(passed), name, "follow each other in a circle")
+            passed.append(leader)
+        else:
+            lines[joint] = line
+    return lines
+
+
+def joint_name(model: HandModel, joint: int) -> str:
+    """Name a joint, also where the file does not."""
+    return model.joint_names[joint] or f"joint{joint}"
+
+
+def _refuse_loops(model: HandModel, used: set[int], name: str) -> None:
+    """Refuse what holds bodies or tendons together, where joints of the hand move them."""
+    for kind, *bodies in model.loops:
+        one, other = (
+            {j for j, own in enumerate(model.raw.jnt_bodyid.tolist()) if own in path}
+            for path in (path_of_body(model, body) for body in bodies)
+        )
+        _refuse(model, (one ^ other) & used, name, f"are in a loop that a {kind} closes")
+    for tendon in model.tendons:
+        if tendon.is_held and (used & set(tendon.joints) or not tendon.joints):
+            joints = set(tendon.joints) or used
+            _refuse(model, joints, name, f"are coupled by the length of tendon {tendon.name}")
+
+
+def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:
+    if joints:
+        named = [joint_name(model, joint) for joint in sorted(joints - {-1})]
+        raise InputError(
+            f"{name}: joints {listed(named)} {why}; a hand's joints must be free or follow one "
+            "other by offset + ratio * angle: write such a rule in its place, or remove it"
+        )
+
+
+def _notes(model: HandModel, used: set[int], aside: list[str]) -> tuple[str, ...]:
+    notes = list[str]()
+    if aside:
+        notes.append(
+            "joints that move no fingertip are drawn as the file starts, though they are coupled "
+            f"with joints that do: {listed(aside)}"
+        )
+    tendons = [t.name for t in model.tendons if used & set(t.joints) or not t.joints]
+    if tendons:
+        notes.append(
+            f"tendons are left out, as if joints had motors of their own: {listed(tendons)}"
+        )
+    return tuple(notes)

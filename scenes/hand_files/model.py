@@ -31,7 +31,7 @@ class JointRule(NamedTuple):
     leader: int  # the other joint; -1 for a constant angle
     offset: float
     ratio: float
-    is_linear: bool  # False where the rule has further powers of the leader's angle
+    is_linear: bool = True  # False where the rule has further powers of the leader's angle
 
 
 class Tendon(NamedTuple):
@@ -93,9 +93,9 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
         names = listed([model.body(body).name for body in lent])
         notes.append(f"bodies without shapes that collide do so with all they have: {names}")
     kinds = tuple(mujoco.mjtJoint(int(kind)).name[6:].lower() for kind in model.jnt_type)
-    hinges = np.array([kind == "hinge" for kind in kinds], bool)
-    slides = np.array([kind == "slide" for kind in kinds], bool)
-    limited = (hinges | slides) & model.jnt_limited.astype(bool)
+    hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
+    moving = hinges | (model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE)
+    limited = moving & model.jnt_limited.astype(bool)
     return HandModel(
         raw=model,
         body_names=_names(model, mujoco.mjtObj.mjOBJ_BODY, model.nbody),

@@ -328,7 +328,7 @@ class Verdict(Declared, InNotebooks):
         """Return a picture of the scene with how the trials ended, the failed ones first."""
         if self.scene is None:
             return None
-        from scenes.drawing.in_notebooks import card, placed
+        from scenes.drawing.pages import card, placed
 
         title = f"{self.id}: {self.outcome.value.replace('_', ' ')}"
         return card(placed(self.scene.layout), title, _rows(self))

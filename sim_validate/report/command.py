@@ -13,8 +13,8 @@ from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
+from scenes.drawing.pages import turntable_page
 from scenes.drawing.pictures import grasp_sheet
-from scenes.drawing.turntable import turntable_page
 from scenes.mujoco.closure_scene import Scene, build_scene
 from scenes.settings import FingerSettings
 from sim_validate.engine.setup import with_planned_radius

@@ -25,10 +25,9 @@ from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
 from sim_validate.kit.result_folders import CLIPS, PICTURES
 from sim_validate.planning.regions_json import GraspRegions
-from sim_validate.report.charts.margin_charts import margin_panels
-from sim_validate.report.charts.motion_charts import motion_panels
-from sim_validate.report.charts.wrench_charts import wrench_panels
+from sim_validate.report.grasp_charts import margin_panels, wrench_panels
 from sim_validate.report.reached_grasps import held_in
+from sim_validate.report.run_charts import motion_panels
 from sim_validate.report.run_folder import RunFolder
 
 

@@ -11,8 +11,7 @@ from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.figures import figures
 from grasp_core.values import Grasp
-from scenes.drawing.pages import NOTHING, number
-from scenes.drawing.turntable import Fact, as_text, grasp_data, grasp_facts
+from scenes.drawing.pages import NOTHING, Fact, as_text, grasp_data, grasp_facts, number
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.planning.best_json import MEASURES, Best

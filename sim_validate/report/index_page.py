@@ -23,7 +23,6 @@ from sim_validate.report.agreement import (
     quadrants_in,
     wrench_size,
 )
-from sim_validate.report.charts.run_charts import fidelity_panel
 from sim_validate.report.executed_grasps import (
     described_executions,
     execution_figures,
@@ -38,6 +37,7 @@ from sim_validate.report.reached_grasps import (
     reach_settings,
     said_of_reach,
 )
+from sim_validate.report.run_charts import fidelity_panel
 from sim_validate.report.run_folder import RunFolder
 
 ROWS = 20

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from grasp_core.checked import function, path_of, whole
 from grasp_core.files.text_files import write_text
-from scenes.drawing.turntable import as_text, object_data
+from scenes.drawing.pages import as_text, object_data
 from sim_validate.kit.processes import available_cores, each
 from sim_validate.kit.result_folders import (
     GRASPS,

@@ -10,12 +10,15 @@ import grasp_core as gc
 from scenes.drawing.drawings import (
     BAR_LENGTH,
     MOST_TRIANGLES,
+    cone_sides,
     drawing_of,
     finger_size,
     glass,
+    ring,
     rulings,
+    tube,
 )
-from scenes.drawing.shapes import Shape, cone_sides, extent_of, ring, tube
+from scenes.drawing.painting import Shape, extent_of
 from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
 

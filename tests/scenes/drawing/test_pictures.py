@@ -13,13 +13,26 @@ import scenes
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_hull
 from scenes.drawing import pictures
-from scenes.drawing.colours import BAD, FINGERS, FOCUS, GOOD, INK, SURFACE, rgb
 from scenes.drawing.drawings import BAR_RADIUS, drawing_of, glass
-from scenes.drawing.painting import Surface, outline, painted
+from scenes.drawing.painting import LOOKS, Shape, Surface, outline, painted
 from scenes.drawing.panels import width_of
 from scenes.drawing.pictures import grasp_figure, write_picture
-from scenes.drawing.shapes import LOOKS, Shape
-from scenes.drawing.sheets import ASSETS, FONT_FILES, FORMATS, Sheet, Words, png_of
+from scenes.drawing.sheets import (
+    ASSETS,
+    BAD,
+    FINGERS,
+    FOCUS,
+    FONT_FILES,
+    FORMATS,
+    GOOD,
+    INK,
+    SURFACE,
+    Area,
+    Sheet,
+    Words,
+    png_of,
+    rgb,
+)
 from scenes.drawing.views import FORESHORTENED, View, best_view
 from tests.scenes.drawing.whole import assert_whole
 from tests.scenes.meshes import sphere_mesh
@@ -78,14 +91,14 @@ def square(nearness, role="region", finger=0):
 
 def test_what_is_in_front_is_drawn_later():
     patches = painted([square(0.3, finger=1), square(-0.3, finger=0)], FRONT, 2.0)
-    assert [patch.colour for patch in patches] == [FINGERS[0], FINGERS[1]]
+    assert [patch.fill for patch in patches] == [FINGERS[0], FINGERS[1]]
 
 
 def test_lines_are_as_wide_and_as_long_as_they_say():
     ends = np.array([FRONT.center - FRONT.axes[0], FRONT.center + FRONT.axes[0]])
     for role, share in (("friction cone", 1.0), ("line of force", 0.5)):
         parts = painted([Shape(role, 0, lines=(ends,))], FRONT, 2.0)
-        lengths = [np.linalg.norm(np.diff(line, axis=0)) for part in parts for line in part.loops]
+        lengths = [np.linalg.norm(np.diff(line, axis=0)) for part in parts for line in part.lines]
         assert sum(lengths) == pytest.approx(2.0 * share, rel=0.05)
         widths = [part.width for part in parts]
         np.testing.assert_allclose(widths, 0.02 * LOOKS[role].line, rtol=1e-9)
@@ -167,10 +180,10 @@ def test_a_curved_body_has_an_outline_and_no_seams():
     heights = (lines.reshape(-1, 3) - body.center_of_mass) @ view.axes[2] / body.radius
     # the camera is nine radii away: the tangents touch at a ninth, here to an edge's length
     assert np.abs(heights - 1.0 / 9.0).max() < 0.2
-    areas = [patch for patch in painted((surface,), view, 2.0) if not patch.width]
+    areas = [part for part in painted((surface,), view, 2.0) if isinstance(part, Area)]
     assert 2 <= len(areas) <= 14  # two sides, at most seven shades each
     flat, _ = view.seen(surface.vertices())
-    covered = sum(abs(signed(loop)) for patch in areas for loop in patch.loops)
+    covered = sum(abs(signed(loop)) for area in areas for loop in area.loops)
     assert covered == pytest.approx(2.0 * abs(signed(convex_hull(flat))), rel=0.35)
 
 

@@ -9,9 +9,8 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.closure.wrench_sets import WrenchSet
-from scenes.drawing.colours import BAD, GOOD, LEVELS
 from scenes.drawing.panels import thinned
-from scenes.drawing.sheets import Area, Dots, Image, png_of, svg_of
+from scenes.drawing.sheets import BAD, GOOD, LEVELS, Area, Dots, Image, png_of, svg_of
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.closure.verdict import WrenchVerdict
@@ -25,17 +24,17 @@ from sim_validate.report.agreement import (
     limits_in,
     quadrants_in,
 )
-from sim_validate.report.charts.margin_charts import (
+from sim_validate.report.grasp_charts import (
     directions_of_map,
     margin_figure,
     margin_panels,
     margins,
     on_map,
     pixels,
+    shadow_of,
+    wrench_panels,
 )
-from sim_validate.report.charts.motion_charts import friction_used, motion_panels
-from sim_validate.report.charts.run_charts import fidelity_panel
-from sim_validate.report.charts.wrench_charts import shadow_of, wrench_panels
+from sim_validate.report.run_charts import fidelity_panel, friction_used, motion_panels
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim_validate as sv
-from scenes.drawing.turntable import UNITS
+from scenes.drawing.pages import UNITS
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.colours import FINGERS, HAND
-from scenes.drawing.turntable import UNITS
+from scenes.drawing.pages import UNITS
+from scenes.drawing.sheets import FINGERS, HAND
 from sim_validate import main as commands
 from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.exit_codes import Exit

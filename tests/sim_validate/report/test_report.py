@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.turntable import UNITS
+from scenes.drawing.pages import UNITS
 from sim_validate import main as commands
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.engine.traces import Outcome

@@ -1,15 +1,23 @@
+"""Pages and cards show a grasp, its figures and nothing that a name could run."""
+
+import html
+import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.drawing import in_notebooks
-from scenes.drawing.colours import FINGERS
+from scenes.drawing import pages
+from scenes.drawing.pages import UNITS
+from scenes.drawing.sheets import FINGERS
+from sim_validate.main import main
 
 SVG = "{http://www.w3.org/2000/svg}"
 EVIL = "<script>alert('&')</script>"
@@ -83,7 +91,7 @@ def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatc
     elsewhere = replace(plan, body=scenes.example_object("dodecahedron"))
     assert elsewhere._repr_html_() is None
     assert repr(elsewhere).startswith("Plan(")
-    monkeypatch.setattr(in_notebooks, "MOST_CORNERS", 10)
+    monkeypatch.setattr(pages, "MOST_CORNERS", 10)
     found, cells = read(plan.body)
     assert found.find(f".//{SVG}path") is None
     assert "67.74 mm" in cells
@@ -100,3 +108,26 @@ print(cube._repr_html_()[:4])
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["None", "<div"]
+
+
+def test_a_notebook_and_the_command_view_show_the_same_page(plan, tmp_path):
+    shown = scenes.show(plan.body, plan[0], 0.5)
+    gc.save_grasps(tmp_path / "grasps.json", plan)
+    page = tmp_path / "page.html"
+    assert main(["view", str(tmp_path / "grasps.json"), "--page", str(page)]) == 0
+    assert page.read_text() == shown.page
+    assert shown.write(tmp_path / "new" / "own.html").read_text() == shown.page
+    (framed,) = re.findall(
+        r'<iframe sandbox="allow-scripts" .* srcdoc="([^"]*)">', shown._repr_html_()
+    )
+    assert html.unescape(framed) == shown.page
+
+
+def test_the_page_holds_the_contacts(plan):
+    body, grasp = plan.body, plan[0]
+    text = scenes.show(body, grasp).page
+    (drawing,) = re.findall(r'id="drawing">(.*)</script>', text)
+    shapes = json.loads(drawing)["shapes"]
+    (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
+    points = body.center_of_mass + np.array(contacts) * body.radius / UNITS
+    np.testing.assert_allclose(points, grasp.positions, atol=body.radius / UNITS)

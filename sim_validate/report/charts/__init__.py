@@ -1,1 +1,0 @@
-"""Charts of reports: each module draws what one kind of figure says."""
