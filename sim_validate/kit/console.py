@@ -207,24 +207,6 @@ def finished(
     return found
 
 
-def finished_text(
-    results: Iterable[Result], total: int, text_of: Callable[..., str], path: Path | None,
-    reporter: Reporter,
-) -> tuple[list[Result], str]:  # fmt: skip
-    """Collect results, and write the text about them even if the work is interrupted."""
-    done = list[Result]()
-    try:
-        for result in results:
-            done.append(result)
-    finally:
-        complete = len(done) == total
-        text = text_of(done, complete=complete)
-        if path and done:
-            write_text(path, text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    return done, text
-
-
 def warn_of(lines: Sequence[str], file: str, reporter: Reporter) -> None:
     """Print the first lines of warnings, and say which file has all of them."""
     for line in lines[:TABLE_ROWS]:
