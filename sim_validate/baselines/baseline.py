@@ -28,7 +28,7 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
-from sim_validate.kit.about_object import AboutObject
+from sim_validate.kit.files import AboutObject
 from sim_validate.settings.executions import ExecutionSettings
 
 DIGITS = 12

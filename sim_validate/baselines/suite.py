@@ -40,7 +40,7 @@ from sim_validate.baselines.part import (
     testable,
 )
 from sim_validate.engine.setup import Agenda
-from sim_validate.kit.toml_tables import read_tables
+from sim_validate.kit.files import read_tables
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.planning.wrenches_json import wrenches_from_file
 from sim_validate.settings.executions import ExecutionSettings

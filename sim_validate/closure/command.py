@@ -15,8 +15,8 @@ from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import write_arrays
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.kit.writing import write_arrays
 from sim_validate.planning.asked_objects import asked_grasps
 
 Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, str]]

@@ -182,7 +182,7 @@ class DatasetConfig(PlannedContent):
 
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
-    from sim_validate.kit.toml_tables import read_tables  # slow, and no flag needs it
+    from sim_validate.kit.files import read_tables  # slow, and no flag needs it
 
     given = read_tables(path)
     with about(path):

@@ -20,9 +20,9 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.kit import command_flags
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings.executions import ExecutionSettings

@@ -31,10 +31,10 @@ from sim_validate.hands.hand_command import asked_hand
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
 from sim_validate.kit import processes
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.planning.grasps_json import GRASPS

@@ -53,7 +53,7 @@ def _named(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 def _read(path: Path, known: Mapping[str, Flag]) -> list[str]:
     """Read a file of settings as words of a command line."""
     # imported only when there is a file to read
-    from sim_validate.kit.toml_tables import read_tables
+    from sim_validate.kit.files import read_tables
 
     try:
         settings = read_tables(path)

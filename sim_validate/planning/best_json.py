@@ -17,7 +17,7 @@ from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt
 from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp
-from sim_validate.kit.about_object import AboutObject
+from sim_validate.kit.files import AboutObject
 
 PROOF = "best-proof.npz"
 MEASURES: Mapping[MeasureName, tuple[str, str]] = {

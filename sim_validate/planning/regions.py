@@ -17,9 +17,9 @@ from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.console import Reporter, finished
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.grasps_json import read_grasps

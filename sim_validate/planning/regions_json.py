@@ -26,9 +26,7 @@ from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.proof import TwistCover
 from grasp_core.settings import Settings
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
-from sim_validate.kit.about_object import AboutObject
-from sim_validate.kit.npz import read_arrays
-from sim_validate.kit.writing import write_arrays
+from sim_validate.kit.files import AboutObject, read_arrays, write_arrays
 
 PROOFS = "proofs"
 """Folder of the proof files, beside `regions.json`."""

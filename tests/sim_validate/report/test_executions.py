@@ -25,8 +25,8 @@ from sim_validate.execution.verdict import (
     Skipped,
     load_executions,
 )
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.main import main
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.report import drawn_grasps
