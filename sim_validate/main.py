@@ -33,15 +33,22 @@ from sim_validate.kit.command_flags import (
     Report,
     Run,
     Scene,
+    Spoken,
     Transfer,
     Validate,
     View,
 )
-from sim_validate.kit.config_file import with_config
 from sim_validate.kit.examples import examples_for
-from sim_validate.kit.exit_codes import Exit, FlagsError, exit_code, reason_of
-from sim_validate.kit.flag_groups import Spoken
-from sim_validate.kit.flag_values import REGISTRY, flags_of
+from sim_validate.kit.exit_codes import (
+    Exit,
+    FlagsError,
+    end_streams,
+    exit_code,
+    reason_of,
+    steady_streams,
+)
+from sim_validate.kit.flag_values import REGISTRY, flags_of, with_config
+from sim_validate.kit.processes import interrupts_noted
 
 Command = (
     Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
@@ -135,9 +142,7 @@ def execute(command: Spoken) -> int:
 
 def _dispatch(command: Spoken) -> int:
     try:
-        from sim_validate.kit import interrupts
-
-        with interrupts.noted():
+        with interrupts_noted():
             code = execute(command)
             if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
                 sys.stdout.flush()
@@ -162,10 +167,8 @@ def _complain(message: str, code: Exit) -> int:
 
 def run_and_exit() -> None:
     """Run the `graspproof` command as a program, and exit with its exit code."""
-    from sim_validate.kit import streams
-
     gc.set_threshold(COLLECTED_AFTER)
-    streams.steady()
+    steady_streams()
     code = main()
-    streams.end()
+    end_streams()
     sys.exit(code)

@@ -20,7 +20,7 @@ from grasp_core.figures import table
 from grasp_core.files.json_text import text_of
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
-from sim_validate.kit import interrupts
+from sim_validate.kit.processes import check_interrupted
 
 Result = TypeVar("Result")
 File = TypeVar("File", bound=RecordFile)
@@ -173,7 +173,7 @@ class Steps:
 
     def update(self, done: int, total: int, note: str = "") -> None:
         """Show how many steps are done; an interrupt that was swallowed is raised here."""
-        interrupts.check()
+        check_interrupted()
         if self.bar is not None:
             title = f"{self.title} {note}" if note else self.title
             self.bar.update(self.task, completed=done, total=total, description=title)

@@ -10,12 +10,12 @@ from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from scenes.example_objects import example_object
-from sim_validate.kit import flag_groups
+from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
 
 
-def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
+def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
     """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower() == ".json":
@@ -37,7 +37,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
             "file exists"
         )
     unlimited = replace(mesh.choices, **asdict(MeshLimits()))
-    if replace(mesh, choices=unlimited) != flag_groups.Mesh():
+    if replace(mesh, choices=unlimited) != command_flags.Mesh():
         raise InputError(
             f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches..., "
             "--flatness-m, --largest-part and --center-of-mass-m, which say how mesh files are read"
@@ -45,7 +45,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
     return example_object(name)
 
 
-def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter) -> Polyhedron:
+def object_to_plan(name: str, planning: command_flags.Planning, reporter: Reporter) -> Polyhedron:
     """Load the object and check that the planning flags fit it."""
     if planning.ceiling is not None and not planning.optimize:
         raise InputError(
@@ -75,7 +75,7 @@ def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter
     return body
 
 
-def asked_finger(planning: flag_groups.Planning) -> Finger | None:
+def asked_finger(planning: command_flags.Planning) -> Finger | None:
     """Build the finger whose straight free path is planned, or None if no flag asks for it."""
     if planning.approach_m is None:
         if planning.finger_radius_m is not None and not planning.optimize:

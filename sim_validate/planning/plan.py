@@ -26,7 +26,7 @@ from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types
 from grasp_core.values import Grasp
-from sim_validate.kit import command_flags, flag_groups
+from sim_validate.kit import command_flags
 from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
@@ -43,7 +43,7 @@ optimum end some thousandths from it."""
 
 
 def plan_object(
-    body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
+    body: Polyhedron, planning: command_flags.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
     """Plan the grasps of an object and, if asked for, improve them."""
     if must_compile(PLANNING, jobs):
@@ -68,7 +68,7 @@ def plan_object(
 
 
 def improved(
-    body: Polyhedron, found: Plan, planning: flag_groups.Planning, jobs: int, reporter: Reporter
+    body: Polyhedron, found: Plan, planning: command_flags.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
     """Move the contacts of each grasp to raise its quality; return the new plan, best first.
 
@@ -120,7 +120,7 @@ def _improve(
 
 
 def with_regions(
-    body: Polyhedron, found: Plan, planning: flag_groups.Planning, folder: Path | None, jobs: int,
+    body: Polyhedron, found: Plan, planning: command_flags.Planning, folder: Path | None, jobs: int,
     reporter: Reporter,
 ) -> Plan:  # fmt: skip
     """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""

@@ -27,7 +27,7 @@ from grasp_core.transferring.transfer import (
     Transfer,
     transfer,
 )
-from sim_validate.kit import command_flags, flag_groups
+from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject
@@ -122,7 +122,7 @@ def carried_to_json(found: Transfer, saved: Plan) -> str:
 
 def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
     center, part = command.center_of_mass_m, Path(command.part)
-    asked = flag_groups.Mesh(
+    asked = command_flags.Mesh(
         command.lengths, extended(MeshChoices, command.limits), center_of_mass_m=center
     )
     if part.suffix or part.is_file():  # a built-in object is as it is
