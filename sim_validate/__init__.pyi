@@ -38,4 +38,4 @@ from sim_validate.protocols.published import protocol_names as protocol_names
 from sim_validate.report.charts.margin_charts import margin_figure as margin_figure
 from sim_validate.report.charts.wrench_charts import wrench_figure as wrench_figure
 from sim_validate.report.report import write_report as write_report
-from sim_validate.settings.executions import ExecutionSettings as ExecutionSettings
+from sim_validate.settings import ExecutionSettings as ExecutionSettings

@@ -21,7 +21,7 @@ from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.planning.grasps_json import read_grasps
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 FRICTION = 0.5
 TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")

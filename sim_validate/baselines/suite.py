@@ -43,8 +43,7 @@ from sim_validate.engine.setup import Agenda
 from sim_validate.kit.files import read_tables
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.planning.wrenches_json import wrenches_from_file
-from sim_validate.settings.executions import ExecutionSettings
-from sim_validate.settings.trials import LimitSearch, Noise
+from sim_validate.settings import ExecutionSettings, LimitSearch, Noise
 
 ENDING = ".grasps.toml"
 GIVEN = ("limits", "random_wrenches", "repeats", "noise", "seed")

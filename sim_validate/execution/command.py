@@ -25,7 +25,7 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
 """Figures whose meaning is said below their table."""

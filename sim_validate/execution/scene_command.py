@@ -24,7 +24,7 @@ from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.result_folders import alone_in
 from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
-from sim_validate.settings.executions import ExecutionSettings, Holding
+from sim_validate.settings import ExecutionSettings, Holding
 
 TextOf = Callable[[Grasp], str]
 

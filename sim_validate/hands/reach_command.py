@@ -38,7 +38,7 @@ from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.planning.grasps_json import GRASPS
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 HELD = Agenda(critical_friction=False)
 """What hands hold: the usual wrenches, with controls."""

@@ -35,8 +35,7 @@ from grasp_core.settings import Settings
 from grasp_core.transferring.settings import Carrying
 from scenes.settings import ScaledScene
 from sim_validate.kit.processes import available_cores
-from sim_validate.settings.executions import ChosenExecution, Holding
-from sim_validate.settings.trials import ChosenTrials
+from sim_validate.settings import ChosenExecution, ChosenTrials, Holding
 
 Positive = Annotated[float, Range(above=0.0)]
 NotNegative = Annotated[float, Range(least=0.0)]
