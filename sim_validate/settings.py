@@ -11,7 +11,17 @@ from typing import Annotated, Literal, Self, TypeAlias, get_args
 
 from grasp_core.declared import FieldError
 from grasp_core.errors import InputError
-from grasp_core.kinds import NotNegative, Quantity, RandomWrenches, Range, Repeats, Seed, Share
+from grasp_core.kinds import (
+    MaxCones,
+    NotNegative,
+    Quantity,
+    RandomWrenches,
+    Range,
+    Repeats,
+    Reserve,
+    Seed,
+    Share,
+)
 from grasp_core.settings import Settings
 from scenes.settings import HeldSettings
 
@@ -256,3 +266,19 @@ class ExecutionSettings(ChosenExecution):
     def most_rad(self) -> float:
         """Turn up to which an object counts as held [rad]."""
         return math.radians(self.max_deg)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Certifying(Settings):
+    """How regions are certified."""
+
+    reserve: Reserve = 0.0
+    """Share of the friction that the proof does not count on."""
+    recenter: bool = False
+    """Move the regions to where discs inside the faces can be largest; contacts may then lie
+    outside their regions."""
+    edge_clearance_m: NotNegative = 0.0
+    """How far regions stay from the edges of their faces [m]."""
+    max_cones: MaxCones = 10_000
+    """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
+    by some hundredths, or not at all where they are as large as possible."""

@@ -20,10 +20,8 @@ from grasp_core.kinds import (
     Friction,
     FrictionOrZero,
     Gap,
-    MaxCones,
     Quantity,
     Range,
-    Reserve,
     Seed,
     Size,
     TimeLimit,
@@ -35,7 +33,7 @@ from grasp_core.settings import Settings
 from grasp_core.transferring.settings import Carrying
 from scenes.settings import ScaledScene
 from sim_validate.kit.processes import available_cores
-from sim_validate.settings import ChosenExecution, ChosenTrials, Holding
+from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
 
 Positive = Annotated[float, Range(above=0.0)]
 NotNegative = Annotated[float, Range(least=0.0)]
@@ -317,16 +315,7 @@ class Regions(Spoken):
     """Compute regions for only this many grasps, from the first."""
     friction: Friction | None = None
     """Coulomb coefficient of the proof; if not given, the one planned for."""
-    reserve: Reserve = 0.0
-    """Share of the friction that the proof does not count on."""
-    recenter: bool = False
-    """Move the regions to where discs inside the faces can be largest; contacts may then lie
-    outside their regions."""
-    edge_clearance_m: NotNegative = 0.0
-    """How far regions stay from the edges of their faces [m]."""
-    max_cones: MaxCones = 10_000
-    """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
-    by some hundredths, or not at all where they are as large as possible."""
+    certifying: Annotated[Certifying, PLAIN] = field(default_factory=Certifying)
     jobs: Jobs = field(default_factory=available_cores)
     out: Path | None = None
     """Folder for regions.json and the proofs; if not given, no file is written."""

@@ -33,6 +33,7 @@ from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
+from sim_validate.settings import Certifying
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best.result import BestGrasp
@@ -126,11 +127,9 @@ def with_regions(
     """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
     if not (planning.regions and found.grasps):
         return found
-    from grasp_core.regions.certify_regions import CONES
     from sim_validate.planning.regions import certified, wider
-    from sim_validate.planning.regions_json import Certifying
 
-    asked = Certifying(0.0, False, planning.edge_clearance_m, CONES)
+    asked = Certifying(edge_clearance_m=planning.edge_clearance_m)
     proved = certified(
         body, found.grasps, found.friction, asked, folder=folder, jobs=jobs, reporter=reporter
     )

@@ -23,7 +23,8 @@ from sim_validate.kit.files import AboutObject
 from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.grasps_json import read_grasps
-from sim_validate.planning.regions_json import Certifying, GraspRegions, Regions, write_proof
+from sim_validate.planning.regions_json import GraspRegions, Regions, write_proof
+from sim_validate.settings import Certifying
 
 
 def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
@@ -34,14 +35,11 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
         wanted = f"a grasp {command.grasp}" if command.grasp else "at least one grasp"
         raise InputError(f"{command.grasps}: expected {wanted} to certify, found none")
     friction = saved.friction if command.friction is None else command.friction
-    asked = Certifying(
-        command.reserve, command.recenter, command.edge_clearance_m, command.max_cones
-    )
     with alone_in(command.out):
         if command.out is not None:
             remove_results(command.out, "regions")
         found = certified(
-            saved.body, chosen, friction, asked, folder=command.out, jobs=command.jobs,
+            saved.body, chosen, friction, command.certifying, folder=command.out, jobs=command.jobs,
             reporter=reporter,
         )  # fmt: skip
     _show(found, reporter)
