@@ -1,5 +1,6 @@
 """Loads the object or the grasps that a command's flags name, and the fingers to plan for."""
 
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -9,10 +10,16 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import load_grasps
+from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
-from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
+
+GRASPS = "grasps.json"
+"""Name of the file in a folder of results."""
+NAMED = 5
+"""Largest number of names that a message lists."""
 
 
 def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
@@ -100,7 +107,7 @@ def asked_grasps(
     They have another friction or seed where one is given. None, with a word about it, if the file
     holds no grasp.
     """
-    saved = read_grasps(path)
+    saved = load_grasps(path)
     for note in saved.body.surface.notes():
         reporter.warn(f"{saved.body.name}: {note}")
     if not saved.grasps:
@@ -114,3 +121,25 @@ def asked_grasps(
         seed=saved.seed if seed is None else seed,
         grasps=saved.grasps[:limit] if grasp is None else (grasp_with_id(path, saved, grasp),),
     )
+
+
+def grasp_with_id(path: Path, saved: Plan, wanted: str | None) -> Grasp:
+    """Find the grasp with an id; the id may be left out if the file has one grasp only."""
+    if wanted is None and len(saved.grasps) == 1:
+        return saved.grasps[0]
+    found = next((grasp for grasp in saved.grasps if grasp.id == wanted), None)
+    if found is None:
+        asked = (
+            "choose a grasp with --grasp ID" if wanted is None else f"no grasp is named {wanted}"
+        )
+        raise InputError(
+            f"{path}: {asked}; the file has {some(grasp.id for grasp in saved.grasps)}"
+        )
+    return found
+
+
+def some(names: Iterable[str]) -> str:
+    """List the first few of many names for a message."""
+    listed = list(names)
+    more = f" and {len(listed) - NAMED} more" if len(listed) > NAMED else ""
+    return (", ".join(listed[:NAMED]) or "none") + more

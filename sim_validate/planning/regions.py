@@ -13,6 +13,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.figures import figures
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.values import Grasp
@@ -22,14 +23,13 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject
 from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.planning.regions_json import GraspRegions, Regions, write_proof
 from sim_validate.settings import Certifying
 
 
 def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
     """Certify independent contact regions for a file's grasps, and write them with their proofs."""
-    saved = read_grasps(command.grasps)
+    saved = load_grasps(command.grasps)
     chosen = [grasp for grasp in saved.grasps if command.grasp in (None, grasp.id)][: command.limit]
     if not chosen:
         wanted = f"a grasp {command.grasp}" if command.grasp else "at least one grasp"
