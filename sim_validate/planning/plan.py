@@ -170,9 +170,13 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     if found.absence:
         reporter.say(found.absence)
         return Exit.NONE
-    columns, rows = _table(body, found, carry=command.planning.rank_by == "payload")
-    reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
-    say_cut(len(found.grasps), reporter)
+    reporter.records(f"{len(found.grasps)} grasps of {body.name}", found.grasps)
+    if command.planning.rank_by == "payload":  # which is not kept with grasps
+        payloads = [
+            (grasp.id, f"{carried(body, grasp, found.friction, found.finger):.4g}")
+            for grasp in found.grasps[:TABLE_ROWS]
+        ]
+        reporter.table("what one squeeze carries", ("grasp", "payload kg"), payloads)
     if found.moves:
         show_gains(found.moves, reporter)
     if possible is None:
@@ -195,30 +199,6 @@ def _task(command: command_flags.Plan) -> Array | None:
     from sim_validate.planning.wrenches_json import wrenches_from_file
 
     return np.array([each.wrench for each in wrenches_from_file(command.wrenches)])
-
-
-def _table(
-    body: Polyhedron, found: Plan, *, carry: bool
-) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return the columns and rows that show the best grasps.
-
-    What grasps carry is not kept with them. Where they are ordered by it, it is computed again, and
-    stands in the place of the margin, for which there would be no room.
-    """
-    shown = found.grasps[:TABLE_ROWS]
-    friction, finger = found.friction, found.finger
-    heading = "payload kg" if carry else "margin"
-    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", heading, "quality N")
-    figures = [
-        f"{carried(body, g, friction, finger):.4g}" if carry else f"{g.closure_margin:.4f}"
-        for g in shown
-    ]
-    rows = [
-        (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
-         f"{math.degrees(g.span_angle):.2f}", figure, f"{g.ferrari_canny[0]:.4f}")
-        for g, figure in zip(shown, figures, strict=True)
-    ]  # fmt: skip
-    return columns, rows
 
 
 def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
@@ -262,13 +242,7 @@ def _whoever(why: str) -> str:
 
 def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
     """Show how optimisation changed the quality of each grasp, with percentiles."""
-    rows = [
-        (move.id, f"{move.before[0]:.4f}", f"{move.after[0]:.4f}", f"{move.gain:.3f}",
-         "" if move.ceiling is None else f"{move.ceiling:.4f}")
-        for move in moves[:TABLE_ROWS]
-    ]  # fmt: skip
-    columns = ("grasp", "quality before", "after", "gain", "upper bound")
-    reporter.table("Ferrari-Canny l1 [N]", columns, rows)
+    reporter.records("Ferrari-Canny l1 [N]", moves)
     gains = np.array([move.gain for move in moves])
     low, quarter, middle, upper, high = np.percentile(gains, [0, 25, 50, 75, 100])
     reporter.say(
