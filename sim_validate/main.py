@@ -131,19 +131,14 @@ def _flag_of(error: FieldError) -> str:
     return "--" + next(found, error.name).replace("_", "-")
 
 
-def execute(command: Spoken) -> int:
-    """Carry out a command and return its exit code."""
-    from sim_validate.kit.console import Reporter
-
-    speech = command.speech
-    reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-    return resolve_name(f"sim_validate.{ACTIONS[type(command)]}")(command, reporter)
-
-
 def _dispatch(command: Spoken) -> int:
+    speech = command.speech
     try:
         with interrupts_noted():
-            code = execute(command)
+            from sim_validate.kit.console import Reporter
+
+            action = resolve_name(f"sim_validate.{ACTIONS[type(command)]}")
+            code = action(command, Reporter(speech.quiet, speech.verbose, speech.json))
             if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
                 sys.stdout.flush()
             return code
@@ -152,7 +147,7 @@ def _dispatch(command: Spoken) -> int:
     except (GraspError, OSError) as error:
         return _complain(reason_of(error), exit_code(error))
     except Exception as error:
-        if command.speech.verbose:
+        if speech.verbose:
             traceback.print_exc()
         return _complain(f"internal error: {error!r}; -v shows where", Exit.INTERNAL)
 

@@ -16,6 +16,7 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
+from grasp_core.files.records import RecordFile
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
@@ -41,8 +42,8 @@ from sim_validate.settings import ExecutionSettings
 
 HELD = Agenda(critical_friction=False)
 """What hands hold: the usual wrenches, with controls."""
-Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, str]]
-"""Judges a hand in its poses by another test; gives the exit code and the text of its results."""
+Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, RecordFile]]
+"""Judges a hand in its poses by another test; gives the exit code and its results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +89,8 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
         poses = [each.reach for each in found if each.reach.reached]
         if command.dexgraspbench is not None:
             write_records(command.dexgraspbench, hand, chosen.body, poses, reporter)
-        judged, text = (Exit.GOOD, found.text()) if judge is None else judge(chosen, hand, poses)
-    reporter.text(text)
+        judged, told = (Exit.GOOD, found) if judge is None else judge(chosen, hand, poses)
+    reporter.document(told.document())
     show_simulated([each.simulated for each in found if each.simulated is not None], reporter)
     show_executed([each.executed for each in found if each.executed is not None], reporter)
     if poses:

@@ -36,7 +36,6 @@ from sim_validate.kit.processes import available_cores
 from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
 
 Positive = Annotated[float, Range(above=0.0)]
-NotNegative = Annotated[float, Range(least=0.0)]
 Jobs = Annotated[Count, arg(help="Largest number of processes; results do not depend on it.")]
 ObjectName = Annotated[
     str, arg(help="A mesh file (obj, stl, ply, off, glb) or the name of a built-in object.")

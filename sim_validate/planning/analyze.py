@@ -291,7 +291,7 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
 
     def told(done: tuple[Analysis, ...], *, complete: bool) -> Analyses:
         analyses = Analyses(str(command.contacts), question, done, complete)
-        reporter.text(analyses.text())
+        reporter.document(analyses.document())
         return analyses
 
     analyses = finished(results, len(sets), told, None, reporter)

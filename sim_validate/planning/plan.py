@@ -164,8 +164,8 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
             from sim_validate.planning.best import write_best
 
             possible = write_best(body, best, planned, command.out, reporter)
-        elif reporter.json_only:
-            print(text, end="")  # noqa: T201 - the document itself
+        else:
+            reporter.text(text)
     say_counts(body, found, reporter)
     if found.absence:
         reporter.say(found.absence)

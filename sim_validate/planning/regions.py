@@ -43,7 +43,7 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
             reporter=reporter,
         )  # fmt: skip
     _show(found, reporter)
-    reporter.text(found.text())
+    reporter.document(found.document())
     proved = found.summary["proved"] == len(found.grasps)
     return Exit.GOOD if proved else Exit.NEGATIVE
 

@@ -84,13 +84,13 @@ def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
             saved.body, new, saved.grasps, saved.friction, distance=command.carrying.distance_m,
             angle_deg=command.carrying.angle_deg, finger=saved.finger,
         )  # fmt: skip
-        text = TransferFile.of(found).text()
+        record = TransferFile.of(found)
         if command.out is not None:
             remove_results(command.out)
             grasps = write_text(command.out / GRASPS, carried_to_json(found, saved))
-            path = write_text(command.out / TransferFile.FILE, text)
+            path = write_text(command.out / TransferFile.FILE, record.text())
             reporter.say(f"wrote {grasps} and {path}")
-    reporter.text(text)
+    reporter.document(record.document())
     _show(found, reporter)
     if not found.carried:
         return Exit.NONE
