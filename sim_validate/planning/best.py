@@ -59,7 +59,10 @@ def write_best(
     if not measure.is_usual:
         found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
         bounds = [(each.lower, each.upper) for each in found]
-    rated = (Rated.of(each, ends, best.bound) for each, ends in zip(planned, bounds, strict=True))
+    rated = (
+        Rated(each.id, each.family, ends, ends[0] / best.bound)
+        for each, ends in zip(planned, bounds, strict=True)
+    )
     record = Best.of(body, best, rated, PROOF if folder else None)
     if folder:
         write_proof(folder / PROOF, best.proof)

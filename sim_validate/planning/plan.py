@@ -75,10 +75,7 @@ def improved(
 
     The plan keeps only one of several grasps that end at the same contacts.
     """
-    improve = partial(
-        _improve, body, found.friction, planning.finger_radius_m, found.seed, planning.ceiling
-    )
-    results = each(improve, found.grasps, jobs=jobs)
+    results = each(partial(_improve, body, planning), found.grasps, jobs=jobs)
     done = list(
         reporter.counted(
             "optimising", results, len(found.grasps), "raised", lambda pair: pair[1].gain > 1.0
@@ -100,18 +97,19 @@ def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
 
 
 def _improve(
-    body: Polyhedron, friction: float, finger_radius: float | None, seed: int, parts: int | None,
-    grasp: Grasp,
-) -> tuple[Grasp, Moved]:  # fmt: skip
+    body: Polyhedron, planning: command_flags.Planning, grasp: Grasp
+) -> tuple[Grasp, Moved]:
     from grasp_core.optimizing.better_contacts import optimize_contacts
     from grasp_core.optimizing.ceiling import quality_ceiling
 
-    found = optimize_contacts(body, grasp, friction, finger_radius=finger_radius, seed=seed)
+    found = optimize_contacts(
+        body, grasp, planning.friction, finger_radius=planning.finger_radius_m, seed=planning.seed
+    )
     ceiling = None
-    if parts is not None:
+    if planning.ceiling is not None:
         ceiling = quality_ceiling(
-            body, grasp.faces, friction, known=found.after.lower,
-            finger_radius=found.clearances, parts=parts,
+            body, grasp.faces, planning.friction, known=found.after.lower,
+            finger_radius=found.clearances, parts=planning.ceiling,
         ).upper  # fmt: skip
     before, after = found.before, found.after
     moved = Moved(

@@ -121,17 +121,14 @@ def carried_to_json(found: Transfer, saved: Plan) -> str:
 
 def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
     center, part = command.center_of_mass_m, Path(command.part)
-    asked = command_flags.Mesh(
-        command.lengths, extended(MeshChoices, command.limits), center_of_mass_m=center
-    )
+    choices = extended(MeshChoices, command.limits)
     if part.suffix or part.is_file():  # a built-in object is as it is
         if center is None and (kept := given_center(old)) is not None:
             x, y, z = kept.tolist()
             center = x, y, z
-        largest = old.surface.dropped > SMALL
-        choices = replace(asked.choices, faces="planar", largest_part=largest)
-        asked = replace(asked, choices=choices, center_of_mass_m=center)
-    return load_object(command.part, asked)
+        choices = replace(choices, faces="planar", largest_part=old.surface.dropped > SMALL)
+    mesh = command_flags.Mesh(command.lengths, choices, center_of_mass_m=center)
+    return load_object(command.part, mesh)
 
 
 def _show(found: Transfer, reporter: Reporter) -> None:
