@@ -159,7 +159,7 @@ def _marked(kind: type, *marks: type[Shown | Compared]) -> Iterator[Figure]:
 
 
 def cell(value: Any, shown: Shown) -> str:
-    """Write a figure for people: the ends of a range, and how many items other sequences have."""
+    """Write a figure for people: ends of a range that differ, and the number of other items."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return NONE
     if isinstance(value, bool):
@@ -172,7 +172,8 @@ def cell(value: Any, shown: Shown) -> str:
         return value
     items: Sequence[Any] = value
     numbers = bool(items) and all(isinstance(item, float) for item in items)
-    return " to ".join(cell(item, shown) for item in items) if numbers else str(len(items))
+    ends = dict.fromkeys(cell(item, shown) for item in items)
+    return " to ".join(ends) if numbers else str(len(items))
 
 
 def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tuple[str, ...]]]:

@@ -15,6 +15,7 @@ from grasp_core.arrays import Array, Shape, UnitVector
 from grasp_core.checked import LARGEST, number, shown
 from grasp_core.declared import Declared, FieldError, counted, summary, vector
 from grasp_core.errors import InputError
+from grasp_core.figures import Shown
 from grasp_core.files.records import Key, recorded
 from grasp_core.frames import poses_along
 from grasp_core.kinds import Family, NotNegative, Null, Number, Range, Signed
@@ -105,8 +106,8 @@ class Grasp(Declared):
     both. Copies, pickles and files hold the computed figures.
     """
 
-    id: str
-    family: Family
+    id: Annotated[str, Shown("grasp")]
+    family: Annotated[Family, Shown("family")]
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
     focus_points: Annotated[Array, Shape(None, 3), Key("focus_points_m")]
@@ -116,18 +117,22 @@ class Grasp(Declared):
     force_cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
     """Force cones that the construction used; each lies inside its contact's friction cone."""
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
-    radius: Annotated[NotNegative, Key("radius_m")]
+    radius: Annotated[NotNegative, Key("radius_m"), Shown("radius mm", ".3g", 1e3)]
     """Radius of the smallest of four discs in which fingers may stand independently [m]; 0.0 where
     no discs are claimed."""
-    span_angle: Annotated[HalfAngle, Key("span_angle_rad")]
+    span_angle: Annotated[
+        HalfAngle, Key("span_angle_rad"), Shown("theta* deg", ".2f", math.degrees(1.0))
+    ]
     """theta*, the largest half-angle [rad] below which cones around the four normals positively
     span."""
-    critical_friction: Annotated[float, Range(least=0.0, most=math.inf), Null(math.inf)]
+    critical_friction: Annotated[
+        float, Range(least=0.0, most=math.inf), Null(math.inf), Shown("mu*", ".4f")
+    ]
     """Smallest Coulomb coefficient above which the contacts are in force closure; computed at
     first use if the grasp was planned."""
-    closure_margin: Signed
+    closure_margin: Annotated[Signed, Shown("margin", ".4f")]
     """Proved margin of force closure at the planned friction (see `ClosureCertificate.margin`)."""
-    ferrari_canny: Bounds
+    ferrari_canny: Annotated[Bounds, Shown("quality N", ".4f")]
     """Proved lower and upper bound [N] of the `l1` quality at the planned friction, with torques
     about the centre of mass and divided by the object's radius; computed at first use if the grasp
     was planned."""

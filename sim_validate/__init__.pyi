@@ -37,6 +37,6 @@ from sim_validate.protocols.published import protocol_names as protocol_names
 from sim_validate.report.grasp_charts import margin_figure as margin_figure
 from sim_validate.report.grasp_charts import wrench_figure as wrench_figure
 from sim_validate.report.report import write_report as write_report
-from sim_validate.settings.executions import ExecutionSettings as ExecutionSettings
-from sim_validate.settings.trials import HoldProtocol as HoldProtocol
-from sim_validate.settings.trials import Noise as Noise
+from sim_validate.settings import ExecutionSettings as ExecutionSettings
+from sim_validate.settings import HoldProtocol as HoldProtocol
+from sim_validate.settings import Noise as Noise

@@ -33,15 +33,22 @@ from sim_validate.kit.command_flags import (
     Report,
     Run,
     Scene,
+    Spoken,
     Transfer,
     Validate,
     View,
 )
-from sim_validate.kit.config_file import with_config
 from sim_validate.kit.examples import examples_for
-from sim_validate.kit.exit_codes import Exit, FlagsError, exit_code, reason_of
-from sim_validate.kit.flag_groups import Spoken
-from sim_validate.kit.flag_values import REGISTRY, flags_of
+from sim_validate.kit.exit_codes import (
+    Exit,
+    FlagsError,
+    end_streams,
+    exit_code,
+    reason_of,
+    steady_streams,
+)
+from sim_validate.kit.flag_values import REGISTRY, flags_of, with_config
+from sim_validate.kit.processes import interrupts_noted
 
 Command = (
     Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
@@ -124,21 +131,14 @@ def _flag_of(error: FieldError) -> str:
     return "--" + next(found, error.name).replace("_", "-")
 
 
-def execute(command: Spoken) -> int:
-    """Carry out a command and return its exit code."""
-    from sim_validate.kit.console import Reporter
-
-    speech = command.speech
-    reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-    return resolve_name(f"sim_validate.{ACTIONS[type(command)]}")(command, reporter)
-
-
 def _dispatch(command: Spoken) -> int:
+    speech = command.speech
     try:
-        from sim_validate.kit import interrupts
+        with interrupts_noted():
+            from sim_validate.kit.console import Reporter
 
-        with interrupts.noted():
-            code = execute(command)
+            action = resolve_name(f"sim_validate.{ACTIONS[type(command)]}")
+            code = action(command, Reporter(speech.quiet, speech.verbose, speech.json))
             if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
                 sys.stdout.flush()
             return code
@@ -147,7 +147,7 @@ def _dispatch(command: Spoken) -> int:
     except (GraspError, OSError) as error:
         return _complain(reason_of(error), exit_code(error))
     except Exception as error:
-        if command.speech.verbose:
+        if speech.verbose:
             traceback.print_exc()
         return _complain(f"internal error: {error!r}; -v shows where", Exit.INTERNAL)
 
@@ -162,10 +162,8 @@ def _complain(message: str, code: Exit) -> int:
 
 def run_and_exit() -> None:
     """Run the `graspproof` command as a program, and exit with its exit code."""
-    from sim_validate.kit import streams
-
     gc.set_threshold(COLLECTED_AFTER)
-    streams.steady()
+    steady_streams()
     code = main()
-    streams.end()
+    end_streams()
     sys.exit(code)

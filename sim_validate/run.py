@@ -1,11 +1,9 @@
 """Runs the command `run`, which plans grasps, simulates them and writes all results."""
 
-import json
 import re
 from pathlib import Path
 
 from grasp_core.errors import GraspError
-from grasp_core.files.json_text import text_of
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import plan_to_json
@@ -79,17 +77,19 @@ def _run_in(
     for grasp in found.grasps:
         scene = setup.scene(body, grasp, found.friction)
         write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
-    code, text = simulate_grasps(found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter)
+    code, verdicts = simulate_grasps(
+        found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter
+    )
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
     try:
-        if execution is None:
-            reporter.text(text)
-        else:
-            survival, more = execute_grasps(
+        document = verdicts.document()
+        if execution is not None:
+            survival, executions = execute_grasps(
                 found, execution, jobs=jobs, folder=folder, reporter=reporter
             )
-            reporter.text(text_of(json.loads(text) | {"executions": json.loads(more)}))
+            document["executions"] = executions.document()
             code = max(code, survival)
+        reporter.document(document)
     except GraspError:  # the other results are complete, so that pages can show them
         _report(command, folder, reporter)
         raise

@@ -16,7 +16,7 @@ from grasp_core.settings import Settings
 
 PAGE = Path(__file__).parent.parent / "docs" / "api.md"
 PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
-UNTOLD = ("Key", "Shape", "UNRECORDED", "FLAT")
+UNTOLD = ("Key", "Shape", "Shown", "UNRECORDED", "FLAT")
 """Rules of types that the page leaves out."""
 INTRODUCTION = """\
 # Python reference
@@ -82,7 +82,7 @@ def flowed(text: str) -> str:
 
 
 class Shown(ast.NodeTransformer):
-    """Leaves out of types what only files need, and shapes, which are said in words."""
+    """Leaves out of types what only files and tables need, and shapes, which are said in words."""
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         self.generic_visit(node)

@@ -14,7 +14,7 @@ from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import Suite, suite_from_toml
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.settings.trials import Noise
+from sim_validate.settings import Noise
 from tests.sim_validate.plugin.project import run_pytest, run_pytest_alone
 
 ROOT = Path(__file__).parent.parent

@@ -24,7 +24,7 @@ from sim_validate.execution.verdict import Fate
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning.wrenches_json import wrenches_from_file
-from sim_validate.settings.executions import KINDS, ChosenExecution
+from sim_validate.settings import KINDS, ChosenExecution
 from tests import api_reference, file_reference
 from tests.sim_validate.datasets.configs import build_small
 

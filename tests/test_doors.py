@@ -44,7 +44,7 @@ def imported(code, among, **environment):
 
 @pytest.mark.parametrize(
     "module",
-    ["grasp_core", "scenes", "sim_validate", "sim_validate.main", "sim_validate.kit.flag_groups"],
+    ["grasp_core", "scenes", "sim_validate", "sim_validate.main", "sim_validate.kit.command_flags"],
 )
 def test_importing_a_package_imports_nothing_heavy(module):
     assert imported(f"import {module}", HEAVY) == ([], "")

@@ -366,9 +366,13 @@ class RecordFile(Declared):
     SCHEMA: ClassVar[int]
     """Version of its form."""
 
+    def document(self) -> dict[str, Any]:
+        """Return what the file holds, as plain values."""
+        return {"schema": self.SCHEMA, **record_of(self)}
+
     def text(self) -> str:
         """Return the text of the file; equal records give equal texts."""
-        return text_of({"schema": self.SCHEMA, **record_of(self)})
+        return text_of(self.document())
 
     @classmethod
     def of_text(cls, text: str) -> Self:

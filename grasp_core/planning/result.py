@@ -7,6 +7,7 @@ from textwrap import shorten
 from typing import Annotated, Any, Protocol, TypeAlias, runtime_checkable
 
 from grasp_core.declared import Declared, counted, summary
+from grasp_core.figures import Shown, figure
 from grasp_core.files.records import UNRECORDED, Key
 from grasp_core.grasp_tables import ById, chosen, data_frame
 from grasp_core.kinds import Friction, Method, Number, Seed
@@ -83,16 +84,16 @@ class Outcomes(Declared):
 class Moved(Declared):
     """How optimisation changed a grasp's quality, as proved bounds (lower, upper)."""
 
-    id: str
+    id: Annotated[str, Shown("grasp")]
     moved_from: str
     """Id of the planned grasp; equal to `id` where the grasp was not moved."""
-    before: Annotated[Bounds, Key("ferrari_canny_before")]
-    after: Annotated[Bounds, Key("ferrari_canny_after")]
-    ceiling: Annotated[float | None, Key("ferrari_canny_ceiling")]
+    before: Annotated[Bounds, Key("ferrari_canny_before"), Shown("quality before", ".4f")]
+    after: Annotated[Bounds, Key("ferrari_canny_after"), Shown("after", ".4f")]
+    ceiling: Annotated[float | None, Key("ferrari_canny_ceiling"), Shown("upper bound", ".4f")]
     """Quality that no contacts on the same faces exceed; None where no ceiling was asked for."""
 
-    @property
-    def gain(self) -> float:
+    @figure
+    def gain(self) -> Annotated[float, Shown("gain", ".3f")]:
         """Return the ratio of the proved lower bounds, after to before."""
         return self.after[0] / self.before[0]
 

@@ -28,8 +28,8 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
-from sim_validate.kit.about_object import AboutObject
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.kit.files import AboutObject
+from sim_validate.settings import ExecutionSettings
 
 DIGITS = 12
 MARK = '"grasps_file"'

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from grasp_core.files.records import record_of
 from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import extended
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.baseline import How, check_writable, read_baseline, write_baseline
@@ -18,14 +19,13 @@ from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.engine.setup import Agenda
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.planning.wrenches_json import wrenches_from_file
 
 
 def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Simulate grasps and write the results as a baseline, to compare later results with."""
     check_writable(command.out)
-    saved = read_grasps(command.grasps)
+    saved = load_grasps(command.grasps)
     now = _present(saved, command.grasps, command.out, command)
     check_noise(command.more)
     wrenches = () if command.wrenches is None else wrenches_from_file(command.wrenches)
@@ -49,7 +49,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     """Simulate the grasps of a baseline again and report how each result differs."""
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
-    saved = read_grasps(path)
+    saved = load_grasps(path)
     now = _present(saved, path, command.baseline, command, before.scale)
     now = now.against(before)
     how = before.settings

@@ -10,6 +10,7 @@ from grasp_core.errors import InputError
 from grasp_core.kinds import Range, Share
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import CHOSEN, Settings, for_users, named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
@@ -20,8 +21,7 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.planning.grasps_json import read_grasps
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 FRICTION = 0.5
 TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")
@@ -89,7 +89,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
 
 
 def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> list[GraspCase]:
-    saved = read_grasps(path)
+    saved = load_grasps(path)
     friction = _number(settings.get("friction", saved.friction))
     _check_any(saved.grasps, saved.body, friction)
     asked = IfChanged.of_table(settings.get(TABLE, {}), TABLE)

@@ -9,9 +9,9 @@ from tyro.conf import Positional, arg, subcommand
 from grasp_core.kinds import Count, Seed
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import IfChanged
-from sim_validate.kit.flag_groups import PLAIN, Jobs, Spoken
+from sim_validate.kit.command_flags import PLAIN, Jobs, Spoken
 from sim_validate.kit.processes import available_cores
-from sim_validate.settings.trials import ChosenTrials
+from sim_validate.settings import ChosenTrials
 
 MeshFile = Annotated[Path | None, arg(help=(
     "The mesh file that the grasps were planned from; if not given, a file with the object's name "

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import RandomWrenches, Repeats, Seed
 from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import CHOSEN, Settings
 from sim_validate.baselines.baseline import (
     Baseline,
@@ -40,11 +41,9 @@ from sim_validate.baselines.part import (
     testable,
 )
 from sim_validate.engine.setup import Agenda
-from sim_validate.kit.toml_tables import read_tables
-from sim_validate.planning.grasps_json import read_grasps
+from sim_validate.kit.files import read_tables
 from sim_validate.planning.wrenches_json import wrenches_from_file
-from sim_validate.settings.executions import ExecutionSettings
-from sim_validate.settings.trials import LimitSearch, Noise
+from sim_validate.settings import ExecutionSettings, LimitSearch, Noise
 
 ENDING = ".grasps.toml"
 GIVEN = ("limits", "random_wrenches", "repeats", "noise", "seed")
@@ -79,7 +78,7 @@ class Suite(Settings):
     @cached_property
     def saved(self) -> Plan:
         """Read the grasps that the suite is about."""
-        return read_grasps(self.grasps)
+        return load_grasps(self.grasps)
 
     @cached_property
     def source(self) -> Source:

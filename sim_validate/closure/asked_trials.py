@@ -7,10 +7,10 @@ from grasp_core.planning.reach import Finger
 from grasp_core.settings import extended
 from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.engine.setup import Agenda, Setup, with_planned_radius
+from sim_validate.kit.command_flags import Testing
 from sim_validate.kit.exit_codes import FlagsError
-from sim_validate.kit.flag_groups import Testing
 from sim_validate.planning.wrenches_json import weights, wrenches_from_file
-from sim_validate.settings.trials import ChosenTrials, Noise
+from sim_validate.settings import ChosenTrials, Noise
 
 
 def check_noise(given: ChosenTrials) -> None:

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
+from grasp_core.files.records import RecordFile
 from grasp_core.planning.result import Plan
 from sim_validate.closure.asked_trials import prepared
 from sim_validate.closure.validate import Job, validated
@@ -15,12 +16,12 @@ from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import write_arrays
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.kit.writing import write_arrays
 from sim_validate.planning.asked_objects import asked_grasps
 
-Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, str]]
-"""Judges grasps by another test; gives the exit code and the text of its results."""
+Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, RecordFile]]
+"""Judges grasps by another test; gives the exit code and its results."""
 
 
 def validate_file(
@@ -36,20 +37,20 @@ def validate_file(
     jobs, folder = command.testing.jobs, command.out
     with alone_in(folder):
         if judge is not None:
-            code, text = judge(chosen, setup)
+            code, found = judge(chosen, setup)
         else:
-            code, text = simulate_grasps(
+            code, found = simulate_grasps(
                 chosen, setup, agenda, jobs=jobs, folder=folder, reporter=reporter
             )
-    reporter.text(text)
+    reporter.document(found.document())
     return code
 
 
 def simulate_grasps(
     saved: Plan, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
     reporter: Reporter,
-) -> tuple[Exit, str]:  # fmt: skip
-    """Simulate grasps; return the exit code and the text of verdicts.json."""
+) -> tuple[Exit, Verdicts]:  # fmt: skip
+    """Simulate grasps; return the exit code and the verdicts."""
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
         reporter.detail(str(check))
@@ -68,7 +69,7 @@ def simulate_grasps(
     found = finished(results, len(tasks), collect, path, reporter)
     _show(found, setup, reporter)
     good = all(verdict.good for verdict in found)
-    return (Exit.GOOD if good else Exit.NEGATIVE), found.text()
+    return (Exit.GOOD if good else Exit.NEGATIVE), found
 
 
 def _show(verdicts: Verdicts, setup: Setup, reporter: Reporter) -> None:

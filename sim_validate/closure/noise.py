@@ -38,7 +38,7 @@ from sim_validate.engine.loads import PlannedLoad, loads_as_they_are
 from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
-from sim_validate.settings.trials import Noise
+from sim_validate.settings import Noise
 
 STREAM = 1
 """Number of the random stream that noise is drawn from, apart from other draws with the same

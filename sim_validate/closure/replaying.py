@@ -18,6 +18,7 @@ from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.kinds import OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
@@ -36,7 +37,7 @@ from sim_validate.engine.rig import Rig, Watched, squeezed
 from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
-from sim_validate.planning.grasps_json import GRASPS, grasp_with_id, read_grasps, some
+from sim_validate.planning.asked_objects import GRASPS, grasp_with_id, some
 
 VERDICTS = "verdicts.json"
 
@@ -108,7 +109,7 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
         raise InputError(
             f"{source}: this file of grasps is missing; say with --grasps where the file is"
         )
-    saved = read_grasps(source)
+    saved = load_grasps(source)
     if saved.body.content_sha256 != found.object_sha256:
         raise InputError(
             f"{source}: these grasps are on another object than the results to replay; give the "

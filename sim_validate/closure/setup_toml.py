@@ -11,7 +11,7 @@ from grasp_core.errors import InputError, about
 from grasp_core.settings import Settings, for_users, named
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import Setup
-from sim_validate.kit.toml_tables import read_tables
+from sim_validate.kit.files import read_tables
 
 
 def setup_from_file(path: Path, setup: Setup) -> Setup:

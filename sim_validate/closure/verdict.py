@@ -32,8 +32,8 @@ from sim_validate.engine.gate import Gate
 from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
-from sim_validate.kit.about_object import AboutObject
-from sim_validate.settings.trials import Noise
+from sim_validate.kit.files import AboutObject
+from sim_validate.settings import Noise
 
 AGREEMENT = 0.02
 """Largest relative error of simulated limits and critical frictions: five times the worst that was

@@ -36,7 +36,7 @@ from sim_validate.datasets.units import WorkUnit, provenance, units_of, units_sh
 from sim_validate.datasets.workers import Engine, drive
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
-from sim_validate.kit.paths import path_inside
+from sim_validate.kit.files import path_inside
 from sim_validate.kit.result_folders import alone_in
 
 DATA = "data"

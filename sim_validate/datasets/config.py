@@ -17,8 +17,7 @@ from grasp_core.kinds import METHODS, ConeKind, Count, Friction, Method, RandomW
 from grasp_core.mesh_files.limits import FaceKind, Lengths
 from grasp_core.settings import Settings, as_table
 from sim_validate.datasets.tables import EXECUTED
-from sim_validate.settings.executions import ExecutionSettings
-from sim_validate.settings.trials import LimitSearch
+from sim_validate.settings import ExecutionSettings, LimitSearch
 
 EXECUTION = "execution"
 LEARNING = "learning"
@@ -182,7 +181,7 @@ class DatasetConfig(PlannedContent):
 
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
-    from sim_validate.kit.toml_tables import read_tables  # slow, and no flag needs it
+    from sim_validate.kit.files import read_tables  # slow, and no flag needs it
 
     given = read_tables(path)
     with about(path):

@@ -26,7 +26,7 @@ from sim_validate.datasets.config import Learning
 from sim_validate.datasets.rows import ExecutionRow, GraspRow
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
-from sim_validate.settings.executions import ExecutionSettings, TrialKind
+from sim_validate.settings import ExecutionSettings, TrialKind
 
 Executed: TypeAlias = ExecutedGrasp | str | None
 """An execution, the reason why it was refused, or None where none is asked for."""

@@ -32,7 +32,7 @@ from sim_validate.datasets.open_dataset import Selection, select
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow
 from sim_validate.datasets.tables import SHORT, Name, SplitName
-from sim_validate.kit.writing import whole_folder, write_lines
+from sim_validate.kit.files import whole_folder, write_lines
 
 AXES = "xyz"
 HEAD = """\

@@ -21,7 +21,7 @@ from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import Number, Range
 from sim_validate.datasets.rows import Tables, dataset_tables, groups_asked
 from sim_validate.datasets.tables import Name, SplitName
-from sim_validate.kit.paths import require_inside
+from sim_validate.kit.files import require_inside
 
 MANIFEST = "manifest.json"
 QUARANTINE = "quarantine.jsonl"

@@ -12,7 +12,7 @@ from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
-from sim_validate.kit.paths import path_inside
+from sim_validate.kit.files import path_inside
 
 FOLDER = "meshes"
 SURFACE = "# surface "

@@ -19,7 +19,7 @@ from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manife
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.datasets.rows import ROWS, Rows, Tables
 from sim_validate.datasets.tables import KEYS, SHORT, SPLITS, Name
-from sim_validate.kit.paths import path_inside
+from sim_validate.kit.files import path_inside
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow, TrialRow
 from sim_validate.datasets.varied import VARIED
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.planning.grasps_json import NAMED, some
+from sim_validate.planning.asked_objects import NAMED, some
 
 
 def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:

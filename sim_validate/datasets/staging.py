@@ -24,7 +24,7 @@ from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.rows import dataset_tables
 from sim_validate.datasets.tables import Name, SplitName
 from sim_validate.datasets.units import WorkUnit
-from sim_validate.kit.paths import path_inside
+from sim_validate.kit.files import path_inside
 
 HASH = re.compile(r"[0-9a-f]{64}")
 OTHERS = "others"

@@ -47,7 +47,7 @@ from sim_validate.engine.gate import Gate
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 RATIOS = {
     "friction_below": (0.6, 0.9),

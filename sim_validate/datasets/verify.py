@@ -40,7 +40,7 @@ from sim_validate.datasets.tables import KEYS, Name, id_beginning
 from sim_validate.datasets.units import WorkUnit, provenance
 from sim_validate.datasets.verify_rows import object_faults
 from sim_validate.execution.verdict import may_slip
-from sim_validate.kit.paths import path_inside
+from sim_validate.kit.files import path_inside
 
 OTHER_ROUNDING = 1e-6
 """Relative difference that numbers may have when other packages or processors round them."""

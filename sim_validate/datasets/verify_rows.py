@@ -41,7 +41,7 @@ from sim_validate.datasets.varied import RATIOS, VARIED
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 SAME_MARGIN = 1e-6
 """Largest difference between a closure margin in a row and that of the contacts, relative to the

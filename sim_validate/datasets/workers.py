@@ -24,7 +24,7 @@ from grasp_core.errors import GraspError
 from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenance
-from sim_validate.kit import interrupts
+from sim_validate.kit.processes import check_interrupted
 
 AHEAD = 3
 """Number of units submitted per worker process, so that no worker waits for the next unit."""
@@ -133,7 +133,7 @@ def drive(
                 finished += 1
             else:
                 again.append(task)
-        interrupts.check()
+        check_interrupted()
         if finished > told:
             told = finished
             report(finished, len(units))
@@ -148,7 +148,7 @@ def _try_alone(task: Task, engine: Engine) -> None:
     began = time.monotonic()
     future = engine.submit(do_task, task)
     while not wait([future], timeout=LOOK_S).done:
-        interrupts.check()
+        check_interrupted()
     if _succeeded(future, task, engine):
         return
     took_s = time.monotonic() - began

@@ -37,7 +37,7 @@ from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Trace, holds
-from sim_validate.settings.trials import FrictionProtocol
+from sim_validate.settings import FrictionProtocol
 
 LATER = 8.0
 """Displacement at the second reading of a ramp, relative to the first; 8 = 2 cubed."""

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from sim_validate.settings.trials import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 
 
 @dataclass(frozen=True, slots=True, eq=False)

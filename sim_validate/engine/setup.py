@@ -23,7 +23,7 @@ from grasp_core.settings import CHOSEN
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, build_scene
 from scenes.settings import FingerSettings, PhysicsSettings, ScaledScene
-from sim_validate.settings.trials import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.settings import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"

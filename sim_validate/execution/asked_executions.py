@@ -9,7 +9,7 @@ from grasp_core.settings import extended
 from sim_validate.kit.command_flags import Run
 from sim_validate.kit.exit_codes import FlagsError
 from sim_validate.planning.asked_objects import asked_finger
-from sim_validate.settings.executions import ChosenExecution, ExecutionSettings, Holding
+from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
 Held = TypeVar("Held", bound=Holding)
 

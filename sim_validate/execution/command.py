@@ -20,12 +20,12 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.kit import command_flags
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
 """Figures whose meaning is said below their table."""
@@ -51,19 +51,19 @@ def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     settings = execution_settings(command.executing, chosen.body, chosen.seed, chosen.finger)
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):
-        code, text = execute_grasps(
+        code, found = execute_grasps(
             chosen, settings, jobs=command.jobs, folder=command.out, reporter=reporter,
             physics=physics,
         )  # fmt: skip
-    reporter.text(text)
+    reporter.document(found.document())
     return code
 
 
 def execute_grasps(
     saved: Plan, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
     reporter: Reporter, physics: Mapping[str, object] | None = None,
-) -> tuple[Exit, str]:  # fmt: skip
-    """Execute grasps; return the exit code and the text of executions.json."""
+) -> tuple[Exit, Executions]:  # fmt: skip
+    """Execute grasps; return the exit code and what was found."""
     if folder:
         remove_results(folder, "executions")
     changed, count = physics or {}, len(saved.grasps)
@@ -75,9 +75,9 @@ def execute_grasps(
     found = finished(results, count, collect, folder and folder / Executions.FILE, reporter)
     _show(found, reporter)
     if not all(each.controls_let_go for each in found):
-        return Exit.INTERNAL, found.text()
+        return Exit.INTERNAL, found
     good = all(each.survived for each in found)
-    return (Exit.GOOD if good else Exit.NEGATIVE), found.text()
+    return (Exit.GOOD if good else Exit.NEGATIVE), found
 
 
 def _collected(

@@ -27,7 +27,7 @@ from sim_validate.execution import paths
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import Enough
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 CLEAR = 1.1
 """Predicted loss of the trials that is asked for: predictions beyond a slip are not exact."""

@@ -50,7 +50,7 @@ from sim_validate.execution.predictions import held_dynamics, predicted_losses
 from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
 from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Execution, ExecutionTrial
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 FINE_S = 1.25e-4
 """Length of steps that confirm a loss, at most [s]."""

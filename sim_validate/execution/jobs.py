@@ -21,7 +21,7 @@ from sim_validate.execution.predictions import held_dynamics
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 
 @dataclass(frozen=True, slots=True)

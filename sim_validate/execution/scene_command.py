@@ -23,8 +23,8 @@ from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.result_folders import alone_in
-from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
-from sim_validate.settings.executions import ExecutionSettings, Holding
+from sim_validate.planning.asked_objects import asked_grasps, grasp_with_id
+from sim_validate.settings import ExecutionSettings, Holding
 
 TextOf = Callable[[Grasp], str]
 
@@ -32,7 +32,7 @@ TextOf = Callable[[Grasp], str]
 def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
     """Write a MuJoCo scene for each grasp of a file, or print a single one."""
     _check(command)
-    saved = read_grasps(command.grasps)
+    saved = load_grasps(command.grasps)
     chosen = saved.grasps
     if command.grasp is not None:
         chosen = (grasp_with_id(command.grasps, saved, command.grasp),)
@@ -117,14 +117,9 @@ def export_grasps(command: command_flags.Export, reporter: Reporter) -> int:
         raise FlagsError(
             f"--out must end in {' or '.join(endings)} with --to {command.to}, got {command.out}"
         )
-    plan = load_grasps(command.grasps)
-    if command.grasp is not None:
-        plan = replace(plan, grasps=(grasp_with_id(command.grasps, plan, command.grasp),))
-    if not plan.grasps:
-        reporter.say(f"{command.grasps} holds no grasp")
-        reporter.document({"absence": f"{command.grasps} holds no grasp"})
+    chosen = asked_grasps(command.grasps, reporter, grasp=command.grasp, limit=command.limit)
+    if chosen is None:
         return Exit.NONE
-    chosen = plan[: command.limit]
     radius = command.fingertip_radius_m
     exports.export_grasps(chosen, command.out, command.to, fingertip_radius_m=radius)
     reporter.say(f"wrote {command.out} with {counted(len(chosen), 'grasp')}")

@@ -30,7 +30,7 @@ from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Pose, Table, joined
 from sim_validate.execution.verdict import Skipped
-from sim_validate.settings.executions import ExecutionSettings, TrialKind
+from sim_validate.settings import ExecutionSettings, TrialKind
 
 MET = 1e-7
 """Distance from the surface at which a fingertip has met it, in object radii."""

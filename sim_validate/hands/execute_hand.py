@@ -22,7 +22,7 @@ from scenes.mujoco.held_mjcf import HeldScene
 from sim_validate.execution.execute import asked_settings, executed, surface_reach
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.hands.validate_hand import MOST_PUSH_N
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 
 def execute_hand(

@@ -19,7 +19,7 @@ from grasp_core.kinds import (
     Starts,
     TorqueLimit,
 )
-from sim_validate.kit.flag_groups import Jobs, ProtocolName, Spoken
+from sim_validate.kit.command_flags import Jobs, ProtocolName, Spoken
 from sim_validate.kit.processes import available_cores
 
 HandName = Annotated[

@@ -16,6 +16,7 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
+from grasp_core.files.records import RecordFile
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
@@ -31,19 +32,18 @@ from sim_validate.hands.hand_command import asked_hand
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
 from sim_validate.kit import processes
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.planning.asked_objects import asked_grasps
-from sim_validate.planning.grasps_json import GRASPS
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.planning.asked_objects import GRASPS, asked_grasps
+from sim_validate.settings import ExecutionSettings
 
 HELD = Agenda(critical_friction=False)
 """What hands hold: the usual wrenches, with controls."""
-Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, str]]
-"""Judges a hand in its poses by another test; gives the exit code and the text of its results."""
+Judge: TypeAlias = Callable[[Plan, Hand, Sequence[HandReach]], tuple[Exit, RecordFile]]
+"""Judges a hand in its poses by another test; gives the exit code and its results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +89,8 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
         poses = [each.reach for each in found if each.reach.reached]
         if command.dexgraspbench is not None:
             write_records(command.dexgraspbench, hand, chosen.body, poses, reporter)
-        judged, text = (Exit.GOOD, found.text()) if judge is None else judge(chosen, hand, poses)
-    reporter.text(text)
+        judged, told = (Exit.GOOD, found) if judge is None else judge(chosen, hand, poses)
+    reporter.document(told.document())
     show_simulated([each.simulated for each in found if each.simulated is not None], reporter)
     show_executed([each.executed for each in found if each.executed is not None], reporter)
     if poses:

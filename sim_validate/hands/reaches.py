@@ -26,8 +26,8 @@ from grasp_core.provenance import versions
 from grasp_core.settings import Settings
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.validate_hand import HandVerdict
-from sim_validate.kit.about_object import AboutObject
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.kit.files import AboutObject
+from sim_validate.settings import ExecutionSettings
 
 TOUCHING_M = 1e-4
 """How far a fingertip of the file may be from its contact [m]: ten times what `reach_with` allows.

@@ -20,7 +20,7 @@ from grasp_core.figures import table
 from grasp_core.files.json_text import text_of
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
-from sim_validate.kit import interrupts
+from sim_validate.kit.processes import check_interrupted
 
 Result = TypeVar("Result")
 File = TypeVar("File", bound=RecordFile)
@@ -173,7 +173,7 @@ class Steps:
 
     def update(self, done: int, total: int, note: str = "") -> None:
         """Show how many steps are done; an interrupt that was swallowed is raised here."""
-        interrupts.check()
+        check_interrupted()
         if self.bar is not None:
             title = f"{self.title} {note}" if note else self.title
             self.bar.update(self.task, completed=done, total=total, description=title)
@@ -205,24 +205,6 @@ def finished(
             write_text(path, found.text())
             reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
     return found
-
-
-def finished_text(
-    results: Iterable[Result], total: int, text_of: Callable[..., str], path: Path | None,
-    reporter: Reporter,
-) -> tuple[list[Result], str]:  # fmt: skip
-    """Collect results, and write the text about them even if the work is interrupted."""
-    done = list[Result]()
-    try:
-        for result in results:
-            done.append(result)
-    finally:
-        complete = len(done) == total
-        text = text_of(done, complete=complete)
-        if path and done:
-            write_text(path, text)
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    return done, text
 
 
 def warn_of(lines: Sequence[str], file: str, reporter: Reporter) -> None:

@@ -1,13 +1,22 @@
 """Runs units of work in processes of this machine.
 
 Results do not depend on the number of processes: a unit sees only its own arguments.
+
+Some compiled libraries clear errors that are not their own, keyboard interrupts too, and the
+program would run on: interrupts are noted, and raised again at the next step. A request to end
+(SIGTERM) counts as one.
 """
 
 import os
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+import signal
+import sys
+import threading
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
+from types import FrameType
 from typing import Any, Generic, TypeVar
 
 Unit = TypeVar("Unit")
@@ -82,3 +91,43 @@ def _packed(value: object) -> bytes:
 @lru_cache(maxsize=KEPT)
 def _arrived(data: bytes) -> Shared[Any]:
     return Shared(pickle.loads(data))  # noqa: S301 - the process that started this one packed it
+
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+_noted = threading.Event()
+
+
+@contextmanager
+def interrupts_noted() -> Generator[None, None, None]:
+    """Record interrupts, besides raising them, while the context is open."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python handles signals in its main thread only
+        return
+    _noted.clear()
+    before = {number: signal.signal(number, _note) for number in SIGNALS}
+    told = sys.unraisablehook
+    # reports errors that cannot be raised where they occur, but interrupts, which are recorded
+    sys.unraisablehook = lambda e: None if e.exc_type is KeyboardInterrupt else told(e)
+    try:
+        yield
+    except Exception as error:
+        if _noted.is_set():
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        sys.unraisablehook = told
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _note(_: int, __: FrameType | None) -> None:
+    _noted.set()
+    raise KeyboardInterrupt
+
+
+def check_interrupted() -> None:
+    """Raise an interrupt that was recorded, where a library may have swallowed it."""
+    if _noted.is_set():
+        _noted.clear()
+        raise KeyboardInterrupt

@@ -1,26 +1,274 @@
-"""Runs the command `analyze`, which judges contacts of any origin and prints tables or JSON."""
+"""Runs the command `analyze`, which judges contacts of any origin and prints tables or JSON.
 
+A question that cannot be decided leaves a reason; all other questions are still answered.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import partial
+from typing import Annotated, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, to_digits
-from grasp_core.errors import about
-from grasp_core.figures import NONE, figures
+from grasp_core.arrays import Array, Shape, Wrench, to_digits
+from grasp_core.closure.critical_friction import critical_friction_interval
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.friction_interval import FrictionInterval
+from grasp_core.closure.wrench_sets import Norm
+from grasp_core.declared import Declared
+from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedError, about
+from grasp_core.figures import NONE, Shown, figures
+from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.files.text_files import read_text
+from grasp_core.forces.contact_forces import contact_forces
+from grasp_core.kinds import Count, Null, OrInfinity, Quantity
+from grasp_core.provenance import versions
+from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
+from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
+from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
 from grasp_core.records.contacts_json import ContactSet, Overrides, contact_sets_from_json
+from grasp_core.solvers.ties import first_best
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.processes import each
-from sim_validate.planning.contact_analysis import (
-    Analyses,
-    Analysis,
-    Outcome,
-    Question,
-    analyze,
-    check_edges,
-)
+
+MOST_EDGES = 10_000
+"""Largest number of edges of all pyramids of a grasp together; their hull in six dimensions then
+takes ten seconds."""
+
+Answer = TypeVar("Answer")
+Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
+Forces = Annotated[Array, Shape(None, 3)]
+Margin = Annotated[float, Null(-math.inf)]
+Bounds = tuple[float, float]
+"""Proved lower and upper bound."""
+
+
+class Outcome(StrEnum):
+    """What was decided about force closure."""
+
+    CLOSED = "closed"
+    OPEN = "open"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, slots=True)
+class Question(Declared):
+    """Which questions to answer about contacts, with their settings."""
+
+    max_normal_force_n: Quantity
+    """Largest normal force of each contact [N]."""
+    wrenches: tuple[tuple[float, float, float, float, float, float], ...] = ()
+    """External wrenches (force, torque) [N, N m], torque about each grasp's centre."""
+    edges: Count = 8
+    """Number of edges of the pyramids that stand for friction cones in metrics defined by them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Resisted(Declared):
+    """The largest multiple of a wrench that is resisted, and forces that balance the wrench."""
+
+    wrench: Wrench
+    limit: OrInfinity
+    """Largest multiple that is resisted."""
+    upper: OrInfinity
+    """Multiple above which the wrench is not resisted."""
+    least_norm_forces_n: Forces | None = None
+    """The balancing forces of least norm, in pyramids inscribed in the friction cones, (k, 3) [N];
+    None if there are none, which may happen for a limit just above 1, or if none were asked for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Analysis(Declared):
+    """Results about one grasp; None stands for a result that could not be decided."""
+
+    contacts: Annotated[ContactSet, FLAT]
+    closed: Annotated[bool | None, Shown("closed")]
+    """Whether the contacts are in force closure, by a certificate that was checked again."""
+    closure_margin: Annotated[Margin | None, Shown("margin")]
+    """Proved margin of force closure; None also if it is below -1e6."""
+    forces: Forces | None
+    """Balancing forces that prove closure."""
+    separating_wrench: Wrench | None
+    """Wrench that proves that there is no closure, with its torque about the grasp's centre."""
+    critical_friction: Annotated[OrInfinity | None, Shown("mu*", ".4f")]
+    """Common coefficient that suffices for closure; infinite if none does."""
+    critical_friction_interval: tuple[OrInfinity, OrInfinity] | None
+    """Ends between which it is proved to lie, checked again in rational arithmetic."""
+    ferrari_canny_l1_n: Annotated[Bounds | None, Shown("l1 N")]
+    ferrari_canny_linf_n: Annotated[Bounds | None, Shown("linf N")]
+    verified: Mapping[str, bool]
+    """Whether plain arithmetic has confirmed closure and the bounds of both qualities, by name."""
+    min_weight: Annotated[OrInfinity | None, Shown("min-weight")]
+    hull_volume: Annotated[float | None, Shown("hull volume")]
+    smallest_singular_value: Annotated[float, Shown("singular value")]
+    weakest_axis_wrench: Resisted | None
+    """The wrench along an axis that is resisted least, and its limit."""
+    resisted_in_every_direction_n: Annotated[float | None, Shown("every direction N")]
+    """Multiple up to which the grasp resists every wrench of unit size."""
+    wrenches: tuple[Resisted | None, ...]
+    """Results about the wrenches, in the order in which they were asked about."""
+    undecided: Mapping[str, str]
+    """Reasons why questions could not be decided, by the name of the question."""
+
+    @recorded
+    def outcome(self) -> Outcome:
+        """The answer about force closure."""
+        if self.closed is None:
+            return Outcome.UNDECIDED
+        return Outcome.CLOSED if self.closed else Outcome.OPEN
+
+    @recorded
+    def weakest_axis(self) -> Annotated[OrInfinity | None, Shown("weakest axis")]:
+        """Largest multiple that is resisted of the wrench along the weakest axis."""
+        return None if self.weakest_axis_wrench is None else self.weakest_axis_wrench.limit
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Analyses(RecordFile):
+    """The analyses of all grasps of a contacts file."""
+
+    FILE = "document of analyses"
+    SCHEMA = 1
+
+    source: str
+    """Path of the file."""
+    question: Annotated[Question, FLAT]
+    grasps: tuple[Analysis, ...]
+    complete: bool
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps, and of grasps of each outcome."""
+        counts = Counter(each.outcome for each in self.grasps)
+        return {"grasps": len(self.grasps)} | {each.value: counts[each] for each in Outcome}
+
+
+def check_edges(sets: Iterable[ContactSet], edges: int) -> None:
+    """Refuse pyramids with so many edges that their hull would take minutes."""
+    for contacts in sets:
+        count = len(contacts.positions)
+        if count * edges > MOST_EDGES:
+            raise InputError(
+                f"grasp {contacts.id}: {count} contacts with {edges} edges each exceed "
+                f"{MOST_EDGES} edges; use --edges {MOST_EDGES // count} or less"
+            )
+
+
+def analyze(contacts: ContactSet, question: Question) -> Analysis:
+    """Answer every question about one grasp that can be decided."""
+    given = contacts.positions, contacts.normals, contacts.friction
+    edges, center, scale = question.edges, contacts.center, contacts.torque_scale
+    ask = _Asking()
+    l1 = ask("ferrari_canny_l1", lambda: _quality(contacts, "l1"))
+    linf = ask("ferrari_canny_linf", lambda: _quality(contacts, "linf"))
+    proof = ask("closure", lambda: _checked(force_closure(*given)))
+    interval = ask("critical_friction", lambda: _checked(critical_friction_interval(*given[:2])))
+    bounds = [None if found is None else (found.lower, found.upper) for found in (l1, linf)]
+    return Analysis(
+        contacts=contacts,
+        closed=None if proof is None else proof.closed,
+        closure_margin=None if proof is None else proof.margin,
+        forces=None if proof is None else proof.forces,
+        separating_wrench=_about_center(proof, center),
+        critical_friction=None if interval is None else interval.critical_friction,
+        critical_friction_interval=None if interval is None else (interval.lower, interval.upper),
+        ferrari_canny_l1_n=bounds[0],
+        ferrari_canny_linf_n=bounds[1],
+        verified={
+            "closure": proof is not None,
+            "ferrari_canny_l1_n": l1 is not None and l1.verify(),
+            "ferrari_canny_linf_n": linf is not None and linf.verify(),
+        },
+        min_weight=ask("min_weight", lambda: min_weight(*given, edges=edges)),
+        hull_volume=ask(
+            "hull_volume",
+            lambda: hull_volume(*given, edges=edges, center=center, torque_scale=scale),
+        ),
+        smallest_singular_value=smallest_singular_value(
+            contacts.positions, center=center, torque_scale=scale
+        ),
+        weakest_axis_wrench=ask("weakest_axis_wrench", lambda: _weakest_axis(contacts, question)),
+        resisted_in_every_direction_n=(
+            None if linf is None else max(linf.lower, 0.0) * question.max_normal_force_n
+        ),
+        wrenches=tuple(
+            ask(f"wrenches[{i}]", lambda load=load: _resisted(contacts, load, question))
+            for i, load in enumerate(question.wrenches)
+        ),
+        undecided=ask.reasons,
+    )
+
+
+@dataclass(slots=True)
+class _Asking:
+    """Answers questions about one grasp, and keeps the reasons why some have no answer."""
+
+    reasons: dict[str, str] = field(default_factory=dict[str, str])
+
+    def __call__(self, name: str, question: Callable[[], Answer]) -> Answer | None:
+        try:
+            return question()
+        except (UndecidedError, SolverError) as error:
+            self.reasons[name] = str(error)
+            return None
+
+
+def _checked(certificate: Checked) -> Checked:
+    if not certificate.verify():
+        raise UndecidedError(
+            "the answer's own certificate failed its check, so the answer cannot be trusted"
+        )
+    return certificate
+
+
+def _about_center(proof: ClosureCertificate | None, center: Array) -> Array | None:
+    """Return a certificate's separating wrench with its torque about a grasp's centre, (6,)."""
+    wrench = None if proof is None else proof.separating_wrench
+    if wrench is None:
+        return None
+    return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
+
+
+def _quality(contacts: ContactSet, norm: Norm) -> FerrariCanny:
+    return ferrari_canny(
+        contacts.positions, contacts.normals, contacts.friction,
+        center=contacts.center, torque_scale=contacts.torque_scale, norm=norm,
+    )  # fmt: skip
+
+
+def _limits(contacts: ContactSet, wrenches: ArrayLike, question: Question) -> list[Resisted]:
+    found = wrench_limits(
+        contacts.positions, contacts.normals, contacts.friction, wrenches,
+        max_normal_force=question.max_normal_force_n, center=contacts.center,
+    )  # fmt: skip
+    return [Resisted(each.wrench, each.limit, each.upper) for each in found]
+
+
+def _weakest_axis(contacts: ContactSet, question: Question) -> Resisted:
+    limits = _limits(contacts, axis_wrenches(contacts.torque_scale), question)
+    return limits[first_best([-found.limit for found in limits])]
+
+
+def _resisted(contacts: ContactSet, wrench: ArrayLike, question: Question) -> Resisted:
+    (limit,) = _limits(contacts, np.array([wrench]), question)
+    if limit.upper < 1.0:
+        return limit
+    try:
+        forces = contact_forces(
+            contacts.positions, contacts.normals, contacts.friction, wrench,
+            normal_force=(0.0, question.max_normal_force_n), center=contacts.center,
+        )  # fmt: skip
+    except NoForcesError:
+        return limit
+    return replace(limit, least_norm_forces_n=forces)
+
 
 DIGITS = 7
 STEP = 10.0**-DIGITS
@@ -43,7 +291,7 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
 
     def told(done: tuple[Analysis, ...], *, complete: bool) -> Analyses:
         analyses = Analyses(str(command.contacts), question, done, complete)
-        reporter.text(analyses.text())
+        reporter.document(analyses.document())
         return analyses
 
     analyses = finished(results, len(sets), told, None, reporter)

@@ -1,5 +1,6 @@
 """Loads the object or the grasps that a command's flags name, and the fingers to plan for."""
 
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -9,13 +10,19 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import load_grasps
+from grasp_core.values import Grasp
 from scenes.example_objects import example_object
-from sim_validate.kit import flag_groups
+from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
-from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
+
+GRASPS = "grasps.json"
+"""Name of the file in a folder of results."""
+NAMED = 5
+"""Largest number of names that a message lists."""
 
 
-def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
+def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
     """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower() == ".json":
@@ -37,7 +44,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
             "file exists"
         )
     unlimited = replace(mesh.choices, **asdict(MeshLimits()))
-    if replace(mesh, choices=unlimited) != flag_groups.Mesh():
+    if replace(mesh, choices=unlimited) != command_flags.Mesh():
         raise InputError(
             f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches..., "
             "--flatness-m, --largest-part and --center-of-mass-m, which say how mesh files are read"
@@ -45,7 +52,7 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
     return example_object(name)
 
 
-def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter) -> Polyhedron:
+def object_to_plan(name: str, planning: command_flags.Planning, reporter: Reporter) -> Polyhedron:
     """Load the object and check that the planning flags fit it."""
     if planning.ceiling is not None and not planning.optimize:
         raise InputError(
@@ -75,7 +82,7 @@ def object_to_plan(name: str, planning: flag_groups.Planning, reporter: Reporter
     return body
 
 
-def asked_finger(planning: flag_groups.Planning) -> Finger | None:
+def asked_finger(planning: command_flags.Planning) -> Finger | None:
     """Build the finger whose straight free path is planned, or None if no flag asks for it."""
     if planning.approach_m is None:
         if planning.finger_radius_m is not None and not planning.optimize:
@@ -100,7 +107,7 @@ def asked_grasps(
     They have another friction or seed where one is given. None, with a word about it, if the file
     holds no grasp.
     """
-    saved = read_grasps(path)
+    saved = load_grasps(path)
     for note in saved.body.surface.notes():
         reporter.warn(f"{saved.body.name}: {note}")
     if not saved.grasps:
@@ -114,3 +121,25 @@ def asked_grasps(
         seed=saved.seed if seed is None else seed,
         grasps=saved.grasps[:limit] if grasp is None else (grasp_with_id(path, saved, grasp),),
     )
+
+
+def grasp_with_id(path: Path, saved: Plan, wanted: str | None) -> Grasp:
+    """Find the grasp with an id; the id may be left out if the file has one grasp only."""
+    if wanted is None and len(saved.grasps) == 1:
+        return saved.grasps[0]
+    found = next((grasp for grasp in saved.grasps if grasp.id == wanted), None)
+    if found is None:
+        asked = (
+            "choose a grasp with --grasp ID" if wanted is None else f"no grasp is named {wanted}"
+        )
+        raise InputError(
+            f"{path}: {asked}; the file has {some(grasp.id for grasp in saved.grasps)}"
+        )
+    return found
+
+
+def some(names: Iterable[str]) -> str:
+    """List the first few of many names for a message."""
+    listed = list(names)
+    more = f" and {len(listed) - NAMED} more" if len(listed) > NAMED else ""
+    return (", ".join(listed[:NAMED]) or "none") + more

@@ -13,7 +13,7 @@ from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.planning.best_json import PROOF, Best, Rated
+from sim_validate.planning.best_json import MEASURES, PROOF, Best, Rated
 
 STEPS = 100
 WHY = {
@@ -25,10 +25,8 @@ WHY = {
 """Why a search ended, in words."""
 ROUGH = 1e-3
 """Gap between the bounds of what planned grasps hold."""
-UNITS = {
-    "ferrari-canny": ("quality", " N"), "weight": ("weight", " N"), "task": ("multiple", ""),
-}  # fmt: skip
-"""What each measure gives, and its unit, for normal forces that sum to one newton."""
+WORDS = {"ferrari-canny": "quality", "weight": "weight", "task": "multiple"}
+"""What each measure gives, in a word."""
 
 
 def search_best(
@@ -40,7 +38,7 @@ def search_best(
 
         def tell(now: GapAt) -> None:
             closed = round(STEPS * (1.0 - max(now.gap - command.gap, 0.0)))
-            word = UNITS[command.measure][0]
+            word = WORDS[command.measure]
             note = f"({word} {now.quality:.4f}, bound {now.bound:.4f}, gap {100 * now.gap:.1f} %)"
             steps.update(closed, STEPS, note)
 
@@ -61,19 +59,22 @@ def write_best(
     if not measure.is_usual:
         found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
         bounds = [(each.lower, each.upper) for each in found]
-    rated = (Rated.of(each, ends, best.bound) for each, ends in zip(planned, bounds, strict=True))
+    rated = (
+        Rated(each.id, each.family, ends, ends[0] / best.bound)
+        for each, ends in zip(planned, bounds, strict=True)
+    )
     record = Best.of(body, best, rated, PROOF if folder else None)
     if folder:
         write_proof(folder / PROOF, best.proof)
         write_text(folder / Best.FILE, record.text())
         reporter.say(f"wrote {folder / Best.FILE} and {folder / PROOF}")
-    reporter.text(record.text())
+    reporter.document(record.document())
     return record
 
 
 def show_best(found: Best, reporter: Reporter) -> int:
     """Show the best grasp, the bound, and how much of the possible each planned grasp reaches."""
-    word, unit = UNITS[found.measure]
+    word, (_, unit) = WORDS[found.measure], MEASURES[found.measure]
     reporter.say(
         f"best grasp {found.grasp.id}: {word} {found.quality[0]:.4f}{unit}; no four contacts "
         f"{1e3 * found.clearance_m:.3g} mm from edges exceed {found.bound:.4f}{unit} (gap "

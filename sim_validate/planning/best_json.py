@@ -16,8 +16,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt
 from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
-from grasp_core.values import FINGERS, FaceQuadruple, Grasp
-from sim_validate.kit.about_object import AboutObject
+from grasp_core.values import FINGERS, FaceQuadruple
+from sim_validate.kit.files import AboutObject
 
 PROOF = "best-proof.npz"
 MEASURES: Mapping[MeasureName, tuple[str, str]] = {
@@ -38,11 +38,6 @@ class Rated(Declared):
     """Proved lower and upper bound of what the measure says of the grasp."""
     share_of_bound: Annotated[float, Shown("of the bound %", ".1f", 100.0)]
     """Share of the bound that the lower one reaches."""
-
-    @classmethod
-    def of(cls, grasp: Grasp, quality: tuple[float, float], bound: float) -> Self:
-        """Set a grasp beside a bound."""
-        return cls(grasp.id, grasp.family, quality, quality[0] / bound)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -26,13 +26,14 @@ from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types
 from grasp_core.values import Grasp
-from sim_validate.kit import command_flags, flag_groups
+from sim_validate.kit import command_flags
 from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
+from sim_validate.settings import Certifying
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best.result import BestGrasp
@@ -43,7 +44,7 @@ optimum end some thousandths from it."""
 
 
 def plan_object(
-    body: Polyhedron, planning: flag_groups.Planning, jobs: int, reporter: Reporter
+    body: Polyhedron, planning: command_flags.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
     """Plan the grasps of an object and, if asked for, improve them."""
     if must_compile(PLANNING, jobs):
@@ -68,16 +69,13 @@ def plan_object(
 
 
 def improved(
-    body: Polyhedron, found: Plan, planning: flag_groups.Planning, jobs: int, reporter: Reporter
+    body: Polyhedron, found: Plan, planning: command_flags.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
     """Move the contacts of each grasp to raise its quality; return the new plan, best first.
 
     The plan keeps only one of several grasps that end at the same contacts.
     """
-    improve = partial(
-        _improve, body, found.friction, planning.finger_radius_m, found.seed, planning.ceiling
-    )
-    results = each(improve, found.grasps, jobs=jobs)
+    results = each(partial(_improve, body, planning), found.grasps, jobs=jobs)
     done = list(
         reporter.counted(
             "optimising", results, len(found.grasps), "raised", lambda pair: pair[1].gain > 1.0
@@ -99,18 +97,19 @@ def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
 
 
 def _improve(
-    body: Polyhedron, friction: float, finger_radius: float | None, seed: int, parts: int | None,
-    grasp: Grasp,
-) -> tuple[Grasp, Moved]:  # fmt: skip
+    body: Polyhedron, planning: command_flags.Planning, grasp: Grasp
+) -> tuple[Grasp, Moved]:
     from grasp_core.optimizing.better_contacts import optimize_contacts
     from grasp_core.optimizing.ceiling import quality_ceiling
 
-    found = optimize_contacts(body, grasp, friction, finger_radius=finger_radius, seed=seed)
+    found = optimize_contacts(
+        body, grasp, planning.friction, finger_radius=planning.finger_radius_m, seed=planning.seed
+    )
     ceiling = None
-    if parts is not None:
+    if planning.ceiling is not None:
         ceiling = quality_ceiling(
-            body, grasp.faces, friction, known=found.after.lower,
-            finger_radius=found.clearances, parts=parts,
+            body, grasp.faces, planning.friction, known=found.after.lower,
+            finger_radius=found.clearances, parts=planning.ceiling,
         ).upper  # fmt: skip
     before, after = found.before, found.after
     moved = Moved(
@@ -120,17 +119,15 @@ def _improve(
 
 
 def with_regions(
-    body: Polyhedron, found: Plan, planning: flag_groups.Planning, folder: Path | None, jobs: int,
+    body: Polyhedron, found: Plan, planning: command_flags.Planning, folder: Path | None, jobs: int,
     reporter: Reporter,
 ) -> Plan:  # fmt: skip
     """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
     if not (planning.regions and found.grasps):
         return found
-    from grasp_core.regions.certify_regions import CONES
     from sim_validate.planning.regions import certified, wider
-    from sim_validate.planning.regions_json import Certifying
 
-    asked = Certifying(0.0, False, planning.edge_clearance_m, CONES)
+    asked = Certifying(edge_clearance_m=planning.edge_clearance_m)
     proved = certified(
         body, found.grasps, found.friction, asked, folder=folder, jobs=jobs, reporter=reporter
     )
@@ -165,15 +162,19 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
             from sim_validate.planning.best import write_best
 
             possible = write_best(body, best, planned, command.out, reporter)
-        elif reporter.json_only:
-            print(text, end="")  # noqa: T201 - the document itself
+        else:
+            reporter.text(text)
     say_counts(body, found, reporter)
     if found.absence:
         reporter.say(found.absence)
         return Exit.NONE
-    columns, rows = _table(body, found, carry=command.planning.rank_by == "payload")
-    reporter.table(f"{len(found.grasps)} grasps of {body.name}", columns, rows)
-    say_cut(len(found.grasps), reporter)
+    reporter.records(f"{len(found.grasps)} grasps of {body.name}", found.grasps)
+    if command.planning.rank_by == "payload":  # which is not kept with grasps
+        payloads = [
+            (grasp.id, f"{carried(body, grasp, found.friction, found.finger):.4g}")
+            for grasp in found.grasps[:TABLE_ROWS]
+        ]
+        reporter.table("what one squeeze carries", ("grasp", "payload kg"), payloads)
     if found.moves:
         show_gains(found.moves, reporter)
     if possible is None:
@@ -196,30 +197,6 @@ def _task(command: command_flags.Plan) -> Array | None:
     from sim_validate.planning.wrenches_json import wrenches_from_file
 
     return np.array([each.wrench for each in wrenches_from_file(command.wrenches)])
-
-
-def _table(
-    body: Polyhedron, found: Plan, *, carry: bool
-) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return the columns and rows that show the best grasps.
-
-    What grasps carry is not kept with them. Where they are ordered by it, it is computed again, and
-    stands in the place of the margin, for which there would be no room.
-    """
-    shown = found.grasps[:TABLE_ROWS]
-    friction, finger = found.friction, found.finger
-    heading = "payload kg" if carry else "margin"
-    columns = ("grasp", "family", "radius mm", "mu*", "theta* deg", heading, "quality N")
-    figures = [
-        f"{carried(body, g, friction, finger):.4g}" if carry else f"{g.closure_margin:.4f}"
-        for g in shown
-    ]
-    rows = [
-        (g.id, g.family, f"{1e3 * g.radius:.3g}" if g.radius else "-", f"{g.critical_friction:.4f}",
-         f"{math.degrees(g.span_angle):.2f}", figure, f"{g.ferrari_canny[0]:.4f}")
-        for g, figure in zip(shown, figures, strict=True)
-    ]  # fmt: skip
-    return columns, rows
 
 
 def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
@@ -263,13 +240,7 @@ def _whoever(why: str) -> str:
 
 def show_gains(moves: Sequence[Moved], reporter: Reporter) -> None:
     """Show how optimisation changed the quality of each grasp, with percentiles."""
-    rows = [
-        (move.id, f"{move.before[0]:.4f}", f"{move.after[0]:.4f}", f"{move.gain:.3f}",
-         "" if move.ceiling is None else f"{move.ceiling:.4f}")
-        for move in moves[:TABLE_ROWS]
-    ]  # fmt: skip
-    columns = ("grasp", "quality before", "after", "gain", "upper bound")
-    reporter.table("Ferrari-Canny l1 [N]", columns, rows)
+    reporter.records("Ferrari-Canny l1 [N]", moves)
     gains = np.array([move.gain for move in moves])
     low, quarter, middle, upper, high = np.percentile(gains, [0, 25, 50, 75, 100])
     reporter.say(

@@ -13,39 +13,37 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.figures import figures
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.console import Reporter, finished
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.processes import each
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.planning.grasps_json import read_grasps
-from sim_validate.planning.regions_json import Certifying, GraspRegions, Regions, write_proof
+from sim_validate.planning.regions_json import GraspRegions, Regions, write_proof
+from sim_validate.settings import Certifying
 
 
 def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
     """Certify independent contact regions for a file's grasps, and write them with their proofs."""
-    saved = read_grasps(command.grasps)
+    saved = load_grasps(command.grasps)
     chosen = [grasp for grasp in saved.grasps if command.grasp in (None, grasp.id)][: command.limit]
     if not chosen:
         wanted = f"a grasp {command.grasp}" if command.grasp else "at least one grasp"
         raise InputError(f"{command.grasps}: expected {wanted} to certify, found none")
     friction = saved.friction if command.friction is None else command.friction
-    asked = Certifying(
-        command.reserve, command.recenter, command.edge_clearance_m, command.max_cones
-    )
     with alone_in(command.out):
         if command.out is not None:
             remove_results(command.out, "regions")
         found = certified(
-            saved.body, chosen, friction, asked, folder=command.out, jobs=command.jobs,
+            saved.body, chosen, friction, command.certifying, folder=command.out, jobs=command.jobs,
             reporter=reporter,
         )  # fmt: skip
     _show(found, reporter)
-    reporter.text(found.text())
+    reporter.document(found.document())
     proved = found.summary["proved"] == len(found.grasps)
     return Exit.GOOD if proved else Exit.NEGATIVE
 

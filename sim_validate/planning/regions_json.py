@@ -18,17 +18,15 @@ from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS
 from grasp_core.grasp_tables import ById
-from grasp_core.kinds import Count, Family, Friction, MaxCones, NotNegative, Reserve
+from grasp_core.kinds import Count, Family, Friction, NotNegative
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.proof import TwistCover
-from grasp_core.settings import Settings
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
-from sim_validate.kit.about_object import AboutObject
-from sim_validate.kit.npz import read_arrays
-from sim_validate.kit.writing import write_arrays
+from sim_validate.kit.files import AboutObject, read_arrays, write_arrays
+from sim_validate.settings import Certifying
 
 PROOFS = "proofs"
 """Folder of the proof files, beside `regions.json`."""
@@ -52,20 +50,6 @@ MOST_CORNERS = 1000
 """Largest number of corners of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 """Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Certifying(Settings):
-    """How regions are certified."""
-
-    reserve: Reserve
-    """Share of the friction that proofs do not count on."""
-    recenter: bool
-    """Whether discs are around face middles rather than around contacts."""
-    edge_clearance_m: NotNegative
-    """Distance of regions from the edges of their faces [m]."""
-    max_cones: MaxCones
-    """Largest number of cones of a proof."""
 
 
 @dataclass(frozen=True, slots=True)

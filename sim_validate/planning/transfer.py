@@ -27,13 +27,12 @@ from grasp_core.transferring.transfer import (
     Transfer,
     transfer,
 )
-from sim_validate.kit import command_flags, flag_groups
-from sim_validate.kit.about_object import AboutObject
+from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.planning.asked_objects import asked_grasps, load_object
-from sim_validate.planning.grasps_json import GRASPS
+from sim_validate.planning.asked_objects import GRASPS, asked_grasps, load_object
 
 MM = 1e3
 ABSENT = "-"
@@ -85,13 +84,13 @@ def transfer_file(command: command_flags.Transfer, reporter: Reporter) -> int:
             saved.body, new, saved.grasps, saved.friction, distance=command.carrying.distance_m,
             angle_deg=command.carrying.angle_deg, finger=saved.finger,
         )  # fmt: skip
-        text = TransferFile.of(found).text()
+        record = TransferFile.of(found)
         if command.out is not None:
             remove_results(command.out)
             grasps = write_text(command.out / GRASPS, carried_to_json(found, saved))
-            path = write_text(command.out / TransferFile.FILE, text)
+            path = write_text(command.out / TransferFile.FILE, record.text())
             reporter.say(f"wrote {grasps} and {path}")
-    reporter.text(text)
+    reporter.document(record.document())
     _show(found, reporter)
     if not found.carried:
         return Exit.NONE
@@ -122,17 +121,14 @@ def carried_to_json(found: Transfer, saved: Plan) -> str:
 
 def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
     center, part = command.center_of_mass_m, Path(command.part)
-    asked = flag_groups.Mesh(
-        command.lengths, extended(MeshChoices, command.limits), center_of_mass_m=center
-    )
+    choices = extended(MeshChoices, command.limits)
     if part.suffix or part.is_file():  # a built-in object is as it is
         if center is None and (kept := given_center(old)) is not None:
             x, y, z = kept.tolist()
             center = x, y, z
-        largest = old.surface.dropped > SMALL
-        choices = replace(asked.choices, faces="planar", largest_part=largest)
-        asked = replace(asked, choices=choices, center_of_mass_m=center)
-    return load_object(command.part, asked)
+        choices = replace(choices, faces="planar", largest_part=old.surface.dropped > SMALL)
+    mesh = command_flags.Mesh(command.lengths, choices, center_of_mass_m=center)
+    return load_object(command.part, mesh)
 
 
 def _show(found: Transfer, reporter: Reporter) -> None:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 from operator import call
-from pathlib import Path
 
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
@@ -13,9 +12,9 @@ from sim_validate.engine.setup import Setup
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.reach_command import reach_file
 from sim_validate.kit import command_flags, processes
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import remove_results
 from sim_validate.protocols.judging import judge_by, judge_hand_by
 from sim_validate.protocols.published import protocol
@@ -24,64 +23,48 @@ from sim_validate.protocols.verdict import Judgement, Judgements
 
 def judge_file(command: command_flags.Validate, reporter: Reporter) -> int:
     """Judge the grasps of a file by the published tests that are named, or else by our own."""
-    by = partial(
-        judge_grasps, names=command.protocol, jobs=command.testing.jobs, folder=command.out,
-        reporter=reporter,
-    )  # fmt: skip
-    return validate_file(command, reporter, by if command.protocol else None)
+
+    def judge(saved: Plan, setup: Setup) -> tuple[Exit, Judgements]:
+        cases = [
+            partial(judge_by, name, saved.body, grasp, saved.friction, setup=setup)
+            for name in command.protocol
+            for grasp in saved.grasps
+        ]
+        return _judged(command, saved, cases, command.testing.jobs, reporter)
+
+    return validate_file(command, reporter, judge if command.protocol else None)
 
 
 def judge_reach(command: hand_flags.Reach, reporter: Reporter) -> int:
     """Look for poses of a hand in grasps, and judge them by the published tests that are named."""
-    by = partial(
-        judge_hands, names=command.protocol, jobs=command.jobs, folder=command.out,
-        reporter=reporter,
-    )  # fmt: skip
-    return reach_file(command, reporter, by if command.protocol else None)
 
+    def judge(saved: Plan, hand: Hand, found: Sequence[HandReach]) -> tuple[Exit, Judgements]:
+        cases = [
+            partial(judge_hand_by, name, hand, saved.body, reach, saved.friction)
+            for name in command.protocol
+            for reach in found
+        ]
+        return _judged(command, saved, cases, command.jobs, reporter)
 
-def judge_grasps(
-    saved: Plan, setup: Setup, *, names: Sequence[str], jobs: int, folder: Path | None,
-    reporter: Reporter,
-) -> tuple[Exit, str]:  # fmt: skip
-    """Judge grasps by tests with four fingertips; return exit code and text of judgements.json."""
-    cases = [
-        partial(judge_by, name, saved.body, grasp, saved.friction, setup=setup)
-        for name in names
-        for grasp in saved.grasps
-    ]
-    return _judged(saved, names, cases, jobs, folder, reporter)
-
-
-def judge_hands(
-    saved: Plan, hand: Hand, found: Sequence[HandReach], *, names: Sequence[str],
-    jobs: int, folder: Path | None, reporter: Reporter,
-) -> tuple[Exit, str]:  # fmt: skip
-    """Judge the poses of a hand by tests; return the exit code and the text of judgements.json."""
-    cases = [
-        partial(judge_hand_by, name, hand, saved.body, reach, saved.friction)
-        for name in names
-        for reach in found
-        if reach.reached
-    ]
-    return _judged(saved, names, cases, jobs, folder, reporter)
+    return reach_file(command, reporter, judge if command.protocol else None)
 
 
 def _judged(
-    saved: Plan, names: Sequence[str], cases: Sequence[Callable[[], Judgement]], jobs: int,
-    folder: Path | None, reporter: Reporter,
-) -> tuple[Exit, str]:  # fmt: skip
+    command: command_flags.Validate | hand_flags.Reach, saved: Plan,
+    cases: Sequence[Callable[[], Judgement]], jobs: int, reporter: Reporter,
+) -> tuple[Exit, Judgements]:  # fmt: skip
+    folder = command.out
     if folder:
         remove_results(folder, "judgements")
     found = processes.each(call, cases, jobs=jobs)
     results = reporter.counted("judging", found, len(cases), "passed", lambda one: one.theirs)
-    tests = {name: protocol(name) for name in names}
+    tests = {name: protocol(name) for name in command.protocol}
     collect = partial(Judgements, AboutObject.of(saved.body), saved.friction, tests)
     path = folder and folder / Judgements.FILE
     done = finished(results, len(cases), collect, path, reporter)
     _show(done, reporter)
     good = all(one.good for one in done.judgements)
-    return (Exit.GOOD if good else Exit.NEGATIVE), done.text()
+    return (Exit.GOOD if good else Exit.NEGATIVE), done
 
 
 def _show(found: Judgements, reporter: Reporter) -> None:

@@ -10,7 +10,7 @@ from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, Key, RecordFile, recorded
 from grasp_core.kinds import Friction, Number, OrInfinity, Quantity
 from grasp_core.provenance import versions
-from sim_validate.kit.about_object import AboutObject
+from sim_validate.kit.files import AboutObject
 from sim_validate.protocols.published import PublishedProtocol
 from sim_validate.protocols.runs import RunVerdict
 

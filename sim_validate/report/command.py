@@ -11,6 +11,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.pages import turntable_page
@@ -22,7 +23,7 @@ from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in
-from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
+from sim_validate.planning.asked_objects import grasp_with_id
 from sim_validate.report.reached_grasps import held_in, why_not_held
 from sim_validate.report.report import Report, write_report
 from sim_validate.report.run_folder import GRASPS, folder_of, reaches_beside
@@ -36,7 +37,7 @@ SWING_DEG, ELEVATION_DEG = 120.0, 25.0
 def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
     """Show a grasp in MuJoCo's viewer, or write it to the files that are asked for."""
     path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
-    saved = read_grasps(path)
+    saved = load_grasps(path)
     if not saved.grasps:
         raise InputError(f"{path}: expected at least one grasp to show, found none")
     grasp = grasp_with_id(path, saved, command.grasp or saved.grasps[0].id)

@@ -20,7 +20,7 @@ from sim_validate.execution.verdict import (
 )
 from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of
 from sim_validate.report.pages import records_table
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 MILLI = 1e3
 ALWAYS = ("mass_kg", "seed")

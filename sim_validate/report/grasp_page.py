@@ -14,8 +14,8 @@ from grasp_core.values import Grasp
 from scenes.drawing.pages import NOTHING, Fact, as_text, grasp_data, grasp_facts, number
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best_json import MEASURES, Best
-from sim_validate.planning.grasps_json import GRASPS
 from sim_validate.report.agreement import BAD, GOOD, Record, as_predicted, wrench_size
 from sim_validate.report.drawn_grasps import Drawn, certified, largest_push
 from sim_validate.report.executed_grasps import execute_command, execution_section, said_of_both

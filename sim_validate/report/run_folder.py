@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.planning.result import Plan
+from grasp_core.records.grasps_json import load_grasps
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.kit.result_folders import REACHES
+from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best_json import Best
-from sim_validate.planning.grasps_json import GRASPS, read_grasps
 from sim_validate.planning.regions_json import GraspRegions, Regions
 from sim_validate.protocols.verdict import Judgements
 from sim_validate.report.agreement import BAD, said_of
@@ -111,7 +112,7 @@ def runs_in(folder: Path) -> tuple[RunFolder, ...]:
 
 
 def _run(path: Path) -> RunFolder:
-    saved = read_grasps(path / GRASPS)
+    saved = load_grasps(path / GRASPS)
     tried = _read(path, Verdicts, saved)
     return RunFolder(
         path=path,

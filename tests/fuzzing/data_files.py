@@ -31,9 +31,8 @@ from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.command_flags import Run
-from sim_validate.kit.config_file import flags_from
-from sim_validate.kit.flag_values import flags_of
-from sim_validate.kit.toml_tables import tables_of_toml
+from sim_validate.kit.files import tables_of_toml
+from sim_validate.kit.flag_values import flags_from, flags_of
 from sim_validate.planning.regions_json import Regions
 from sim_validate.planning.wrenches_json import wrenches_from_json
 from tests.fuzzing.targets import Target

@@ -25,7 +25,7 @@ from grasp_core.regions.growth import larger_inside
 from grasp_core.regions.largest_discs import Grounds, Proved, search_cover
 from grasp_core.regions.sites import Sites
 from scenes.example_objects import example_object
-from sim_validate.planning import contact_analysis as analysis
+from sim_validate.planning import analyze as analysis
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 SHAKEN = 1e-14

@@ -21,7 +21,7 @@ from sim_validate.baselines.compare import (
 from sim_validate.engine.schedules import HoldProtocol
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit.about_object import AboutObject
+from sim_validate.kit.files import AboutObject
 
 FIGURES = VerdictFigures(
     outcome=Outcome.HELD,

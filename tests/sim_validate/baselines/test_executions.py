@@ -18,7 +18,7 @@ from sim_validate.execution.verdict import (
     ExecutionControl,
     ExecutionTrial,
 )
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 
 TRIAL = ExecutionTrial(

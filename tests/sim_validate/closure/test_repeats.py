@@ -11,7 +11,7 @@ from sim_validate.closure.verdict import interval
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.settings.trials import Noise
+from sim_validate.settings import Noise
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 

@@ -9,7 +9,7 @@ import sim_validate as sv
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.settings.trials import Noise
+from sim_validate.settings import Noise
 from tests.sim_validate.rigs import grasps
 
 AGENDA = Agenda(

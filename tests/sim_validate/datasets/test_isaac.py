@@ -23,7 +23,7 @@ from sim_validate.datasets.isaac import export, yaml_number
 from sim_validate.datasets.manifest import read_manifest, write_manifest
 from sim_validate.datasets.tables import SPLITS, SplitName
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.writing import whole_folder
+from sim_validate.kit.files import whole_folder
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
 from tests.sim_validate.datasets.forging import forged
@@ -219,7 +219,7 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
 KILLED = """
 import os, sys
 from pathlib import Path
-from sim_validate.kit.writing import whole_folder
+from sim_validate.kit.files import whole_folder
 with whole_folder(Path(sys.argv[1])) as place:
     (place / "half").write_text("a")
     os._exit(9)

@@ -12,7 +12,7 @@ from sim_validate.engine import schedules
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.limits import bisected, forces_just_above, released_friction
 from sim_validate.engine.setup import Setup
-from sim_validate.settings.trials import FrictionProtocol
+from sim_validate.settings import FrictionProtocol
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 

@@ -12,7 +12,7 @@ from sim_validate.engine.limits import part
 from sim_validate.engine.schedules import Load, hold, release
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
-from sim_validate.settings.trials import FrictionProtocol, HoldProtocol
+from sim_validate.settings import FrictionProtocol, HoldProtocol
 from tests.marks import more
 from tests.sim_validate.engine.test_traces import pose
 from tests.sim_validate.engine.whole_and_early import compared

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from grasp_core.closure.contacts import contact_frames
 from grasp_core.objects.on_faces import face_under
 from sim_validate.closure.noise import disturbed
-from sim_validate.settings.trials import Noise
+from sim_validate.settings import Noise
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)

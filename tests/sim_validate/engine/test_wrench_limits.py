@@ -8,7 +8,7 @@ from sim_validate.engine.limits import _onset, bisected_limits, ramped_limits
 from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Trace
-from sim_validate.settings.trials import LimitProtocol
+from sim_validate.settings import LimitProtocol
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")

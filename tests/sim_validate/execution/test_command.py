@@ -17,7 +17,7 @@ from sim_validate.execution import jobs
 from sim_validate.execution.execute import execute
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 QUICK = ["--trials", "knock"]
 IDS = ("c-0-1-2-7", "p-0-7-1-5")

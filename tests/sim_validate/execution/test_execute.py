@@ -9,7 +9,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from sim_validate.execution.execute import chosen_squeeze, held_scene
-from sim_validate.settings.executions import KINDS
+from sim_validate.settings import KINDS
 from tests.grasp_core.execution.held import box
 from tests.scenes.meshes import dented_ball
 from tests.sim_validate.execution.held_rigs import G, opposed, planned

@@ -15,7 +15,7 @@ from sim_validate.execution.verdict import (
     best_executed,
     ended,
 )
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 
 
 def trial(kind, survived, fate="stuck"):

@@ -12,11 +12,16 @@ import pytest
 import grasp_core as gc
 from grasp_core.files.json_text import BESIDE, DEEPEST, object_of
 from grasp_core.files.text_files import read_bytes, read_text
-from sim_validate.kit import npz
+from sim_validate.kit import files
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.npz import arrays_of
-from sim_validate.kit.paths import path_inside, require_inside
-from sim_validate.kit.toml_tables import MOST_LETTERS, read_tables, tables_of_toml
+from sim_validate.kit.files import (
+    MOST_LETTERS,
+    arrays_of,
+    path_inside,
+    read_tables,
+    require_inside,
+    tables_of_toml,
+)
 from sim_validate.main import main
 
 
@@ -155,7 +160,7 @@ def test_archives_that_lie_are_refused(case):
 
 
 def test_a_bomb_is_refused_by_what_it_claims_before_it_is_inflated(monkeypatch):
-    monkeypatch.setattr(npz, "MOST_BYTES", 2**22)
+    monkeypatch.setattr(files, "MOST_BYTES", 2**22)
     bomb = _archive(*((f"{i}.npy", b"\0" * 2**20) for i in range(5)))
     assert len(bomb) < 2**14
     with pytest.raises(gc.InputError, match="the arrays of the npz file take"):

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from sim_validate.kit import interrupts
 from sim_validate.kit.console import Reporter
+from sim_validate.kit.processes import check_interrupted, interrupts_noted
 
 
 def swallow():
@@ -20,20 +20,20 @@ def swallow():
 
 def test_a_swallowed_interrupt_is_raised_at_the_next_step():
     before = signal.getsignal(signal.SIGINT)
-    with interrupts.noted():
-        interrupts.check()
+    with interrupts_noted():
+        check_interrupted()
         swallow()
         with pytest.raises(KeyboardInterrupt), Reporter(True, False, False).progress("x") as steps:
             steps.update(1, 2)
-        interrupts.check()  # raised once
+        check_interrupted()  # raised once
     assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_interrupts_from_before_do_not_count():
-    with interrupts.noted():
+    with interrupts_noted():
         swallow()
-    with interrupts.noted():
-        interrupts.check()
+    with interrupts_noted():
+        check_interrupted()
 
 
 class Swallowing:
@@ -44,10 +44,10 @@ class Swallowing:
 
 def test_a_request_to_end_is_an_interrupt_and_where_it_is_swallowed_says_nothing(capsys):
     before = signal.getsignal(signal.SIGTERM), sys.unraisablehook
-    with interrupts.noted():
+    with interrupts_noted():
         Swallowing()
         with pytest.raises(KeyboardInterrupt):
-            interrupts.check()
+            check_interrupted()
     assert capsys.readouterr().err == ""
     assert (signal.getsignal(signal.SIGTERM), sys.unraisablehook) == before
 
@@ -58,7 +58,7 @@ def fail_without_what_was_swallowed():
 
 
 def test_an_error_after_a_swallowed_interrupt_is_that_interrupt():
-    with pytest.raises(KeyboardInterrupt), interrupts.noted():
+    with pytest.raises(KeyboardInterrupt), interrupts_noted():
         fail_without_what_was_swallowed()
-    with pytest.raises(RuntimeError), interrupts.noted():
+    with pytest.raises(RuntimeError), interrupts_noted():
         raise RuntimeError("nothing was swallowed")

@@ -8,7 +8,7 @@ import pytest
 from grasp_core.errors import UndecidedError
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.planning import contact_analysis as analysis
+from sim_validate.planning import analyze as analysis
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 from tests.sim_validate.planning.contacts_files import (
     CROSS,

@@ -7,10 +7,10 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.files.text_files import write_text
+from grasp_core.records.grasps_json import load_grasps
 from scenes.example_objects import example_object
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.planning.grasps_json import read_grasps
 from tests.bad_input.mesh_texts import obj
 from tests.changed_parts import with_face_moved, with_hole
 
@@ -28,7 +28,7 @@ def folder(tmp_path_factory):
     written(folder / "moved.obj", with_face_moved(body, 3, 1e-3))
     assert main(["plan", str(folder / "part.obj"), "--unit", "mm", "--limit", "6",
                  "--out", str(folder / "plan"), "-q"]) == Exit.GOOD  # fmt: skip
-    grasp = read_grasps(folder / "plan" / "grasps.json").grasps[0]
+    grasp = load_grasps(folder / "plan" / "grasps.json").grasps[0]
     hole = with_hole(body, grasp.faces[0], grasp.positions[0], 5e-3, 4e-3)
     written(folder / "hole.obj", hole)
     return folder
@@ -62,7 +62,7 @@ def test_it_writes_grasps_and_what_became_of_them(folder, tmp_path, capsys):
     assert "moved: face 3 moved 1.00 mm outward; 4 faces of another area" in said
     assert "6 of 6 grasps were carried over" in said
     record = json.loads((tmp_path / "new" / "transfer.json").read_text())
-    saved = read_grasps(tmp_path / "new" / "grasps.json")
+    saved = load_grasps(tmp_path / "new" / "grasps.json")
     assert saved.body.name == "moved"
     assert record["new"]["content_sha256"] == saved.body.content_sha256
     assert [each["new_id"] for each in record["grasps"]] == [grasp.id for grasp in saved.grasps]
@@ -152,8 +152,8 @@ def test_a_given_centre_of_mass_stays(folder, tmp_path):
     assert main([*line, *center, "--out", str(plan)]) == Exit.GOOD
     asked = ["transfer", str(plan / "grasps.json"), str(folder / "moved.obj"), "--unit", "mm", "-q"]
     main([*asked, "--out", str(tmp_path / "kept")])
-    kept = read_grasps(tmp_path / "kept" / "grasps.json").body.center_of_mass
+    kept = load_grasps(tmp_path / "kept" / "grasps.json").body.center_of_mass
     np.testing.assert_array_equal(kept, [0.001, 0.002, 0.003])
     main([*asked, "--out", str(tmp_path / "other"), "--center-of-mass-m", "0", "0", "0.004"])
-    other = read_grasps(tmp_path / "other" / "grasps.json").body.center_of_mass
+    other = load_grasps(tmp_path / "other" / "grasps.json").body.center_of_mass
     np.testing.assert_array_equal(other, [0.0, 0.0, 0.004])

@@ -42,7 +42,7 @@ def test_close_to_slipping(grasp_case, assert_stable):
     assert_stable(grasp_case, min_margin=0.49)
 
 def test_often_dropped(grasp_case, assert_stable):
-    from sim_validate.settings.trials import Noise
+    from sim_validate.settings import Noise
     assert_stable(grasp_case, repeats=8, noise=Noise(mass=0.5), min_pass_rate=0.99)
 """
 

@@ -8,9 +8,8 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import plan_to_json
+from grasp_core.records.grasps_json import load_grasps, plan_to_json
 from scenes.example_objects import example_object
-from sim_validate.planning.grasps_json import read_grasps
 from tests.sim_validate.plugin.project import properties_in, run_pytest
 
 CODE = """
@@ -51,7 +50,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(folder):
     """What comes out where the wedge weighs one kilogram."""
-    saved = read_grasps(folder / "grasps.json")
+    saved = load_grasps(folder / "grasps.json")
     settings = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
     return sv.execute(saved.body, saved.grasps[0], saved.friction, settings)
 

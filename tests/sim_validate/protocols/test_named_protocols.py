@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sim_validate as sv
-from sim_validate.kit.flag_groups import ProtocolName
+from sim_validate.kit.command_flags import ProtocolName
 from sim_validate.protocols.published import PROTOCOLS, protocol, protocol_names
 
 AXES = {(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)}

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import sim_validate as sv
+from grasp_core.records.grasps_json import load_grasps
 from scenes.drawing.pages import UNITS
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.report.index_page import cards_of
 from sim_validate.report.report import FIRST, write_report
 from sim_validate.report.run_folder import runs_in
@@ -48,7 +48,7 @@ def cards_in(text):
 
 def test_every_grasp_has_a_page_and_every_card_names_its_copies(planned, drawn):
     report, _ = drawn
-    ids = [grasp.id for grasp in read_grasps(planned / "grasps.json").grasps]
+    ids = [grasp.id for grasp in load_grasps(planned / "grasps.json").grasps]
     folder = report.index.parent
     assert sorted(path.stem for path in (folder / "grasps").iterdir()) == sorted(ids)
     cards = cards_in(report.index.read_text())

@@ -13,6 +13,7 @@ import sim_validate as sv
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.records.grasps_json import load_grasps
 from scenes.settings import PhysicsSettings
 from sim_validate import main as commands
 from sim_validate.execution.asked_executions import execution_settings
@@ -25,17 +26,16 @@ from sim_validate.execution.verdict import (
     Skipped,
     load_executions,
 )
-from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import AboutObject
 from sim_validate.main import main
-from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.report import drawn_grasps
 from sim_validate.report import report as reports
 from sim_validate.report.drawn_grasps import Drawn
 from sim_validate.report.executed_grasps import execute_command, said_of_both
 from sim_validate.report.report import write_report
 from sim_validate.report.run_folder import runs_in
-from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.changing import changed, slipped
 from tests.sim_validate.report.test_report import EVIL, Page
 
@@ -80,7 +80,7 @@ def run(tmp_path_factory):
     """A folder with three grasps: one loses the object, one survives, one has no squeeze."""
     folder = tmp_path_factory.mktemp("executed")
     assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
-    saved = read_grasps(folder / "grasps.json")
+    saved = load_grasps(folder / "grasps.json")
     found = executed(saved, [execution(2.5, TRIALS, skipped=SKIPPED), execution(3.5, KEPT), None])
     (folder / "executions.json").write_text(results(saved, found).text())
     return folder
@@ -111,7 +111,7 @@ def cells_of(page, heading):
 def test_the_first_page_has_a_row_for_each_grasp(run, report):
     text = (report / "index.html").read_text()
     table = text[text.index('id="executions"') :]
-    names = [grasp.id for grasp in read_grasps(run / "grasps.json").grasps]
+    names = [grasp.id for grasp in load_grasps(run / "grasps.json").grasps]
     assert cells_of(table, f"{names[0]}</a></th>")[-9:] == [
         "failed 1 of 4 trials", "2.5", "0.75", "0.72", "0.73", "2.5", "1", "no", "0.90",
     ]  # fmt: skip
@@ -144,7 +144,7 @@ def test_the_first_page_has_a_row_for_each_grasp(run, report):
 )
 def test_a_grasp_is_bad_if_its_closure_or_its_execution_is(run, closure, place, said, tone):
     found = load_executions(run / "executions.json")
-    saved = read_grasps(run / "grasps.json")
+    saved = load_grasps(run / "grasps.json")
     friction = saved.friction
     quick = sv.Agenda(controls=False, critical_friction=False)
     verdict = sv.validate(saved.body, saved.grasps[0], friction, agenda=quick)
@@ -159,7 +159,7 @@ def test_a_grasp_is_bad_if_its_closure_or_its_execution_is(run, closure, place, 
 def test_the_page_of_a_grasp_has_all_of_its_execution(run, report):
     lost, kept, none = (
         (report / "grasps" / f"{grasp.id}.html").read_text()
-        for grasp in read_grasps(run / "grasps.json").grasps
+        for grasp in load_grasps(run / "grasps.json").grasps
     )
     assert cells_of(lost, ">stop +x<")[-8:] == [
         "no", "dropped", "1.25", "2.5", "3.5", "0.91", "1.14", "0.92",
@@ -186,7 +186,7 @@ def test_grasps_that_were_lost_are_drawn_first(run):
 
 @pytest.mark.usefixtures("no_pictures")
 def test_a_control_that_held_is_bad_news(copy, tmp_path):
-    saved = read_grasps(copy / "grasps.json")
+    saved = load_grasps(copy / "grasps.json")
     found = executed(saved, [execution(2.5, KEPT, let_go=False), execution(3.5, KEPT), None])
     (copy / "executions.json").write_text(results(saved, found, complete=False).text())
     said = Page(write_report(copy, tmp_path / "out", jobs=1, limit=1).index.read_text()).said
@@ -237,7 +237,7 @@ def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
     monkeypatch.setattr(drawn_grasps, "film", film)
     report = write_report(copy, tmp_path / "out", jobs=1, limit=1, clips=1).index.parent
     clips = {path.name: path.read_text() for path in (report / "clips").iterdir()}
-    first = read_grasps(copy / "grasps.json").grasps[0].id
+    first = load_grasps(copy / "grasps.json").grasps[0].id
     assert clips == {
         f"{first}-executed-0.webp": "shake about x", f"{first}-executed-1.webp": "stop +x",
     }  # fmt: skip
@@ -268,5 +268,5 @@ def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monk
     assert main(shlex.split(line)[1:]) == Exit.GOOD
     (flags,) = asked
     assert (flags.friction, flags.grasp) == (0.35, "c-0-1-2-7")
-    of = read_grasps(flags.grasps)
+    of = load_grasps(flags.grasps)
     assert execution_settings(flags.executing, of.body, flags.seed, of.finger) == settings

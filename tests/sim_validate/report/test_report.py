@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
+from grasp_core.records.grasps_json import load_grasps
 from scenes.drawing.pages import UNITS
 from sim_validate import main as commands
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.report.agreement import said_of
 from sim_validate.report.report import write_report
 from tests.sim_validate.changing import changed, changed_verdicts, slipped
@@ -54,7 +54,7 @@ def pages_of(report):
 
 
 def test_every_grasp_has_a_card_and_a_page(small_run, small_report):
-    ids = [grasp.id for grasp in read_grasps(small_run / "grasps.json").grasps]
+    ids = [grasp.id for grasp in load_grasps(small_run / "grasps.json").grasps]
     assert len(ids) == 3
     index = Page((small_report / "index.html").read_text())
     cards = [known for tag, known in index.tags if tag == "li" and known.get("class") == "card"]
@@ -118,7 +118,7 @@ def test_the_first_page_counts(small_run, small_report):
 
 
 def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
-    saved = read_grasps(small_run / "grasps.json")
+    saved = load_grasps(small_run / "grasps.json")
     body = saved.body
     for grasp in saved.grasps:
         page = Page((small_report / "grasps" / f"{grasp.id}.html").read_text())

@@ -8,7 +8,7 @@ import sim_validate as sv
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.gate import measured_gate, require_faithful, require_touch
 from sim_validate.engine.setup import Setup
-from sim_validate.settings.trials import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
