@@ -1,4 +1,4 @@
-"""Runs `execute`, which simulates grasps as a robot executes them, and what writes grasps for others.
+"""Runs `execute`, which simulates grasps as a robot executes them, and writes grasps for others.
 
 `scene` writes models for MuJoCo, with true masses if the flags ask for them, and `export` one file
 for other programs.

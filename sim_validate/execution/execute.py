@@ -43,10 +43,16 @@ from sim_validate.execution.bench import (
     motions_joined,
 )
 from sim_validate.execution.controls import run_controls
-from sim_validate.execution.enough import Choose, NoSqueezeError, SceneOf, found_enough
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive, parted
-from sim_validate.execution.predictions import held_dynamics, predicted_losses
+from sim_validate.execution.predictions import (
+    Choose,
+    NoSqueezeError,
+    SceneOf,
+    found_enough,
+    held_dynamics,
+    predicted_losses,
+)
 from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
 from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Execution, ExecutionTrial
