@@ -19,7 +19,7 @@ from sim_validate.closure.validate import Job, prepared, verdict_of
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup, with_planned_radius
-from sim_validate.execution.jobs import ExecutionJob, executed_grasp
+from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.processes import each, processes

@@ -25,8 +25,7 @@ from scenes import exports
 from scenes.settings import ScaledScene
 from sim_validate.closure.setup_toml import physics_from_file
 from sim_validate.engine.setup import Setup, with_planned_radius
-from sim_validate.execution.execute import chosen_squeeze, held_scene
-from sim_validate.execution.jobs import ExecutionJob, executed
+from sim_validate.execution.execute import ExecutionJob, chosen_squeeze, executed, held_scene
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
