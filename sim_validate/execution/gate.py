@@ -55,8 +55,7 @@ from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held import TOUCH, HeldLayout
 from scenes.mujoco.held_mjcf import AWAY, SAMPLE_S, HeldScene, build_held_scene, held_physics
 from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
-from sim_validate.engine.gate import DEPTH, Gate, angles, touch_checks
-from sim_validate.engine.known_cases import Check, near, sized
+from sim_validate.engine.gate import DEPTH, Check, Gate, angles, near, sized, touch_checks
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench, HeldMotion
 from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
