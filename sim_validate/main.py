@@ -72,7 +72,7 @@ ACTIONS: dict[type[Any], str] = {
     baseline_flags.Check: "baselines.command:check_baseline",
     Inspect: "planning.objects:inspect_object",
     Objects: "planning.objects:list_objects",
-    Doctor: "closure.doctor_command:check_installation",
+    Doctor: "closure.command:check_installation",
 }
 """Module and function of each command. They are named as text, because planning must not wait until
 a simulator is imported."""
