@@ -4,6 +4,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -15,24 +16,29 @@ from grasp_core.cones.pyramids import inscribed_share
 from grasp_core.families.placements import KEPT
 from grasp_core.files.records import record_of
 from grasp_core.planning.planner import plan
+from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
+from grasp_core.settings import extended
 from scenes.drawing.clips import GraphicsError, available_graphics, has_display, remedy
 from scenes.example_objects import example_object
-from sim_validate.closure.asked_trials import prepared
+from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.closure.validate import Job, validate, validated
 from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
 from sim_validate.engine.gate import measured_gate, require_faithful
-from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.setup import Agenda, Setup, with_planned_radius
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
 from sim_validate.kit.compiling import EVERYTHING, compile_loops
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.exit_codes import Exit, FlagsError
+from sim_validate.kit.flag_groups import Testing
 from sim_validate.kit.processes import available_cores
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.kit.writing import write_arrays
 from sim_validate.planning.asked_objects import asked_grasps
+from sim_validate.planning.wrenches_json import weights, wrenches_from_file
+from sim_validate.settings.trials import ChosenTrials, Noise
 
 Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, str]]
 """Judges grasps by another test; gives the exit code and the text of its results."""
@@ -201,3 +207,36 @@ def _machine() -> dict[str, str]:
         "graphics": graphics,
         "display for the viewer": look,
     }
+
+
+def check_noise(given: ChosenTrials) -> None:
+    """Refuse noise where nothing is repeated with it."""
+    if not given.repeats and given.noise != Noise():
+        raise FlagsError(
+            "the flags --noise... set the noise of repeated trials: give their number with "
+            "--repeats too"
+        )
+
+
+def prepared(
+    testing: Testing, planned: Finger | None, seed: int, folder: Path | None
+) -> tuple[Setup, Agenda]:
+    """Build settings and trials from flags; those of a setup file override them."""
+    setup = extended(Setup, testing.scene, timeout_s=testing.timeout_s)
+    setup = replace(setup, fingers=with_planned_radius(setup.fingers, planned))
+    if testing.setup is not None:
+        setup = setup_from_file(testing.setup, setup)
+    check_noise(testing.more)
+    if testing.weight_down and testing.weight_n is None:
+        raise FlagsError(
+            "--weight-down is the direction in which the weight acts: give the weight with "
+            "--weight-n too"
+        )
+    if testing.traces and folder is None:
+        raise FlagsError("--traces writes files: give their folder with --out DIR too")
+    own = () if testing.wrenches is None else wrenches_from_file(testing.wrenches)
+    weight = () if testing.weight_n is None else weights(testing.weight_n, testing.weight_down)
+    agenda = extended(
+        Agenda, testing.more, wrenches=(*own, *weight), keep_traces=testing.traces, seed=seed
+    )
+    return setup, agenda
