@@ -14,8 +14,7 @@ from sim_validate.baselines.check import Checked, check, complete, measured, see
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.part import Present, present, source_of, testable
 from sim_validate.closure.command import check_noise
-from sim_validate.closure.setup_toml import setup_from_file
-from sim_validate.engine.setup import Agenda
+from sim_validate.engine.setup import Agenda, setup_from_file
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.planning.grasps_json import read_grasps

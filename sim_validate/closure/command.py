@@ -22,11 +22,10 @@ from grasp_core.provenance import versions
 from grasp_core.settings import extended
 from scenes.drawing.clips import GraphicsError, available_graphics, has_display, remedy
 from scenes.example_objects import example_object
-from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.closure.validate import Job, validate, validated
 from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
 from sim_validate.engine.gate import measured_gate, require_faithful
-from sim_validate.engine.setup import Agenda, Setup, with_planned_radius
+from sim_validate.engine.setup import Agenda, Setup, setup_from_file, with_planned_radius
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
 from sim_validate.kit.compiling import EVERYTHING, compile_loops

@@ -23,8 +23,7 @@ from grasp_core.settings import extended
 from grasp_core.values import Grasp
 from scenes import exports
 from scenes.settings import ScaledScene
-from sim_validate.closure.setup_toml import physics_from_file
-from sim_validate.engine.setup import Setup, with_planned_radius
+from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
 from sim_validate.execution.execute import ExecutionJob, chosen_squeeze, executed, held_scene
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
