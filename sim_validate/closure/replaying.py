@@ -28,7 +28,7 @@ from sim_validate.closure.controls import (
     ControlVerdict,
     control_case,
 )
-from sim_validate.closure.noise import OPEN, disturbed, for_repeats, noisy_case
+from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.loads import PlannedLoad, planned_loads

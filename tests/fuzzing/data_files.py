@@ -100,7 +100,7 @@ def _same_given(data: bytes, found: Any) -> None:
 def _verdicts_seed() -> bytes:
     body = example_object("tetrahedron")
     grasp = plan(body).grasps[0]
-    agenda = Agenda(trials=1, limits="ramp")
+    agenda = Agenda(repeats=1, limits="ramp")
     verdict = validate(body, grasp, agenda=agenda)
     return Verdicts.of(body, 0.5, verdict.gate, (verdict,)).text().encode()
 
