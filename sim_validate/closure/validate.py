@@ -59,12 +59,14 @@ from sim_validate.engine.gate import (
 )
 from sim_validate.engine.limits import (
     CriticalFriction,
+    PlannedLoad,
     SimulatedLimit,
     bisected_limits,
+    loads_as_they_are,
+    planned_loads,
     ramped_limits,
     released_friction,
 )
-from sim_validate.engine.loads import PlannedLoad, loads_as_they_are, planned_loads
 from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
