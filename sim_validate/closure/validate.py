@@ -114,10 +114,10 @@ def tested(
     """Test a grasp whose closure is proved, with a simulator that was checked before."""
     require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
-    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
+    bench, layout = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s), scene.layout
+    rig = squeezed(bench, setup, layout.squeeze_forces, friction)
     loads = planned_loads(body, grasp.contacts, friction, rig.idle, agenda, setup)
-    overlap = clashes(body, grasp.positions, grasp.normals, scene.layout.drive.radius_m)
+    overlap = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
     wrenches = held_wrenches(rig, loads, agenda, overlap)
     critical = CriticalFriction(grasp.critical_friction)
     if agenda.critical_friction:
@@ -142,7 +142,9 @@ def tested(
         robustness=repeats,
         setup=setup,
         agenda=agenda,
-        scale=Scale.of(scene.layout, body.radius),
+        scale=Scale(
+            layout.grasp_size_m, body.radius, layout.object_kg, layout.inertia_kg_m2, layout.drive
+        ),
         gate=gate,
         scene=scene,
     )

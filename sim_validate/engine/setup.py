@@ -134,18 +134,14 @@ class Agenda(ChosenTrials):
     control (contacts that must fail)."""
 
     def _check_together(self) -> None:
-        taken = drawn_names(self.random_wrenches)
+        drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
+        taken = {*AXIS_NAMES, WEAKEST, *drawn}
         for each in self.wrenches:
             if each.name in taken:
                 raise InputError(
                     f"two wrenches are named {each.name!r}: give one of them another name"
                 )
             taken.add(each.name)
-
-
-def drawn_names(random_wrenches: int) -> set[str]:
-    """Return the names of the wrenches of a grasp that are not a user's."""
-    return {*AXIS_NAMES, WEAKEST, *(RANDOM.format(place) for place in range(random_wrenches))}
 
 
 def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:

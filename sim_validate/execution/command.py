@@ -7,7 +7,6 @@ for other programs.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -88,20 +87,17 @@ def execute_grasps(
     results = reporter.counted(
         "executing", executed(tasks, jobs), count, "survived", lambda each: each.survived
     )
-    collect = partial(_collected, AboutObject.of(saved.body), saved.friction, settings)
-    found = finished(results, count, collect, folder and folder / Executions.FILE, reporter)
+    about = AboutObject.of(saved.body)
+
+    def collected(grasps: tuple[ExecutedGrasp, ...], *, complete: bool) -> Executions:
+        return Executions(about, saved.friction, complete, settings, grasps)
+
+    found = finished(results, count, collected, folder and folder / Executions.FILE, reporter)
     _show(found, reporter)
     if not all(each.controls_let_go for each in found):
         return Exit.INTERNAL, found.text()
     good = all(each.survived for each in found)
     return (Exit.GOOD if good else Exit.NEGATIVE), found.text()
-
-
-def _collected(
-    body: AboutObject, friction: float, settings: ExecutionSettings,
-    grasps: tuple[ExecutedGrasp, ...], *, complete: bool,
-) -> Executions:  # fmt: skip
-    return Executions(body, friction, complete, settings, grasps)
 
 
 def _show(found: Executions, reporter: Reporter) -> None:

@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -152,7 +153,7 @@ def execute(
     *,
     mass_kg: float | None = None,
     threads: int = 1,
-    physics: PhysicsSettings | None = None,
+    physics: PhysicsSettings | Mapping[str, Any] | None = None,
     enough: bool = True,
 ) -> Execution:
     """Simulate a grasp as a robot would execute it, and predict the outcome.
@@ -164,8 +165,8 @@ def execute(
         settings: Mass, springs, trials and thresholds; None for the usual ones with `mass_kg`.
         mass_kg: Mass of the object, in place of that of the settings [kg].
         threads: Number of the simulator's threads; results do not depend on it.
-        physics: Settings of the simulator; None for those that suit springs and masses. Gravity
-            must be that of the settings.
+        physics: Settings of the simulator, or some by name in place of the usual ones; None for
+            those that suit springs and masses. Gravity must be that of the settings.
         enough: Whether to find the push that would be enough where the object is lost or has no
             squeeze (see `Execution.enough`), which takes up to a second.
 
@@ -228,11 +229,7 @@ def simulated(
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
     dynamics = held_dynamics(best.grip, scene.layout)
     trials, skipped = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
-    slips, losses = predicted_losses(
-        dynamics, [trial.expected or trial.drive for trial in trials],
-        [trial.turning for trial in trials], settings.most_m, settings.most_rad,
-    )  # fmt: skip
-    predicted = [(float(slip), float(loss)) for slip, loss in zip(slips, losses, strict=True)]
+    predicted = predicted_losses(dynamics, trials, settings)
     return Execution(
         mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
@@ -285,12 +282,16 @@ def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: Executio
 
 def held_scene(
     body: Polyhedron, grip: Grip, settings: ExecutionSettings,
-    physics: PhysicsSettings | None = None,
+    physics: PhysicsSettings | Mapping[str, Any] | None = None,
 ) -> HeldScene:  # fmt: skip
     """Build the scene in which a grip is executed."""
-    return build_held_scene(
-        body, grip, settings, physics=physics, reach_m=surface_reach(body, grip, settings)
-    )  # fmt: skip
+    if isinstance(physics, Mapping):
+        usual = held_scene(body, grip, settings)
+        if not physics:
+            return usual
+        physics = replace(usual.physics, **physics)
+    reach_m = surface_reach(body, grip, settings)
+    return build_held_scene(body, grip, settings, physics=physics, reach_m=reach_m)
 
 
 def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
@@ -385,7 +386,7 @@ class ExecutionJob:
     grasp: Grasp
     friction: float
     settings: ExecutionSettings
-    physics: Mapping[str, object] = field(default_factory=dict[str, object])
+    physics: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """Settings of the simulator that differ from the usual ones, by name."""
     threads: int = 1
     enough: bool = True
@@ -405,25 +406,11 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
     try:
         found = execute(
             job.body, grasp, job.friction, job.settings,
-            physics=physics_of(job), threads=job.threads, enough=job.enough,
+            physics=job.physics, threads=job.threads, enough=job.enough,
         )  # fmt: skip
     except NoForcesError as error:
         return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
     return ExecutedGrasp(*about, found)
-
-
-def physics_of(job: ExecutionJob) -> PhysicsSettings | None:
-    """Return the usual settings for the grasp's springs and masses with the job's changes.
-
-    It is None where the job changes nothing, or where no squeeze carries the weight.
-    """
-    if not job.physics:
-        return None
-    try:
-        best = chosen_squeeze(job.body, job.grasp, job.friction, job.settings)
-    except NoForcesError:
-        return None
-    return replace(held_scene(job.body, best.grip, job.settings).physics, **job.physics)
 
 
 FRAMES = 60
@@ -454,7 +441,7 @@ def film(job: ExecutionJob, name: str, path: Path) -> Path:
     """Simulate one trial of an execution again and draw it."""
     body, settings = job.body, job.settings
     best = chosen_squeeze(body, job.grasp, job.friction, settings)
-    scene = held_scene(body, best.grip, settings, physics_of(job))
+    scene = held_scene(body, best.grip, settings, job.physics)
     dynamics = held_dynamics(best.grip, scene.layout)
     trials, _ = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
     named = {trial.name: trial for trial in trials}

@@ -62,7 +62,7 @@ from scenes.mujoco.held import HeldLayout, gravity_of
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive
-from sim_validate.execution.trials import trials_of
+from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Enough
 from sim_validate.settings.executions import ExecutionSettings
 
@@ -124,23 +124,25 @@ class Expected:
 
 
 def predicted_losses(
-    dynamics: HeldDynamics, drives: Sequence[Drive], turning: Sequence[bool], most_m: float,
-    most_rad: float,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return the multiples of each drive's load of the first slip, and of loss, (drives,) each.
+    dynamics: HeldDynamics, trials: Sequence[Trial], settings: ExecutionSettings
+) -> list[tuple[float, float]]:
+    """Return the multiples of each trial's load of the first slip, and of loss.
 
     Both are zero where the grip is unstable at rest.
     """
-    if not drives or not dynamics.grip.stable:
-        return np.zeros(len(drives)), np.zeros(len(drives))
-    found = expected(dynamics, drives)
+    if not trials or not dynamics.grip.stable:
+        return [(0.0, 0.0)] * len(trials)
+    most_m, most_rad = settings.most_m, settings.most_rad
+    found = expected(dynamics, [trial.expected or trial.drive for trial in trials])
     slips = np.array([each.first_slip for each in found])
     loads = np.array([each.slipping for each in found]) @ dynamics.grip.grasp_stiffness.T
     moved = np.array([max(each.moved_m / most_m, each.turn_rad / most_rad) for each in found])
     with np.errstate(divide="ignore"):
         sticking = 1.0 / moved
     beyond = np.maximum(slips, loss_multiples(dynamics.grip, loads, most_m, most_rad))
-    return slips, np.minimum(sticking, np.where(turning, slips, beyond))
+    turning = [trial.turning for trial in trials]
+    losses = np.minimum(sticking, np.where(turning, slips, beyond))
+    return list(zip(slips.tolist(), losses.tolist(), strict=True))
 
 
 def expected(dynamics: HeldDynamics, drives: Sequence[Drive]) -> list[Expected]:
@@ -360,14 +362,10 @@ def _predicted(
     dynamics = held_dynamics(best.grip, layout)
     alike = replace(settings, misplacements=1)  # they all have the prediction of the weight
     trials, _ = trials_of(body, layout, alike, dynamics.lowest_frequency)
-    slips, losses = predicted_losses(
-        dynamics, [trial.expected or trial.drive for trial in trials],
-        [trial.turning for trial in trials], settings.most_m, settings.most_rad,
-    )  # fmt: skip
-    if not trials:
+    found = predicted_losses(dynamics, trials, settings)
+    if not found:
         return math.inf, math.inf
-    first = first_best(-losses)
-    return float(slips[first]), float(losses[first])
+    return found[first_best([-loss for _, loss in found])]
 
 
 def _rounded_up(value: float) -> float:

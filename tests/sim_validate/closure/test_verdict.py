@@ -19,7 +19,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("verdicts")
     plan = gc.plan(scenes.example_object("wedge"), 0.5, limit=2)
     gc.save_grasps(folder / "grasps.json", plan)
-    more = ["--trials", "2", "--limits", "ramp", "--random-wrenches", "1"]
+    more = ["--repeats", "2", "--limits", "ramp", "--random-wrenches", "1"]
     assert main(["validate", str(folder / "grasps.json"), "--out", str(folder), *more]) == 0
     return folder
 
