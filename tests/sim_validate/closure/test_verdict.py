@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
 
 def test_a_file_gives_the_verdicts_that_were_made(folder):
     plan, found = gc.load_grasps(folder / "grasps.json"), sv.load_verdicts(folder / "verdicts.json")
-    agenda = sv.Agenda(trials=2, limits="ramp", random_wrenches=1)
+    agenda = sv.Agenda(repeats=2, limits="ramp", random_wrenches=1)
     made = sv.validate_all(plan.body, plan, agenda=agenda)
     assert found.verdicts == made
     assert found.text() == (folder / "verdicts.json").read_text()
