@@ -53,7 +53,6 @@ from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import (
     Gate,
     measured_gate,
-    remember_gate,
     require_faithful,
     require_touch,
 )
@@ -95,17 +94,7 @@ def validate(
         InputError: The contacts are not on the body's faces, or not closed at this friction.
         UnfaithfulError: The simulator fails its checks with these settings.
     """
-    check_on_faces(body, grasp)
-    coefficient(friction)
-    agenda, setup = asked_for(agenda, setup)
-    critical = setup.critical_friction(grasp)
-    closed = friction > critical
-    if not (closed and setup.closure(grasp, friction).closed):
-        raise InputError(
-            f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
-        )
-    gate = require_faithful(setup, friction, body.radius)
-    return tested(body, replace(grasp, critical_friction=critical), friction, gate, agenda, setup)
+    return verdict_of(Job(body, grasp, friction, *asked_for(agenda, setup)))
 
 
 def tested(
@@ -259,9 +248,19 @@ def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
 
 def verdict_of(job: Job) -> Verdict:
     """Validate one grasp."""
-    if job.gate is not None:
-        remember_gate(job.gate, job.setup, job.friction, job.body.radius)
-    return validate(job.body, job.grasp, job.friction, agenda=job.agenda, setup=job.setup)
+    body, grasp, friction, setup = job.body, job.grasp, job.friction, job.setup
+    check_on_faces(body, grasp)
+    coefficient(friction)
+    critical = setup.critical_friction(grasp)
+    closed = friction > critical
+    if not (closed and setup.closure(grasp, friction).closed):
+        raise InputError(
+            f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
+        )
+    gate = job.gate or measured_gate(setup, friction, body.radius)
+    gate.require("no grasp is certified")
+    proved = replace(grasp, critical_friction=critical)
+    return tested(body, proved, friction, gate, job.agenda, setup)
 
 
 def validate_all(

@@ -38,6 +38,7 @@ low, and friction is lowered to it.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -485,8 +486,6 @@ def touch_checks(turned: Array, off: Array, where: str = "") -> tuple[Check, Che
 
 
 USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
-MOST_KNOWN = 256
-"""Number of settings whose results are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -511,9 +510,6 @@ class Gate(Declared):
             )
 
 
-_KNOWN: dict[Case, Gate] = {}
-
-
 def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
@@ -527,31 +523,17 @@ def measured_gate(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
     """Check the simulator on known cases, once per process for the same settings."""
-    case = _case(setup, friction, radius_m)
-    if case in _KNOWN:
-        return _KNOWN[case]
-    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
-    checks = known_answers(pads)
-    if setup.surface == "mesh":
-        meshes = (*mesh_touches(case), *known_answers(case))
-        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
-    return _kept(case, Gate(checks, versions()["mujoco"]))
-
-
-def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) -> None:
-    """Take over what `measured_gate` returned in the process that started this one."""
-    _kept(_case(setup, friction, radius_m), gate)
-
-
-def _case(setup: Setup, friction: float, radius_m: float) -> Case:
-    # Two digits of the radius let objects of nearly the same size share one measurement.
     fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
     setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
-    return Case(setup, friction, float(f"{radius_m:.1e}"))
+    # Two digits of the radius let objects of nearly the same size share one measurement.
+    return _measured(Case(setup, friction, float(f"{radius_m:.1e}")))
 
 
-def _kept(case: Case, gate: Gate) -> Gate:
-    _KNOWN[case] = gate
-    if len(_KNOWN) > MOST_KNOWN:
-        del _KNOWN[next(iter(_KNOWN))]
-    return gate
+@lru_cache(maxsize=256)
+def _measured(case: Case) -> Gate:
+    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
+    checks = known_answers(pads)
+    if case.setup.surface == "mesh":
+        meshes = (*mesh_touches(case), *known_answers(case))
+        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
+    return Gate(checks, versions()["mujoco"])

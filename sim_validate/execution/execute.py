@@ -44,7 +44,6 @@ from sim_validate.execution import paths
 from sim_validate.execution.bench import (
     HeldBench,
     HeldMotion,
-    Lost,
     begun_motion,
     facing,
     motions_joined,
@@ -128,13 +127,16 @@ def _rest(trial: Trial, begin: int) -> Drive:
     return rest if begin < trial.weighing else replace(rest, velocity=np.zeros(3))
 
 
-def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> Lost:
-    """Return how far from its planned place an object is surely too far from where it was."""
+def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[float, float]:
+    """Return how far from its planned place an object surely is too far from where it was.
+
+    Gives a distance [m] and an angle [rad].
+    """
     palm = hinged(motion.palm[begun : begun + 1, 3:])[0]
     turned = palm.T @ rotations(motion.turned[begun : begun + 1])[0]
     angle = math.acos(min(max(0.5 * (float(np.trace(turned)) - 1.0), -1.0), 1.0))
     away = float(np.linalg.norm(motion.moved[begun] - motion.palm[begun, :3]))
-    return Lost(settings.most_m + away, settings.most_rad + angle)
+    return settings.most_m + away, settings.most_rad + angle
 
 
 LOST = 3.0
