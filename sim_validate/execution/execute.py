@@ -155,7 +155,7 @@ def execute(
     *,
     mass_kg: float | None = None,
     threads: int = 1,
-    physics: PhysicsSettings | Mapping[str, Any] | None = None,
+    physics: PhysicsSettings | None = None,
     enough: bool = True,
 ) -> Execution:
     """Simulate a grasp as a robot would execute it, and predict the outcome.
@@ -167,8 +167,8 @@ def execute(
         settings: Mass, springs, trials and thresholds; None for the usual ones with `mass_kg`.
         mass_kg: Mass of the object, in place of that of the settings [kg].
         threads: Number of the simulator's threads; results do not depend on it.
-        physics: Settings of the simulator, or some by name in place of the usual ones; None for
-            those that suit springs and masses. Gravity must be that of the settings.
+        physics: Settings of the simulator; None for those that suit springs and masses. Gravity
+            must be that of the settings.
         enough: Whether to find the push that would be enough where the object is lost or has no
             squeeze (see `Execution.enough`), which takes up to a second.
 
@@ -177,8 +177,19 @@ def execute(
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
-    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings).for_body(body)
-    contacts = given_contacts(body, grasp)
+    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings)
+    if physics is not None:
+        instance(physics, PhysicsSettings, "physics")
+    return execute_with(body, grasp, friction, settings, physics, threads=threads, enough=enough)
+
+
+def execute_with(
+    body: Polyhedron, grasp: Grasp | Iterable[Contact], friction: ArrayLike,
+    settings: ExecutionSettings, physics: PhysicsSettings | Mapping[str, Any] | None, *,
+    threads: int, enough: bool,
+) -> Execution:  # fmt: skip
+    """Execute a grasp, with physics as they are or as some settings change them."""
+    settings, contacts = settings.for_body(body), given_contacts(body, grasp)
     return execution_of(
         body, settings,
         lambda own, loads: chosen_squeeze(body, contacts, friction, own, loads),
@@ -406,9 +417,9 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
     grasp = job.grasp
     about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)
     try:
-        found = execute(
-            job.body, grasp, job.friction, job.settings,
-            physics=job.physics, threads=job.threads, enough=job.enough,
+        found = execute_with(
+            job.body, grasp, job.friction, job.settings, job.physics,
+            threads=job.threads, enough=job.enough,
         )  # fmt: skip
     except NoForcesError as error:
         return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
