@@ -61,8 +61,8 @@ ACTIONS: dict[type[Any], str] = {
     Plan: "planning.plan:plan_file",
     Validate: "protocols.command:judge_file",
     Execute: "execution.command:execute_file",
-    Scene: "execution.scene_command:write_scenes",
-    Export: "execution.scene_command:export_grasps",
+    Scene: "execution.command:write_scenes",
+    Export: "execution.command:export_grasps",
     View: "report.command:view_grasp",
     Report: "report.command:report_folder",
     Regions: "planning.regions:certify_file",
@@ -79,7 +79,7 @@ ACTIONS: dict[type[Any], str] = {
     baseline_flags.Check: "baselines.command:check_baseline",
     Inspect: "planning.objects:inspect_object",
     Objects: "planning.objects:list_objects",
-    Doctor: "closure.doctor_command:check_installation",
+    Doctor: "closure.command:check_installation",
 }
 """Module and function of each command. They are named as text, because planning must not wait until
 a simulator is imported."""

@@ -7,12 +7,10 @@ from grasp_core.errors import GraspError
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import plan_to_json
-from sim_validate.closure.asked_trials import prepared
-from sim_validate.closure.command import simulate_grasps
+from sim_validate.closure.command import prepared, simulate_grasps
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.asked_executions import check_executing, execution_of_run
-from sim_validate.execution.command import execute_grasps
+from sim_validate.execution.command import check_executing, execute_grasps, execution_of_run
 from sim_validate.kit import command_flags
 from sim_validate.kit.command_flags import Report
 from sim_validate.kit.console import Reporter

@@ -14,12 +14,11 @@ from scenes.settings import FingerSettings
 from sim_validate.baselines.baseline import Baseline, Entry, How
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
-from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.closure.validate import Job, prepared, verdict_of
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.setup import Setup, with_planned_radius
-from sim_validate.execution.jobs import ExecutionJob, executed_grasp
+from sim_validate.engine.setup import Setup, setup_from_file, with_planned_radius
+from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.kit.files import AboutObject
 from sim_validate.kit.processes import each, processes

@@ -14,9 +14,8 @@ from sim_validate.baselines.baseline import How, check_writable, read_baseline, 
 from sim_validate.baselines.check import Checked, check, complete, measured, seen_from, setup_for
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.part import Present, present, source_of, testable
-from sim_validate.closure.asked_trials import check_noise
-from sim_validate.closure.setup_toml import setup_from_file
-from sim_validate.engine.setup import Agenda
+from sim_validate.closure.command import check_noise
+from sim_validate.engine.setup import Agenda, setup_from_file
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.planning.wrenches_json import wrenches_from_file

@@ -19,7 +19,7 @@ from sim_validate.baselines.part import TABLE, IfChanged, Source, present, sourc
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.jobs import ExecutionJob, executed_grasp
+from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.settings import ExecutionSettings
 

@@ -26,7 +26,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.layout import FingerDrive, Layout
+from scenes.mujoco.layout import FingerDrive
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
@@ -148,16 +148,6 @@ class Scale(Declared):
     object_inertia_kg_m2: Annotated[Array, Shape(3, 3)]
     fingers: FingerDrive
 
-    @classmethod
-    def of(cls, layout: Layout, radius_m: float) -> Self:
-        """Return the sizes of a scene with an object of a radius [m]."""
-        size = layout.grasp_size_m
-        return cls(size, radius_m, layout.object_kg, layout.inertia_kg_m2, layout.drive)
-
-
-def _not_held(_before: Outcome, after: Outcome) -> bool:
-    return after is not Outcome.HELD
-
 
 PREDICTED = Compared(more, analysed=True, friction=True)
 PREDICTED_FRICTION = Shown("mu*", ".4f", compared=PREDICTED)
@@ -166,7 +156,7 @@ SHARES = Shown("limits", ".3f", compared=None)
 MOVED = Compared(more, follows=True)
 MICRONS_MOVED = Shown("um moved", ".2g", MICRO, compared=MOVED)
 MICRONS_LOADED = Shown("um when loaded", ".2g", MICRO, compared=None)
-ENDED = Compared(_not_held, follows=True)
+ENDED = Compared(lambda _, after: after is not Outcome.HELD, follows=True)
 LOST = Compared(items=("no longer held", "held now"), follows=True)
 LOST_WITH_NOISE = Compared(
     items=("repeats with noise no longer held", "repeats with noise held now"), close="noisy_close"

@@ -19,7 +19,7 @@ from sim_validate.datasets.rows import GIVEN, Rows
 from sim_validate.datasets.units import WorkUnit
 from sim_validate.datasets.varied import Varying, validated_with
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.jobs import ExecutionJob, executed_grasp
+from sim_validate.execution.execute import ExecutionJob, executed_grasp
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,26 +1,417 @@
 """Checks the simulator on cases with known answers before any grasp is simulated.
 
-It is checked with the settings, friction and object size in force: on cases from statics
-(`known_cases`), and, where fingertips touch the mesh itself, for the normals and depths with which
-they touch its faces. If a check fails, no grasp is simulated, and no verdict on the mesh counts.
+It is checked with the settings, friction and object size in force: on cases from statics, and,
+where fingertips touch the mesh itself, for the normals and depths with which they touch its faces.
+If a check fails, no grasp is simulated, and no verdict on the mesh counts.
+
+With mu the friction and N the normal force of a contact:
+
+* a box on a slope of four contacts slides when the tangential load passes mu times the normal one,
+  whatever the direction;
+* a box between two pairs of fingers slips when it is pulled with more than 4 mu N, whatever the
+  direction across the normals;
+* with the torsional coefficient mu_t, a box between two such pairs, each finger a lever a from the
+  line through the middle of both faces, turns about that line at the torque
+  4 N sqrt((mu a)^2 + mu_t^2);
+* a grasp under a part of the load that it resists does not creep;
+* fingers on two opposite faces a distance w apart, offset by h along them, hold down to the
+  friction h / w;
+* the thresholds of displacement, times the stiffness of the servos, hide only a small force;
+* a solver that goes on to the last digit changes no motion;
+* a blow-up is reported, and does not silently reset the simulation to its start.
+
+The loads and frictions at which the boxes slip are found and judged as those of grasps are, by
+holds, ramps and releases, but every trial has its full length: that trials of grasps may end early
+presumes that nothing slips later (`early_ends`). So thresholds too loose to notice a slip are
+refused, like settings that slip falsely. The cases have the friction and the size of the object
+under test.
+
+A solver that stops early lets contacts slip that would hold. This shows first in two places: where
+fingers push so lightly that hardly anything keeps the object from turning about the line between
+two others, and on small objects, because tolerances are absolute. Whole trials are therefore
+compared for two bodies: a tetrahedron under load, and a box with two offset fingers that need its
+friction and two more that hardly push. The box is released at the friction under test and at a low
+one as well: even where the friction under test is high, the critical friction of a grasp may be
+low, and friction is lowered to it.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.closure.contacts import contact_frictions, stacked
 from grasp_core.declared import Declared
 from grasp_core.errors import UnfaithfulError
 from grasp_core.files.records import recorded
+from grasp_core.kinds import Measured, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
+from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
-from sim_validate.engine.bench import first_touch
-from sim_validate.engine.known_cases import Case, Check, known_answers
+from scenes.example_objects import example_object
+from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, first_touch
+from sim_validate.engine.limits import (
+    SimulatedLimit,
+    bisected,
+    bisected_limits,
+    forces_just_above,
+    part,
+    ramped_limits,
+    released_friction,
+)
+from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.schedules import Load, Schedule
 from sim_validate.engine.setup import Setup
+from sim_validate.engine.traces import holds
+
+LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
+"""Least and largest critical friction that two offset fingers on the box can be made to need."""
+PUSH = 0.6
+"""Normal force of the fingers on the box, relative to the largest normal force allowed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Check(Declared):
+    """One figure measured in simulation, and the interval in which it must lie."""
+
+    name: str
+    value: Measured
+    """The measured figure, or NaN if it could not be measured."""
+    least: float
+    largest: OrInfinity
+
+    @property
+    def passed(self) -> bool:
+        """Whether the measured figure lies in its interval."""
+        return self.least <= self.value <= self.largest
+
+    def __str__(self) -> str:
+        state = "ok" if self.passed else "OUT OF TOLERANCE"
+        return (
+            f"{self.name}: {self.value:.6g} (from {self.least:.6g} to {self.largest:.6g}) {state}"
+        )
+
+
+def near(name: str, ratio: float | None, tolerance: float) -> Check:
+    """Check that a measured figure, over the known one, is one; None if it was not measured."""
+    return Check(name, math.nan if ratio is None else ratio, 1.0 - tolerance, 1.0 + tolerance)
+
+
+def sized(name: str, radius_m: float) -> Polyhedron:
+    """Scale an example object to a size, with its centre of mass at the origin."""
+    example = example_object(name)
+    vertices = (example.vertices - example.center_of_mass) * radius_m / example.radius
+    return Polyhedron.from_mesh(vertices, example.triangles, name=name)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """The settings, friction and object size with which the simulator is checked on known cases."""
+
+    setup: Setup
+    friction: float
+    radius_m: float
+
+    @property
+    def offset_friction(self) -> float:
+        """The friction under test, or the nearest one that offset fingers on a box can need."""
+        return min(max(self.friction, LEAST_OFFSET), LARGEST_OFFSET)
+
+    @property
+    def push(self) -> float:
+        """The normal force of each finger on the box [N]."""
+        return PUSH * self.setup.fingers.max_normal_force_n
+
+    def body(self, name: str) -> Polyhedron:
+        """Scale an example object to the size under test."""
+        return sized(name, self.radius_m)
+
+    def squeezed(
+        self, body: Polyhedron, contacts: Sequence[Contact], forces: Array, friction: float
+    ) -> Rig:
+        """Close fingers on a body with planned forces, for trials of full length."""
+        bench = Bench(self.setup.scene(body, contacts, friction))
+        return replace(squeezed(bench, self.setup, forces, friction), whole=True)
+
+
+def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
+    """Squeeze a tetrahedron at its face centres, and find its limit wrenches on twelve axes."""
+    body, largest = case.body("tetrahedron"), case.setup.fingers.max_normal_force_n
+    contacts = [Contact(face.centroid, face.normal) for face in body.faces]
+    rig = case.squeezed(body, contacts, PUSH * largest * body.normals, case.friction)
+    arms = stacked(contacts)[0] - body.center_of_mass
+    frictions = contact_frictions(case.friction, len(contacts))
+    resisted = WrenchBody(arms, body.normals, frictions, largest)
+    found = [limit_of(resisted, wrench) for wrench in axis_wrenches(body.radius)]
+    return rig, [Load(limit.limit * limit.wrench, limit.forces) for limit in found]
+
+
+AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
+SIDES = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
+"""Signs of the places of four contacts, two on each of two opposite faces."""
+SLIP_TOLERANCE = 0.005
+"""Largest error of the load at which a box slips, relative to the load that statics predicts."""
+LEAST_LEVER = 0.05
+"""Least lever of the fingers on a box that is twisted, in widths of the box."""
+CREEP_LIMIT = 1e-4
+"""Fastest creep allowed under load, in grasp sizes per second; good settings show a twentieth of
+it."""
+CREEP_SHARE = 0.2
+"""Largest share of a hold's displacement threshold that creep may use up."""
+CREEP_LOAD = 0.8
+HIDDEN_LIMIT = 0.01
+"""Largest force that may act without a threshold noticing it, relative to the largest normal force.
+It is ten times what the usual thresholds let pass."""
+NEAR = 0.01
+"""Distance from the critical friction, relative to it, at which a hold must tell whether the object
+stays."""
+BLOW_UP = 1e14
+"""Each part of a load that no simulation survives [N, N m]."""
+
+
+def known_answers(case: Case) -> tuple[Check, ...]:
+    """Check the simulator on all known cases, on the surface that the settings name."""
+    return (
+        *_incline(case), *_pulled_box(case), *_twisted_box(case), *_offset_fingers(case),
+        _creep(case), _hidden(case), *solver_gaps(case), _blow_up(case),
+    )  # fmt: skip
+
+
+def _incline(case: Case) -> list[Check]:
+    """Let a box weigh on four rigid supports, pull it at their level, and check when it slides."""
+    body = case.body("box")
+    length, width, height = np.ptp(body.vertices, axis=0)
+    contacts = [
+        Contact(np.array([s * length / 4, t * width / 4, -height / 2]), np.array([0, 0, 1.0]))
+        for s, t in SIDES
+    ]
+    rigid = replace(case.setup, fingers=replace(case.setup.fingers, drive="rigid"))
+    weight = case.setup.fingers.max_normal_force_n
+    resting = Load(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
+    bench = Bench(rigid.scene(body, contacts, case.friction))
+    rig = Rig(bench, case.setup, case.friction, resting, None, whole=True)
+    pulls = [case.friction * weight * np.array([*way, 0.0]) for way in _ways()]
+    torques = [np.cross([0.0, 0.0, -height / 2], pull) for pull in pulls]  # so that it cannot tip
+    limits = [
+        Load(resting.wrench + np.concatenate([pull, torque]), resting.forces)
+        for pull, torque in zip(pulls, torques, strict=True)
+    ]
+    return _slips("slope at which a box slides, over friction", bisected_limits(rig, limits))
+
+
+def _pulled_box(case: Case) -> list[Check]:
+    """Pull a box that fingers hold on two opposite faces, and check when it slips."""
+    body = case.body("box")
+    length, width, _ = np.ptp(body.vertices, axis=0)
+    rig = _held_across(case, body, length, width / 4)
+    forces, largest = rig.idle.forces, 4.0 * case.friction * case.push
+    limits = [
+        Load(np.array([0, *(largest * way), 0, 0, 0]), forces - np.array([0, *(largest * way / 4)]))
+        for way in _ways()
+    ]
+    name = "pull at which a held box slips, over 4 mu N"
+    return [
+        *_slips(f"{name}, by holds", bisected_limits(rig, limits)),
+        *_slips(f"{name}, by ramps", ramped_limits(rig, limits)),
+    ]
+
+
+def _held_across(case: Case, body: Polyhedron, length: float, lever: float) -> Rig:
+    """Squeeze a box on the two faces across x, with fingers a lever from their middles."""
+    contacts = [
+        Contact(np.array([s * length / 2, t * lever, 0.0]), np.array([-s, 0.0, 0.0]))
+        for s, t in SIDES
+    ]
+    return case.squeezed(body, contacts, case.push * stacked(contacts)[1], case.friction)
+
+
+def _twisted_box(case: Case) -> list[Check]:
+    """Twist a box that soft fingers hold on two opposite faces, and check when it turns."""
+    friction, soft = case.friction, case.setup.physics.torsion_m
+    if not soft:
+        return []
+    body = case.body("box")
+    length, width, _ = np.ptp(body.vertices, axis=0)
+    # where both parts resist alike, if that is on the faces and apart enough
+    lever = min(max(soft / friction, LEAST_LEVER * width), width / 4.0)
+    rig = _held_across(case, body, length, lever)
+    each = math.hypot(friction * lever, soft)
+    # a point of the limit surface: sliding and turning as fast as one rigid body does
+    slides = case.push * friction**2 * lever / each
+    limit = Load(
+        np.array([0, 0, 0, 4.0 * case.push * each, 0, 0]),
+        rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in SIDES]),
+    )
+    name = "twist at which a held box turns, over 4 N sqrt((mu a)^2 + mu_t^2)"
+    return [
+        near(f"{name}, by {way}", found and found.share, SLIP_TOLERANCE)
+        for way, search in (("holds", bisected_limits), ("ramps", ramped_limits))
+        for found in search(rig, [limit])
+    ]
+
+
+def _ways() -> list[Array]:
+    turns = np.radians(AZIMUTHS_DEG)
+    return list(np.column_stack([np.cos(turns), np.sin(turns)]))
+
+
+def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
+    """Compare the loads at which a box slips with those of statics, one check per direction."""
+    return [
+        near(f"{name}, at {azimuth:g} deg", at and at.share, SLIP_TOLERANCE)
+        for azimuth, at in zip(AZIMUTHS_DEG, found, strict=True)
+    ]
+
+
+def _offset_fingers(case: Case) -> list[Check]:
+    """Offset two fingers on each of two opposite faces, and check at which friction they let go."""
+    body = case.body("box")
+    length, _, distance = np.ptp(body.vertices, axis=0)
+    critical = case.offset_friction
+    gap = length / 20.0
+    shift = 0.5 * critical * distance + gap
+    contacts = [
+        Contact(np.array([s * shift + t * gap, 0.0, s * distance / 2]), np.array([0.0, 0.0, -s]))
+        for s, t in SIDES
+    ]
+    places = stacked(contacts)
+    bench = Bench(case.setup.scene(body, contacts, critical))
+    released = released_friction(bench, *places, critical, case.setup, whole=True).simulated
+    rig = case.squeezed(body, contacts, case.push * forces_just_above(*places, critical), critical)
+
+    def stays(frictions: list[float]) -> list[bool | None]:
+        traces = [replace(rig, friction=each).hold([rig.idle])[0] for each in frictions]
+        return [holds(trace, rig.bench.scene.layout, case.setup.hold) for trace in traces]
+
+    held = bisected(stays, critical, case.setup.friction)
+    name = "friction at which offset fingers let go, over h / w"
+    return [
+        near(f"{name}, by releases", released and released / critical, SLIP_TOLERANCE),
+        near(f"{name}, by holds", held and sum(held) / (2.0 * critical), NEAR),
+    ]
+
+
+def _creep(case: Case) -> Check:
+    """Check how fast a tetrahedron held at its face centres creeps under twelve loads."""
+    rig, limits = tetrahedron(case)
+    traces = rig.hold([part(rig.idle, limit, CREEP_LOAD) for limit in limits])
+    speeds = list[float]()
+    for trace in traces:  # the mean speed in the second half; NaN if the trial is not valid
+        half = len(trace.times_s) // 2
+        if trace.health.fault or not half:
+            speeds.append(math.nan)
+        else:
+            moved = trace.displacements_m[-1] - trace.displacements_m[half - 1]
+            speeds.append(float(moved / (trace.times_s[-1] - trace.times_s[half - 1])))
+    # the maximum is NaN if one speed is
+    speed = float(np.abs(speeds).max()) / rig.bench.scene.layout.grasp_size_m
+    noticed = case.setup.hold.hold_threshold / case.setup.hold.hold_s
+    limit = min(CREEP_LIMIT, CREEP_SHARE * noticed)
+    return Check("creep under load, in grasp sizes per second", speed, 0.0, limit)
+
+
+def _hidden(case: Case) -> Check:
+    """Check how large a force may be before the displacement thresholds notice it."""
+    rig, _ = tetrahedron(case)
+    layout, setup = rig.bench.scene.layout, case.setup
+    threshold = max(
+        setup.hold.hold_threshold, setup.hold.total_threshold, setup.hold.gap_threshold,
+        setup.limit.ramp_threshold, setup.friction.threshold,
+    )  # fmt: skip
+    hidden = layout.drive.stiffness_n_per_m * threshold * layout.grasp_size_m
+    share = hidden / setup.fingers.max_normal_force_n
+    name = "force hidden below the thresholds, over the largest normal force"
+    return Check(name, share, 0.0, HIDDEN_LIMIT)
+
+
+def _blow_up(case: Case) -> Check:
+    """Check the simulator's clock after a load so large that numbers overflow."""
+    rig, _ = tetrahedron(case)
+    (trace,) = rig.hold([Load(np.full(6, BLOW_UP), rig.idle.forces)])
+    seen = not trace.health.finite or trace.health.warnings > 0
+    error = trace.health.clock_error_s if seen else math.nan
+    name = "simulated less stepped time after a blow-up, in seconds"
+    return Check(name, error, -CLOCK_SLACK_S, CLOCK_SLACK_S)
+
+
+GAP_LIMIT = 1e-9
+"""Largest difference of a position or angle between the two solvers, in grasp sizes: a
+ten-thousandth of the finest threshold. Usual solvers differ by 2e-10 at most, on a millimetre at
+friction 0.02, and else by 1e-15. Solvers that are known to slip falsely differ by 1.6e-9 and more.
+"""
+LOW_GAP_LIMIT = 1e-7
+"""Largest difference between the two solvers at low friction, in grasp sizes: a hundredth of the
+finest threshold. Usual solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes
+of that size were seen to let go far above their critical friction, implicit integrators among them,
+differ by 4e-5."""
+SHARE = 0.8
+"""Load on the tetrahedron, relative to the largest load that it resists."""
+LIGHT = 1e-3
+"""Normal force of the two fingers that hardly push, relative to that of the others."""
+ABOVE = (1.01, 1.05, 2.0)
+"""Frictions at which the box is released, relative to the friction that it needs; it stays at
+each."""
+
+
+def solver_gaps(case: Case) -> tuple[Check, Check]:
+    """Compare motions under the chosen solver with motions under one that iterates to the end."""
+    physics = replace(
+        case.setup.physics, solver="Newton", jacobian="dense", tolerance=1e-18, iterations=300,
+        ls_iterations=100, ls_tolerance=1e-3,
+    )  # fmt: skip
+    exact = replace(case, setup=replace(case.setup, physics=physics))
+    here = [(_held(each), _released(each, case.offset_friction)) for each in (case, exact)]
+    low = [(_released(each, LEAST_OFFSET),) for each in (case, exact)]
+    name = "motion that a solver to the last digit changes"
+    return (
+        Check(name, _gap(*here), 0.0, GAP_LIMIT),
+        Check(f"{name}, at friction {LEAST_OFFSET:g}", _gap(*low), 0.0, LOW_GAP_LIMIT),
+    )
+
+
+def _gap(motions: Sequence[Array], others: Sequence[Array]) -> float:
+    gaps = [np.max(np.abs(one - other)) for one, other in zip(motions, others, strict=True)]
+    return float(np.max(gaps))  # the maximum is NaN if one difference is
+
+
+def _held(case: Case) -> Array:
+    """Simulate the held tetrahedron; return joint positions (trials, n, q) in grasp sizes."""
+    rig, limits = tetrahedron(case)
+    return _in_sizes(rig, rig.holds([part(rig.idle, limit, SHARE) for limit in limits]))
+
+
+def _in_sizes(rig: Rig, trials: Sequence[Schedule]) -> Array:
+    joints = rig.joints(trials)
+    scale = np.full(joints.shape[-1], rig.bench.scene.layout.grasp_size_m)
+    scale[3:7] = 1.0  # a quaternion
+    return joints / scale
+
+
+def _released(case: Case, needed: float) -> Array:
+    """Release a box at frictions above the one it needs; return joint positions as `_held` does.
+
+    Fingers squeeze it along an oblique line from above and below; two side fingers hardly push.
+    """
+    body = case.body("box")
+    _, width, height = np.ptp(body.vertices, axis=0)
+    shift = 0.5 * needed * height
+    # The side fingers stand off centre, because symmetry hides faults.
+    contacts = [
+        *(Contact(np.array([s * shift, 0.0, s * height / 2]), np.array([0.0, 0.0, -s]))
+          for s in (-1.0, 1.0)),
+        *(Contact(np.array([0.13 * height, s * width / 2, 0.07 * height]), np.array([0.0, -s, 0.0]))
+          for s in (-1.0, 1.0)),
+    ]  # fmt: skip
+    pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * stacked(contacts)[1]
+    pushes[:2, 0] = needed * np.array([1.0, -1.0])
+    box = case.squeezed(body, contacts, case.push * pushes, needed)
+    settling = case.setup.friction.settling_friction * needed
+    return _in_sizes(box, box.releases(settling, [above * needed for above in ABOVE]))
+
 
 DEPTH = 1e-4
 """Depth to which rigid fingertips are put into the faces, in object radii. It is a thousand times
@@ -95,8 +486,6 @@ def touch_checks(turned: Array, off: Array, where: str = "") -> tuple[Check, Che
 
 
 USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
-MOST_KNOWN = 256
-"""Number of settings whose results are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,9 +510,6 @@ class Gate(Declared):
             )
 
 
-_KNOWN: dict[Case, Gate] = {}
-
-
 def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
@@ -137,31 +523,17 @@ def measured_gate(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
     """Check the simulator on known cases, once per process for the same settings."""
-    case = _case(setup, friction, radius_m)
-    if case in _KNOWN:
-        return _KNOWN[case]
-    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
-    checks = known_answers(pads)
-    if setup.surface == "mesh":
-        meshes = (*mesh_touches(case), *known_answers(case))
-        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
-    return _kept(case, Gate(checks, versions()["mujoco"]))
-
-
-def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) -> None:
-    """Take over what `measured_gate` returned in the process that started this one."""
-    _kept(_case(setup, friction, radius_m), gate)
-
-
-def _case(setup: Setup, friction: float, radius_m: float) -> Case:
-    # Two digits of the radius let objects of nearly the same size share one measurement.
     fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
     setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
-    return Case(setup, friction, float(f"{radius_m:.1e}"))
+    # Two digits of the radius let objects of nearly the same size share one measurement.
+    return _measured(Case(setup, friction, float(f"{radius_m:.1e}")))
 
 
-def _kept(case: Case, gate: Gate) -> Gate:
-    _KNOWN[case] = gate
-    if len(_KNOWN) > MOST_KNOWN:
-        del _KNOWN[next(iter(_KNOWN))]
-    return gate
+@lru_cache(maxsize=256)
+def _measured(case: Case) -> Gate:
+    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
+    checks = known_answers(pads)
+    if case.setup.surface == "mesh":
+        meshes = (*mesh_touches(case), *known_answers(case))
+        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
+    return Gate(checks, versions()["mujoco"])

@@ -4,7 +4,8 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,16 +14,17 @@ from grasp_core.checked import LARGEST, SMALLEST
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.declared import Declared
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.settings import CHOSEN
+from grasp_core.settings import CHOSEN, named
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, build_scene
 from scenes.settings import FingerSettings, PhysicsSettings, ScaledScene
+from sim_validate.kit.files import read_tables
 from sim_validate.settings import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(
@@ -132,7 +134,8 @@ class Agenda(ChosenTrials):
     control (contacts that must fail)."""
 
     def _check_together(self) -> None:
-        taken = drawn_names(self.random_wrenches)
+        drawn = (RANDOM.format(place) for place in range(self.random_wrenches))
+        taken = {*AXIS_NAMES, WEAKEST, *drawn}
         for each in self.wrenches:
             if each.name in taken:
                 raise InputError(
@@ -141,13 +144,32 @@ class Agenda(ChosenTrials):
             taken.add(each.name)
 
 
-def drawn_names(random_wrenches: int) -> set[str]:
-    """Return the names of the wrenches of a grasp that are not a user's."""
-    return {*AXIS_NAMES, WEAKEST, *(RANDOM.format(place) for place in range(random_wrenches))}
-
-
 def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:
     """Give fingertips the radius that grasps are planned for, unless they have their own."""
     if planned is None or fingers.fingertip_radius_m is not None:
         return fingers
     return replace(fingers, fingertip_radius_m=planned.radius_m)
+
+
+def setup_from_file(path: Path, setup: Setup) -> Setup:
+    """Read settings from a TOML file and put them in place of those in `setup`.
+
+    Its tables are `physics`, `fingers`, `hold`, `limit` and `friction`; all are optional.
+    """
+    tables = read_tables(path)
+    with about(path):
+        return Setup.of_table(tables, usual=setup)
+
+
+def physics_from_file(path: Path) -> dict[str, Any]:
+    """Read the settings in the table `physics` of a file, by name."""
+    tables = read_tables(path)
+    with about(path):
+        given = named(tables, ("physics",), "").get("physics", {})
+        if "gravity" in given:
+            raise InputError(
+                "physics.gravity is that of the earth; leave it out, and give its direction with "
+                "--down"
+            )
+        checked = PhysicsSettings.of_table(given, "physics")
+    return {name: getattr(checked, name) for name in given}

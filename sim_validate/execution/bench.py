@@ -10,7 +10,7 @@ the fingers would not carry what they hold along.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -67,10 +67,7 @@ class HeldMotion:
         return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
 
 
-SERIES = (
-    "moved", "turned", "palm", "fingers", "tips", "forces", "pressed", "table", "states",
-    "tip_turns",
-)  # fmt: skip
+SERIES = tuple(each.name for each in fields(HeldMotion) if each.name != "faults")
 """Fields of a motion that have a row for each sample, where they are known."""
 
 
@@ -85,17 +82,9 @@ def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
 
 def begun_motion(motion: HeldMotion, count: int) -> HeldMotion:
     """Return the first samples of a motion, as if nothing had gone wrong after them."""
-    rows: dict[str, Any] = {name: getattr(motion, name) for name in SERIES}
-    first: dict[str, Any] = {key: None if own is None else own[:count] for key, own in rows.items()}
+    rows = ((name, getattr(motion, name)) for name in SERIES)
+    first: dict[str, Any] = {name: None if own is None else own[:count] for name, own in rows}
     return HeldMotion(**first, faults=())
-
-
-@dataclass(frozen=True, slots=True)
-class Lost:
-    """How far from its planned place in the hand an object is lost, where its trial ends."""
-
-    away_m: float
-    turned_rad: float = math.inf
 
 
 class HeldBench:
@@ -122,14 +111,15 @@ class HeldBench:
 
     def run(
         self, drives: Sequence[Drive], start: Array | None = None, friction: Array | None = None,
-        lost: Sequence["Lost"] | None = None,
+        lost: Sequence[tuple[float, float]] | None = None,
     ) -> tuple[HeldMotion, ...]:  # fmt: skip
         """Simulate trials, all from the same state or from their own start.
 
-        Takes `start` (size,) or (n, size); `friction` (k,) or (n, k).
+        Takes `start` (size,) or (n, size); `friction` (k,) or (n, k). Trials end where the object
+        is `lost`, farther from its planned place in the hand, or turned by more [m, rad].
         """
         trials = self._begun(drives, start, friction)
-        return self._stepped(trials, drives, lost or [Lost(self.lost_m)] * len(drives))
+        return self._stepped(trials, drives, lost or [(self.lost_m, math.inf)] * len(drives))
 
     def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
@@ -166,7 +156,7 @@ class HeldBench:
         return trials
 
     def _stepped(
-        self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence["Lost"]
+        self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence[tuple[float, float]]
     ) -> tuple[HeldMotion, ...]:
         lengths = np.array([len(drive) for drive in drives])
         most = int(lengths.max())
@@ -180,8 +170,8 @@ class HeldBench:
         )
         errors: dict[int, str] = {}
         lost = np.zeros(len(drives), dtype=bool)
-        most_m = np.array([each.away_m for each in limits])
-        least_cosine = np.cos([min(each.turned_rad, math.pi) for each in limits])
+        most_m, most_rad = np.transpose(limits)
+        least_cosine = np.cos(np.minimum(most_rad, math.pi))
         turns_count = bool((least_cosine > -1.0).any())
         with unlogged():
             for sample in range(most):

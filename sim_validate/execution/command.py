@@ -1,15 +1,29 @@
-"""Runs the command `execute`, which simulates grasps as a robot executes them."""
+"""Runs `execute`, which simulates grasps as a robot executes them, and writes grasps for others.
+
+`scene` writes models for MuJoCo, with true masses if the flags ask for them, and `export` one file
+for other programs.
+"""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
+from grasp_core.declared import counted
+from grasp_core.errors import InputError, NoForcesError
 from grasp_core.figures import NONE, figures
+from grasp_core.files.text_files import write_text
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
-from sim_validate.closure.setup_toml import physics_from_file
-from sim_validate.execution.asked_executions import execution_settings
-from sim_validate.execution.jobs import ExecutionJob, executed
+from grasp_core.records.grasps_json import load_grasps
+from grasp_core.settings import extended
+from grasp_core.values import Grasp
+from scenes import exports
+from scenes.settings import ScaledScene
+from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
+from sim_validate.execution.execute import ExecutionJob, chosen_squeeze, executed, held_scene
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -20,12 +34,13 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.kit import command_flags
+from sim_validate.kit.command_flags import Run
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import AboutObject
 from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.planning.asked_objects import asked_grasps
-from sim_validate.settings import ExecutionSettings
+from sim_validate.planning.asked_objects import asked_finger, asked_grasps, grasp_with_id
+from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
 EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
 """Figures whose meaning is said below their table."""
@@ -71,20 +86,17 @@ def execute_grasps(
     results = reporter.counted(
         "executing", executed(tasks, jobs), count, "survived", lambda each: each.survived
     )
-    collect = partial(_collected, AboutObject.of(saved.body), saved.friction, settings)
-    found = finished(results, count, collect, folder and folder / Executions.FILE, reporter)
+    about = AboutObject.of(saved.body)
+
+    def collected(grasps: tuple[ExecutedGrasp, ...], *, complete: bool) -> Executions:
+        return Executions(about, saved.friction, complete, settings, grasps)
+
+    found = finished(results, count, collected, folder and folder / Executions.FILE, reporter)
     _show(found, reporter)
     if not all(each.controls_let_go for each in found):
         return Exit.INTERNAL, found
     good = all(each.survived for each in found)
     return (Exit.GOOD if good else Exit.NEGATIVE), found
-
-
-def _collected(
-    body: AboutObject, friction: float, settings: ExecutionSettings,
-    grasps: tuple[ExecutedGrasp, ...], *, complete: bool,
-) -> Executions:  # fmt: skip
-    return Executions(body, friction, complete, settings, grasps)
 
 
 def _show(found: Executions, reporter: Reporter) -> None:
@@ -144,3 +156,138 @@ def _losses(found: Executions) -> Iterator[str]:
         else:
             said = losses_in_words(each.execution, found.settings)
             yield from (f"{each.id}: {line}" for line in said)
+
+
+Held = TypeVar("Held", bound=Holding)
+
+
+def holding(given: Held, body: Polyhedron, finger: Finger | None) -> Held:
+    """Complete what holds an object: its mass, and fingertips as planned if no flag gives them."""
+    planned = None if finger is None else finger.radius_m
+    radius = planned if given.tip_radius_m is None else given.tip_radius_m
+    return replace(given.for_body(body), tip_radius_m=radius)
+
+
+def execution_settings(
+    given: ChosenExecution, body: Polyhedron, seed: int, finger: Finger | None
+) -> ExecutionSettings:
+    """Build the settings of executions."""
+    return extended(ExecutionSettings, holding(given, body, finger), seed=seed)
+
+
+def check_executing(command: Run) -> None:
+    """Refuse flags about executions where none are asked for, before any file is read."""
+    if not command.execute and command.executing != ChosenExecution():
+        raise FlagsError(
+            "the flags from --mass-kg to --max-deg say how grasps are executed: add --execute too"
+        )
+
+
+def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None:
+    """Build the settings of the executions that `run` is asked for; None if it is not."""
+    if not command.execute:
+        return None
+    planning = command.planning
+    return execution_settings(command.executing, body, planning.seed, asked_finger(planning))
+
+
+TextOf = Callable[[Grasp], str]
+
+
+def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
+    """Write a MuJoCo scene for each grasp of a file, or print a single one."""
+    _check(command)
+    saved = load_grasps(command.grasps)
+    chosen = saved.grasps
+    if command.grasp is not None:
+        chosen = (grasp_with_id(command.grasps, saved, command.grasp),)
+    if command.out is None and len(chosen) > 1:
+        raise InputError(
+            "several scenes cannot be printed: give a folder with --out DIR, or one grasp with "
+            "--grasp ID"
+        )
+    friction = saved.friction if command.friction is None else command.friction
+    if command.holding.weighed:
+        text_of = _held(command, saved, friction, reporter)
+    else:
+        text_of = _scaled(command, saved, friction)
+    with alone_in(command.out):
+        written = [_written(grasp, text_of, command.out, reporter) for grasp in chosen]
+    if command.out is not None:
+        reporter.document({"scenes": [path for path in written if path]})
+    return Exit.GOOD if all(written) else Exit.NEGATIVE
+
+
+def _written(grasp: Grasp, text_of: TextOf, folder: Path | None, reporter: Reporter) -> str:
+    """Write or print the scene of one grasp; return its place, or nothing if it has no scene."""
+    try:
+        text = text_of(grasp)
+    except NoForcesError as error:
+        reporter.warn(f"{grasp.id}: no scene: {error}")
+        if folder is None:
+            reporter.document({"id": grasp.id, "absence": str(error)})
+        return ""
+    if folder is None:
+        reporter.document({"id": grasp.id, "xml": text})
+        if not reporter.json_only:
+            print(text, end="")  # noqa: T201 - the document itself
+        return grasp.id
+    path = str(write_text(folder / f"{grasp.id}.xml", text))
+    reporter.say(f"wrote {path}")
+    return path
+
+
+def _check(command: command_flags.Scene) -> None:
+    """Refuse flags that the scene asked for does not use, before any file is read."""
+    if command.holding.weighed:
+        if command.scaled != ScaledScene():
+            raise FlagsError(
+                "the flags from --max-normal-force-n to --surface are for scenes with scaled "
+                "masses: leave out --mass-kg and --density-kg-m3, or use the flags from "
+                "--tip-mass-kg to --tip-radius-m"
+            )
+    elif command.holding != Holding():
+        raise FlagsError(
+            "the flags from --tip-mass-kg to --tip-radius-m are for objects of true mass: give "
+            "--mass-kg or --density-kg-m3 too"
+        )
+
+
+def _scaled(command: command_flags.Scene, saved: Plan, friction: float) -> TextOf:
+    setup = extended(Setup, command.scaled)
+    setup = replace(setup, fingers=with_planned_radius(setup.fingers, saved.finger))
+    return lambda grasp: setup.scene(saved.body, grasp, friction).xml
+
+
+def _held(command: command_flags.Scene, saved: Plan, friction: float, reporter: Reporter) -> TextOf:
+    own = holding(command.holding, saved.body, saved.finger)
+    settings = extended(ExecutionSettings, own)
+
+    def text_of(grasp: Grasp) -> str:
+        best = chosen_squeeze(saved.body, grasp, friction, settings)
+        if best.scale < 1.0:
+            reporter.warn(
+                f"{grasp.id}: the squeeze is certified for {best.scale:.3g} of the weight only, so "
+                "the object may slip; use a smaller mass, or a larger --push-n"
+            )
+        return held_scene(saved.body, best.grip, settings).xml
+
+    return text_of
+
+
+def export_grasps(command: command_flags.Export, reporter: Reporter) -> int:
+    """Write the grasps of a file as one file of another program's format."""
+    endings = exports.ENDINGS[command.to]
+    if command.out.suffix.lower() not in endings:
+        raise FlagsError(
+            f"--out must end in {' or '.join(endings)} with --to {command.to}, got {command.out}"
+        )
+    chosen = asked_grasps(command.grasps, reporter, grasp=command.grasp, limit=command.limit)
+    if chosen is None:
+        return Exit.NONE
+    radius = command.fingertip_radius_m
+    exports.export_grasps(chosen, command.out, command.to, fingertip_radius_m=radius)
+    reporter.say(f"wrote {command.out} with {counted(len(chosen), 'grasp')}")
+    ids = [grasp.id for grasp in chosen]
+    reporter.document({"to": command.to, "out": str(command.out), "grasps": ids})
+    return Exit.GOOD

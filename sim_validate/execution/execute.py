@@ -1,4 +1,4 @@
-"""Executes a grasp: chooses its squeeze, runs all trials in one batch, and judges each.
+"""Executes grasps: chooses their squeezes, runs all trials of each in one batch, and judges them.
 
 The squeeze is chosen once: the one that carries the most of the object's weight in any direction
 with the largest push allowed. Every trial then runs with it. Before, the simulator is checked on
@@ -10,17 +10,21 @@ steps of the usual length it bounces too much, and may fall where it would come 
 first contact that opens or slips, steps of that length are exact enough, so a run with steps of
 `FINE_S` goes on from shortly before. It ends where the object is farther than it may be: the loss
 is confirmed then, whatever comes later.
+
+Several grasps of an object are executed in one process or in several, and their trials are filmed.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.checked import instance, switch, whole
-from grasp_core.closure.contacts import contact_arrays, listed_contacts, stacked
+from grasp_core.checked import instance, one_of, switch, whole
+from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.grips import Grip
@@ -29,27 +33,36 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
+from scenes.drawing.clips import RATE, write_held_clip
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held import hinged, rotations
-from scenes.mujoco.held_mjcf import HeldScene, build_held_scene, held_physics
+from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, build_held_scene, held_physics
+from scenes.mujoco.mjcf_text import quaternion
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
 from sim_validate.execution.bench import (
     HeldBench,
     HeldMotion,
-    Lost,
     begun_motion,
+    facing,
     motions_joined,
 )
 from sim_validate.execution.controls import run_controls
-from sim_validate.execution.enough import Choose, NoSqueezeError, SceneOf, found_enough
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive, parted
-from sim_validate.execution.predictions import held_dynamics, predicted_losses
+from sim_validate.execution.predictions import (
+    Choose,
+    NoSqueezeError,
+    SceneOf,
+    found_enough,
+    held_dynamics,
+    predicted_losses,
+)
 from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
 from sim_validate.execution.trials import Trial, trials_of
-from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
+from sim_validate.kit.processes import each, processes
 from sim_validate.settings import ExecutionSettings
 
 FINE_S = 1.25e-4
@@ -114,13 +127,16 @@ def _rest(trial: Trial, begin: int) -> Drive:
     return rest if begin < trial.weighing else replace(rest, velocity=np.zeros(3))
 
 
-def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> Lost:
-    """Return how far from its planned place an object is surely too far from where it was."""
+def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[float, float]:
+    """Return how far from its planned place an object surely is too far from where it was.
+
+    Gives a distance [m] and an angle [rad].
+    """
     palm = hinged(motion.palm[begun : begun + 1, 3:])[0]
     turned = palm.T @ rotations(motion.turned[begun : begun + 1])[0]
     angle = math.acos(min(max(0.5 * (float(np.trace(turned)) - 1.0), -1.0), 1.0))
     away = float(np.linalg.norm(motion.moved[begun] - motion.palm[begun, :3]))
-    return Lost(settings.most_m + away, settings.most_rad + angle)
+    return settings.most_m + away, settings.most_rad + angle
 
 
 LOST = 3.0
@@ -161,9 +177,20 @@ def execute(
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
-    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings).for_body(body)
-    contacts = given_contacts(body, grasp)
-    return executed(
+    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings)
+    if physics is not None:
+        instance(physics, PhysicsSettings, "physics")
+    return execute_with(body, grasp, friction, settings, physics, threads=threads, enough=enough)
+
+
+def execute_with(
+    body: Polyhedron, grasp: Grasp | Iterable[Contact], friction: ArrayLike,
+    settings: ExecutionSettings, physics: PhysicsSettings | Mapping[str, Any] | None, *,
+    threads: int, enough: bool,
+) -> Execution:  # fmt: skip
+    """Execute a grasp, with physics as they are or as some settings change them."""
+    settings, contacts = settings.for_body(body), given_contacts(body, grasp)
+    return execution_of(
         body, settings,
         lambda own, loads: chosen_squeeze(body, contacts, friction, own, loads),
         lambda own, best: held_scene(body, best.grip, own, physics),
@@ -186,7 +213,7 @@ def asked_settings(
     return usual(mass_kg)
 
 
-def executed(
+def execution_of(
     body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf, *,
     threads: int, enough: bool,
 ) -> Execution:  # fmt: skip
@@ -215,11 +242,7 @@ def simulated(
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
     dynamics = held_dynamics(best.grip, scene.layout)
     trials, skipped = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
-    slips, losses = predicted_losses(
-        dynamics, [trial.expected or trial.drive for trial in trials],
-        [trial.turning for trial in trials], settings.most_m, settings.most_rad,
-    )  # fmt: skip
-    predicted = [(float(slip), float(loss)) for slip, loss in zip(slips, losses, strict=True)]
+    predicted = predicted_losses(dynamics, trials, settings)
     return Execution(
         mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
@@ -272,12 +295,16 @@ def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: Executio
 
 def held_scene(
     body: Polyhedron, grip: Grip, settings: ExecutionSettings,
-    physics: PhysicsSettings | None = None,
+    physics: PhysicsSettings | Mapping[str, Any] | None = None,
 ) -> HeldScene:  # fmt: skip
     """Build the scene in which a grip is executed."""
-    return build_held_scene(
-        body, grip, settings, physics=physics, reach_m=surface_reach(body, grip, settings)
-    )  # fmt: skip
+    if isinstance(physics, Mapping):
+        usual = held_scene(body, grip, settings)
+        if not physics:
+            return usual
+        physics = replace(usual.physics, **physics)
+    reach_m = surface_reach(body, grip, settings)
+    return build_held_scene(body, grip, settings, physics=physics, reach_m=reach_m)
 
 
 def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
@@ -362,3 +389,83 @@ def _judged(
         simulated_first_slip=found.first_slip,
         step_s=bench.step_s,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionJob:
+    """One grasp to execute, as it is sent to a worker process."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    settings: ExecutionSettings
+    physics: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Settings of the simulator that differ from the usual ones, by name."""
+    threads: int = 1
+    enough: bool = True
+
+
+def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:
+    """Yield one result per job, in order; the number of processors does not change the results."""
+    count = processes(len(jobs), processors)
+    threads = max(1, processors // count)
+    return each(executed_grasp, [replace(job, threads=threads) for job in jobs], jobs=count)
+
+
+def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
+    """Execute one grasp; a grasp without a squeeze is a result with a reason."""
+    grasp = job.grasp
+    about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)
+    try:
+        found = execute_with(
+            job.body, grasp, job.friction, job.settings, job.physics,
+            threads=job.threads, enough=job.enough,
+        )  # fmt: skip
+    except NoForcesError as error:
+        return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
+    return ExecutedGrasp(*about, found)
+
+
+FRAMES = 60
+"""Least number of frames of a clip, 2.4 s: shorter motions are slowed down by a whole number."""
+VISIBLE_M = 1e-4
+"""Least slip that is worth a clip, about a pixel of its picture [m]."""
+
+
+def worth_seeing(found: Execution) -> tuple[ExecutionTrial, ...]:
+    """Choose the trials to film: the lift, the worst shake, and the worst slip that can be seen.
+
+    Shakes that slip before they differ are ordered by their predictions.
+    """
+    shakes = sorted(
+        found.of_kind("shake"),
+        key=lambda each: (each.survived, each.simulated_first_slip, each.predicted_first_slip),
+    )
+    slips = [
+        each for each in found.trials
+        if each.dropped or (each.fate == "slipped" and each.slip_m >= VISIBLE_M)
+    ]  # fmt: skip
+    slips.sort(key=lambda each: (not each.dropped, -each.slip_m))
+    chosen = [*found.of_kind("lift")[:1], *shakes[:1], *slips[:1]]
+    return tuple({trial.name: trial for trial in chosen}.values())
+
+
+def film(job: ExecutionJob, name: str, path: Path) -> Path:
+    """Simulate one trial of an execution again and draw it."""
+    body, settings = job.body, job.settings
+    best = chosen_squeeze(body, job.grasp, job.friction, settings)
+    scene = held_scene(body, best.grip, settings, job.physics)
+    dynamics = held_dynamics(best.grip, scene.layout)
+    trials, _ = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
+    named = {trial.name: trial for trial in trials}
+    one_of(name, tuple(named), "name")
+    (motion,) = run_trials(HeldBench(scene), [named[name]])
+    stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.moved) // FRAMES))
+    slowed = 1.0 / (RATE * SAMPLE_S * stride)
+    caption = name if slowed <= 1.0 else f"{name}, {slowed:.1f} times slower"
+    table, gravity = named[name].drive.table, scene.layout.gravity
+    up = -gravity / np.linalg.norm(gravity) if table is None else table.normal
+    return write_held_clip(
+        scene, motion.joints[::stride], path, caption, up=up,
+        table=None if table is None else (table.point, quaternion(facing(table))),
+    )  # fmt: skip

@@ -42,6 +42,7 @@ LOSSES = Compared(items=("no longer survived", "survived now"))
 CONTROLS_HELD = Compared(more, "controls that did not slip")
 PREDICTED, SIMULATED = Compared(less, analysed=True), Compared(less, close="slips")
 MOVED = Compared(more, close="slips")
+FAILED = Compared(lambda _, after: after is not None)
 """How figures are compared with those of an earlier execution."""
 
 
@@ -264,10 +265,6 @@ class Execution(Declared):
         return sum(trial.survived for trial in own), len(own)
 
 
-def _failed(_before: str | None, after: str | None) -> bool:
-    return after is not None
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ExecutedGrasp(Declared):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
@@ -279,7 +276,7 @@ class ExecutedGrasp(Declared):
     """Hash of the contacts, which tells grasps of one id apart."""
     execution: Annotated[Execution | None, FLAT]
     """Trials and negative controls; None where no squeeze carries the weight."""
-    reason: Annotated[str | None, Compared(_failed)] = None
+    reason: Annotated[str | None, FAILED] = None
     """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
     enough: Enough | None = None
     """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""

@@ -19,7 +19,7 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
 from scenes.mujoco.held_mjcf import HeldScene
-from sim_validate.execution.execute import asked_settings, executed, surface_reach
+from sim_validate.execution.execute import asked_settings, execution_of, surface_reach
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.settings import ExecutionSettings
@@ -66,7 +66,7 @@ def execute_hand(
         near = surface_reach(body, best.grip, own)
         return held_hand_scene(hand, body, reach, best.grip, own, near)
 
-    return executed(
+    return execution_of(
         body, settings,
         lambda own, loads: hand_squeeze(hand, body, reach, friction, own, loads),
         scene_of, threads=threads, enough=enough,

@@ -22,7 +22,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import WrenchLimit, limit_of
 from grasp_core.values import Contact
-from sim_validate.engine.loads import PlannedLoad, resisted_by
+from sim_validate.engine.limits import PlannedLoad, resisted_by
 from sim_validate.engine.setup import Setup
 
 EXCESS = 0.05

@@ -27,10 +27,8 @@ from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import WrenchVerdict
 from sim_validate.engine.bench import Bench
-from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.known_cases import Check
-from sim_validate.engine.limits import part
-from sim_validate.engine.loads import planned_loads
+from sim_validate.engine.gate import Check, require_faithful
+from sim_validate.engine.limits import part, planned_loads
 from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup

@@ -26,7 +26,7 @@ from scenes.mujoco.hand_scene import build_hand_scene
 from scenes.mujoco.tested import HandServos, fingertip_scene, hand_scene, planned_postures
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.loads import loads_as_they_are
+from sim_validate.engine.limits import loads_as_they_are
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge

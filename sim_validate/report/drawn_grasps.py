@@ -21,7 +21,7 @@ from scenes.drawing.views import best_view
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Wanted, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict
-from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing
+from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
 from sim_validate.kit.result_folders import CLIPS, PICTURES
 from sim_validate.planning.regions_json import GraspRegions

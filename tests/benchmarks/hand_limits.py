@@ -22,8 +22,7 @@ import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from sim_validate.engine.bench import Bench
-from sim_validate.engine.limits import part, ramped_limits
-from sim_validate.engine.loads import loads_as_they_are, planned_loads
+from sim_validate.engine.limits import loads_as_they_are, part, planned_loads, ramped_limits
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.traces import holds
 from tests.benchmarks.objects import scaled

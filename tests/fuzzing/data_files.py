@@ -16,7 +16,6 @@ from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.closure.setup_toml import setup_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
@@ -215,7 +214,7 @@ def _same_lines(data: bytes, found: Any) -> None:
 
 
 def _setup(data: bytes) -> Any:
-    return setup_from_tables(tables_of_toml(text_of(data)), Setup(), "s.toml")
+    return Setup.of_table(tables_of_toml(text_of(data)), usual=Setup())
 
 
 def _same_setup(data: bytes, found: Setup) -> None:

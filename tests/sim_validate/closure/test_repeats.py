@@ -6,7 +6,7 @@ import math
 import pytest
 
 import sim_validate as sv
-from sim_validate.closure.noise import disturbed, noisy_case, noisy_trial
+from sim_validate.closure.validate import disturbed, noisy_case, noisy_trial
 from sim_validate.closure.verdict import interval
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from grasp_core.closure.contacts import contact_frames
 from grasp_core.objects.on_faces import face_under
-from sim_validate.closure.noise import disturbed
+from sim_validate.closure.validate import disturbed
 from sim_validate.settings import Noise
 from tests.sim_validate.rigs import grasps
 

@@ -8,8 +8,8 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from grasp_core.settings import as_table
 from scenes.settings import PhysicsSettings
-from sim_validate.closure.setup_toml import setup_from_tables, tables_of
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import measured_gate, require_faithful
 from sim_validate.engine.limits import bisected_limits
@@ -157,9 +157,9 @@ def test_hard_predictions_miss_what_soft_fingertips_hold():
 
 
 def test_a_setup_file_and_its_tables_hold_torsion():
-    setup = setup_from_tables({"physics": {"torsion_m": 0.002}}, Setup(), "setup.toml")
+    setup = Setup.of_table({"physics": {"torsion_m": 0.002}}, usual=Setup())
     assert setup.physics.torsion_m == 0.002
-    again = setup_from_tables(tables_of(setup), Setup(), "setup.toml")
+    again = Setup.of_table(as_table(setup), usual=Setup())
     assert again.physics == setup.physics
 
 

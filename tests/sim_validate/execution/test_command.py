@@ -13,8 +13,8 @@ import sim_validate as sv
 from grasp_core.errors import UnfaithfulError
 from scenes.mujoco.fingertips import fitting_radius
 from sim_validate import run
-from sim_validate.execution import jobs
-from sim_validate.execution.execute import execute
+from sim_validate.execution import execute as jobs
+from sim_validate.execution.execute import execute_with
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.settings import ExecutionSettings
@@ -99,11 +99,11 @@ def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
 @pytest.mark.usefixtures("here")
 def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
     def kept(*given, **more):
-        found = execute(*given, **more)
+        found = execute_with(*given, **more)
         held = tuple(replace(each, let_go=False) for each in found.controls[:1])
         return replace(found, controls=held + found.controls[1:])
 
-    monkeypatch.setattr(jobs, "execute", kept)
+    monkeypatch.setattr(jobs, "execute_with", kept)
     words = ["execute", "grasps.json", "--mass-kg", "0.3", "--limit", "1", *QUICK, "--out", "."]
     assert main(words) == Exit.INTERNAL
     assert "control friction 0.9 did not slip, though it must" in capsys.readouterr().err
@@ -117,9 +117,9 @@ def test_what_was_done_is_kept_where_the_simulator_fails(capsys, monkeypatch):
     def failing(body, grasp, *given, **more):
         if grasp.id == IDS[1]:
             raise UnfaithfulError("knock +x: a number is not finite")
-        return execute(body, grasp, *given, **more)
+        return execute_with(body, grasp, *given, **more)
 
-    monkeypatch.setattr(jobs, "execute", failing)
+    monkeypatch.setattr(jobs, "execute_with", failing)
     words = ["execute", "grasps.json", "--mass-kg", "0.3", *QUICK, "--out", "."]
     assert main(words) == Exit.INTERNAL
     said = capsys.readouterr()

@@ -7,8 +7,8 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.execution.enough import CLEAR, Enough, NoSqueezeError, accelerations_g
 from sim_validate.execution.execute import chosen_squeeze
+from sim_validate.execution.predictions import CLEAR, Enough, NoSqueezeError, accelerations_g
 from sim_validate.execution.verdict import losses_in_words
 from sim_validate.hands.execute_hand import hand_execution_settings
 from tests.grasp_core.execution.held import box

@@ -58,7 +58,7 @@ def test_executions_are_a_table(saved):
 def test_the_file_is_strict_json_with_all_settings():
     document = json.loads(executions().text(), parse_constant=pytest.fail)
     settings = document["settings"]
-    assert (settings["mass_kg"], settings["hand"]["tip_mass_kg"]) == (0.3, 0.02)
+    assert (settings["mass_kg"], settings["tip_mass_kg"]) == (0.3, 0.02)
     assert document["versions"]["mujoco"]
     first, second, third = document["executions"]
     assert first["tip_radius_m"] == [0.004, 0.004, 0.004, 0.005]

@@ -7,8 +7,8 @@ import pytest
 
 import grasp_core as gc
 from scenes.drawing.clips import GraphicsError
-from sim_validate.execution import jobs
-from sim_validate.execution.jobs import FRAMES, ExecutionJob, film, worth_seeing
+from sim_validate.execution import execute as jobs
+from sim_validate.execution.execute import FRAMES, ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.settings import ExecutionSettings
 from tests.scenes.drawing.whole import frames_of

@@ -1,5 +1,6 @@
 """Predicted first slips, against a fine integration of the equation of motion and closed forms."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,11 +14,9 @@ from grasp_core.closure.contacts import cross_matrix
 from scenes.mujoco.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Table, idle
-from sim_validate.execution.predictions import (
-    expected,
-    held_dynamics,
-    predicted_losses,
-)
+from sim_validate.execution.predictions import expected, held_dynamics, predicted_losses
+from sim_validate.execution.trials import Trial
+from sim_validate.settings import ExecutionSettings
 from tests.grasp_core.execution.held import planned_grips
 from tests.sim_validate.execution.held_rigs import MASS, G, box_dynamics
 
@@ -27,7 +26,7 @@ LONG_S = 6.0
 
 def predicted_slips(dynamics, drives):
     """The first slips alone."""
-    return predicted_losses(dynamics, drives, [False] * len(drives), 1.0, 1.0)[0]
+    return losses_of(dynamics, drives)[0]
 
 
 def dynamics_of(name, push=8.0):
@@ -205,7 +204,11 @@ def test_an_unstable_grip_slips_at_once():
 
 
 def losses_of(dynamics, drives, most_m=5e-3, most_rad=0.09, turning=False):
-    return predicted_losses(dynamics, drives, [turning] * len(drives), most_m, most_rad)
+    settings = ExecutionSettings(
+        mass_kg=MASS, max_mm=1000.0 * most_m, max_deg=math.degrees(most_rad)
+    )
+    trials = [Trial("weight", "weight", drive, 0, turning=turning) for drive in drives]
+    return np.reshape(predicted_losses(dynamics, trials, settings), (-1, 2)).T
 
 
 @pytest.mark.parametrize("name", ["box", "wedge"])

@@ -16,7 +16,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.records.grasps_json import load_grasps
 from scenes.settings import PhysicsSettings
 from sim_validate import main as commands
-from sim_validate.execution.asked_executions import execution_settings
+from sim_validate.execution.command import execution_settings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,

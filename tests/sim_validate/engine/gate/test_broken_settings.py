@@ -4,7 +4,6 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from sim_validate.closure.setup_toml import setup_from_tables
 from sim_validate.closure.validate import simulated_critical_friction
 from sim_validate.closure.verdict import AGREEMENT
 from sim_validate.engine.gate import require_faithful
@@ -78,7 +77,7 @@ RIGHT = (
 def refusal(surface, table, numbers, radius_m, friction=0.5):
     """The error that stops these settings, None if nothing does."""
     try:
-        setup = setup_from_tables({table: numbers}, Setup(surface=surface), "setup.toml")
+        setup = Setup.of_table({table: numbers}, usual=Setup(surface=surface))
         require_faithful(setup, friction, radius_m)
     except gc.GraspError as error:
         return error
@@ -88,7 +87,7 @@ def refusal(surface, table, numbers, radius_m, friction=0.5):
 @pytest.mark.parametrize(("surface", "table", "numbers", "kind"), EVERYDAY)
 def test_broken_settings_are_refused_before_a_grasp_is_simulated(surface, table, numbers, kind):
     error = refusal(surface, table, numbers, USUAL)
-    assert type(error) is kind
+    assert isinstance(error, kind)
     if kind is RANGE:
         assert next(iter(numbers)) in str(error)
 
@@ -138,7 +137,5 @@ def test_long_steps_and_a_hasty_squeeze_do_not_tilt_a_lightly_held_bracket(table
         vertices = example.vertices * radius_m / example.radius
         body = gc.Polyhedron.from_mesh(vertices, example.triangles, name=example.name)
         grasp = gc.plan(body, 0.5, limit=1).grasps[0]
-        found = simulated_critical_friction(
-            body, grasp, setup_from_tables(tables, Setup(), "setup.toml")
-        )
+        found = simulated_critical_friction(body, grasp, Setup.of_table(tables, usual=Setup()))
         assert found == pytest.approx(grasp.critical_friction, rel=AGREEMENT)

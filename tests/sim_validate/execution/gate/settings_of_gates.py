@@ -1,6 +1,6 @@
 """Settings with which executions must be refused, or accepted, and the cases that show it."""
 
-from sim_validate.execution.held_case import HeldCase
+from sim_validate.execution.gate import HeldCase
 
 USUAL, STIFF, SOFT = (0.3, 2000.0, 0.07), (0.05, 10_000.0, 0.02), (2.0, 500.0, 0.2)
 """Mass of the object [kg], stiffness of the springs [N/m], radius of the object [m]."""

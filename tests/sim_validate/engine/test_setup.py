@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.closure.setup_toml import setup_from_file
-from sim_validate.engine.setup import Agenda, NamedWrench, Setup
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup, physics_from_file, setup_from_file
 from sim_validate.planning.wrenches_json import weights, wrenches_from_file
 
 
@@ -42,6 +41,15 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, text, words):
     path.write_text(text)
     with pytest.raises(gc.InputError, match=words):
         setup_from_file(path, Setup())
+
+
+@pytest.mark.parametrize("read", [physics_from_file, lambda path: setup_from_file(path, Setup())])
+def test_a_file_that_is_no_toml_is_named_once(tmp_path, read):
+    path = tmp_path / "setup.toml"
+    path.write_text("[physics\n")
+    with pytest.raises(gc.InputError) as refusal:
+        read(path)
+    assert str(refusal.value).count(str(path)) == 1
 
 
 def test_wrenches_of_a_task_are_read_as_they_are(tmp_path):
