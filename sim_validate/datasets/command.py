@@ -10,8 +10,7 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
 from sim_validate.datasets import flags as dataset_flags
-from sim_validate.datasets.build import build
-from sim_validate.datasets.card import CARD
+from sim_validate.datasets.build import CARD, build
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,

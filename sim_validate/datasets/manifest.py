@@ -19,8 +19,8 @@ from grasp_core.files.json_text import object_of
 from grasp_core.files.records import RecordFile, from_record, record_of, recorded
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import Number, Range
+from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.rows import Tables, dataset_tables, groups_asked
-from sim_validate.datasets.tables import Name, SplitName
 from sim_validate.kit.paths import require_inside
 
 MANIFEST = "manifest.json"

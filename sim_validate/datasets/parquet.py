@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
 from sim_validate.datasets.columns import CellKind, Cells, Column
+from sim_validate.datasets.config import KEYS, Name
 from sim_validate.datasets.rows import TABLES, Tables
-from sim_validate.datasets.tables import KEYS, Name
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES: Mapping[CellKind, str] = {

@@ -28,7 +28,7 @@ from sim_validate.datasets.columns import (
     cells_of,
     columns_of,
 )
-from sim_validate.datasets.tables import EXECUTED, NAMES, Name, SplitName
+from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 

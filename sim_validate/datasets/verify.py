@@ -20,8 +20,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.build import CONFIG, CONTACTS, TWIN
 from sim_validate.datasets.columns import Cells
-from sim_validate.datasets.config import config_from_toml
-from sim_validate.datasets.given_contacts import read_given
+from sim_validate.datasets.config import KEYS, Name, config_from_toml, id_beginning
 from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.manifest import (
     MANIFEST,
@@ -32,12 +31,10 @@ from sim_validate.datasets.manifest import (
     read_left_out,
     read_manifest,
 )
-from sim_validate.datasets.meshes import stored_body
-from sim_validate.datasets.open_dataset import Selection, by_object
+from sim_validate.datasets.open_dataset import Selection, by_object, stored_body
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GraspRow, ObjectRow, Rows
-from sim_validate.datasets.tables import KEYS, Name, id_beginning
-from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.units import WorkUnit, provenance, read_given
 from sim_validate.datasets.verify_rows import object_faults
 from sim_validate.execution.verdict import may_slip
 from sim_validate.kit.paths import path_inside

@@ -31,12 +31,11 @@ from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS
 from sim_validate.datasets.build import CONFIG
 from sim_validate.datasets.columns import agrees
-from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.config import KEYS, NAMES, DatasetConfig
 from sim_validate.datasets.figures import Figures, hand_named, trial_cells
-from sim_validate.datasets.make_rows import PLANNED
-from sim_validate.datasets.meshes import stored_body, stored_surface
+from sim_validate.datasets.make_unit import PLANNED
+from sim_validate.datasets.open_dataset import stored_body, stored_surface
 from sim_validate.datasets.rows import GIVEN, ROUNDING, GraspRow, ObjectRow, Rows
-from sim_validate.datasets.tables import KEYS, NAMES
 from sim_validate.datasets.varied import RATIOS, VARIED
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius

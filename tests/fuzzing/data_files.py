@@ -20,13 +20,13 @@ from sim_validate.closure.setup_toml import setup_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
-from sim_validate.datasets.given_contacts import given_from_json
 from sim_validate.datasets.manifest import (
     Listed,
     Manifest,
     left_out_from,
 )
-from sim_validate.datasets.staging import UnitRecord
+from sim_validate.datasets.units import given_from_json
+from sim_validate.datasets.workers import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches

@@ -11,9 +11,8 @@ from grasp_core.processes import local_processes
 from sim_validate.datasets import workers
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, provenance, units_of
-from sim_validate.datasets.workers import Task, do_task, do_unit, drive
+from sim_validate.datasets.workers import Staging, Task, do_task, do_unit, drive
 from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
 
