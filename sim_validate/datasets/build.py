@@ -14,10 +14,10 @@ import inspect
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import read_text, write_text
@@ -46,7 +46,7 @@ from sim_validate.datasets.manifest import (
 from sim_validate.datasets.parquet import TableFiles, pyarrow
 from sim_validate.datasets.rows import ROWS, dataset_tables
 from sim_validate.datasets.units import WorkUnit, given_text, provenance, units_of, units_sha256
-from sim_validate.datasets.workers import Engine, Finished, Staging, drive
+from sim_validate.datasets.workers import Engine, Staging, UnitRecord, drive
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
 from sim_validate.kit.paths import path_inside
@@ -79,15 +79,16 @@ OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
 """Names of all files and folders that the folder of a dataset may hold."""
 
 
-@dataclass(frozen=True, slots=True)
-class Built:
-    """The result of a build: how many units of work and rows the dataset has."""
+Finished: TypeAlias = tuple[WorkUnit, UnitRecord]
+"""A unit of work that has rows, with its record."""
 
-    units: int
+
+class Built(NamedTuple):
+    """The result of a build."""
+
+    manifest: Manifest
     made: int
     """Number of units of work that were computed in this run."""
-    quarantined: int
-    rows: Mapping[str, int]
 
 
 def build(
@@ -97,10 +98,7 @@ def build(
     report: Callable[[int, int], None],
     timeout_s: float | None = None,
 ) -> Built:
-    """Build a dataset, or resume an interrupted build.
-
-    Takes `report` (finished, total).
-    """
+    """Build a dataset, or resume an interrupted build; `report` takes (finished, total)."""
     pyarrow()  # before any work, so that a missing library is named at once
     units = units_of(config)
     _refuse_sources_inside(units, config, folder)
@@ -168,7 +166,7 @@ def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
                 f"{path}: this file of a finished dataset is missing or damaged (see `dataset "
                 "verify`); give another --out to make it again"
             )
-    return Built(len(units), made, manifest.quarantined, manifest.rows)
+    return Built(manifest, made)
 
 
 def _finish(
@@ -179,8 +177,8 @@ def _finish(
         shutil.rmtree(folder / name, ignore_errors=True)
     good, quarantined = _sorted_out(units, staging)
     tables = _write_tables(config, good, staging, folder)
-    for each in good:
-        staging.copy_files(each.unit, folder)
+    for unit, _ in good:
+        staging.copy_files(unit, folder)
     given = {each.id: each for unit in units for each in unit.given}
     if given:
         in_order = [given[name] for name in sorted(given)]
@@ -211,25 +209,19 @@ def _sorted_out(
 ) -> tuple[list[Finished], list[LeftOut]]:
     """List units with rows of their own, sorted by object, and the reasons why others have none."""
     good, quarantined = list[Finished](), list[LeftOut]()
-    first: dict[tuple[str, float], str] = {}
+    first: dict[tuple[str | None, float], str] = {}
     for unit in sorted(units, key=lambda each: (each.object, each.friction)):
-        found = staging.result(unit)
-        if isinstance(found, Finished):
-            other = first.setdefault((found.object_id, unit.friction), unit.object)
+        record = staging.record(unit)
+        reason = record.reason
+        if reason is None:
+            other = first.setdefault((record.object_id, unit.friction), unit.object)
             if other == unit.object:
-                good.append(found)
+                good.append((unit, record))
                 continue
-            found = f"{TWIN} {other}"
-        quarantined.append(
-            LeftOut(
-                object=unit.object,
-                source_sha256=unit.source_sha256,
-                friction=unit.friction,
-                given=tuple(each.id for each in unit.given),
-                reason=found,
-            )
-        )
-    return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
+            reason = f"{TWIN} {other}"
+        given = tuple(each.id for each in unit.given)
+        quarantined.append(LeftOut(unit.object, unit.source_sha256, unit.friction, given, reason))
+    return sorted(good, key=lambda each: (str(each[1].object_id), each[0].friction)), quarantined
 
 
 def _write_tables(
@@ -238,12 +230,11 @@ def _write_tables(
     tables = dataset_tables(config.groups)
     about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
     with TableFiles(folder / DATA, about, tables) as files:
-        for _, same in groupby(good, key=lambda each: each.object_id):
-            of_object = list(same)
+        for (_, split), same in groupby(good, key=lambda each: (each[1].object_id, each[1].split)):
+            of_object = [unit for unit, _ in same]
             for name in tables:
                 chosen = of_object[:1] if name == "objects" else of_object
-                paths = [staging.table(each.unit, name) for each in chosen]
-                files.add(name, of_object[0].split, paths)
+                files.add(name, str(split), [staging.table(unit, name) for unit in chosen])
         return [
             replace(listed(folder, path), table=name, split=split, rows=rows)
             for name, split, path, rows in files.close()

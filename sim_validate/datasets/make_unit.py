@@ -5,36 +5,48 @@ Rows are of one object at one friction; its split is chosen by the hash of its m
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.given_contacts import Seated, grasp_of, seat
+from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
 from grasp_core.values import Contact, Grasp
 from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict, try_control
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
-from sim_validate.datasets.columns import figures_in
+from sim_validate.datasets.columns import Cells, figures_in
 from sim_validate.datasets.config import SPLITS, SplitName, id_beginning
 from sim_validate.datasets.figures import (
     Executed,
-    Figures,
+    closed_cells,
+    contact_cells,
     executed_by,
     execution_cells,
     execution_rows,
+    squeeze_cells,
 )
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
-from sim_validate.datasets.rows import GIVEN, ExecutionRow, GraspRow, ObjectRow, Rows, TrialRow
+from sim_validate.datasets.rows import (
+    GIVEN,
+    VARIED,
+    ExecutionRow,
+    GraspRow,
+    ObjectRow,
+    Rows,
+    TrialRow,
+)
 from sim_validate.datasets.units import GivenGrasp, WorkUnit
-from sim_validate.datasets.varied import VARIED, Tried, Varying, ratio_of, validated_with
+from sim_validate.datasets.varied import Tried, Varying, ratio_of, validated_with
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
+
+PLANNED = "planned"
+"""Kind of the grasps that were planned for their friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,90 +65,9 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
         making.judge()
     else:
         making.plan()
-    return Made(making.found.made, making.files)
-
-
-class _Making:
-    """The rows and files of a unit of work while they are made."""
-
-    def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
-        self.unit, self.body = unit, body
-        self.found = MakingRows(body, unit)
-        path = mesh_path(Path(), body.content_sha256)
-        self.files = {path.as_posix(): mesh_text(body)}
-        config = unit.config
-        self.agenda = Agenda(
-            random_wrenches=config.random_wrenches, limits=config.limits, seed=config.seed
-        )
-
-    def plan(self) -> None:
-        """Plan the best grasps of each family separately, and simulate them."""
-        config = self.unit.config
-        for family in config.families:
-            planned = plan(
-                self.body, self.unit.friction, families=(family,), cones=config.cones,
-                limit=config.limit, seed=config.seed,
-            )  # fmt: skip
-            for grasp in planned.grasps:
-                tried, executed = self._tried(grasp, self.body), self._executed(grasp, self.body)
-                self.found.add(grasp, tried, executed)
-                self._vary(grasp, self.body, tried, executed)
-
-    def judge(self) -> None:
-        """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
-        for given in self.unit.given:
-            try:
-                self._judge(given)
-            except (InputError, UndecidedError) as error:
-                self.found.add_untried(given, str(error))
-
-    def _judge(self, given: GivenGrasp) -> None:
-        friction = self.unit.friction
-        seated = seat(self.body, given.points, given.normals)
-        grasp = grasp_of(seated, friction, given.id)
-        if isinstance(grasp, Grasp):
-            tried, executed = self._tried(grasp, seated.body), self._executed(grasp, seated.body)
-            self.found.add_given(given, grasp, tried, seated, executed)
-            self._vary(grasp, seated.body, tried, executed)
-            return
-        control = Control(GIVEN, friction, grasp)
-        verdict = try_control(seated.body, control, self.agenda, Setup())
-        self.found.add_open(given, verdict, seated.moved_m)
-
-    def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
-        asked = self.unit.config.learning
-        verdict = validated_with(body, grasp, self.unit.friction, self.agenda, asked)
-        if self.unit.config.scenes and verdict.scene is not None:
-            self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
-        return verdict
-
-    def _vary(self, grasp: Grasp, body: Polyhedron, verdict: Verdict, executed: Executed) -> None:
-        config = self.unit.config
-        if config.learning is None:
-            return
-        varying = Varying(config.learning, self.unit.friction, self.agenda, config.execution)
-        for each in varying.of(body, grasp, verdict, executed):
-            self.found.add_varied(grasp.id, each)
-
-    def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
-        asked = self.unit.config.execution
-        if asked is None:
-            return None
-        try:
-            settings, learning = asked.for_body(body), self.unit.config.learning
-            job = ExecutionJob(body, grasp, self.unit.friction, settings, enough=False)
-            return executed_by(
-                lambda each: executed_grasp(replace(job, settings=each)), settings,
-                () if learning is None else learning.seeds,
-            )  # fmt: skip
-        except InputError as error:
-            return str(error)
-
-
-Begun: TypeAlias = partial[GraspRow]
-"""A row with some of its cells, which lacks others."""
-PLANNED = "planned"
-"""Kind of the grasps that were planned for their friction."""
+    trials, executions = tuple(making.trials), tuple(making.executions)
+    rows = Rows((_object_row(body, unit),), tuple(making.grasps), trials, executions)
+    return Made(rows, making.files)
 
 
 def split_of(object_id: str, seed: int) -> SplitName:
@@ -146,8 +77,7 @@ def split_of(object_id: str, seed: int) -> SplitName:
     return next(name for name, upto in SPLITS if share < upto)
 
 
-def object_row(body: Polyhedron, unit: WorkUnit) -> ObjectRow:
-    """Make the row of a unit's object."""
+def _object_row(body: Polyhedron, unit: WorkUnit) -> ObjectRow:
     return ObjectRow(
         object_id=body.content_sha256,
         source_name=Path(unit.object).name,
@@ -164,53 +94,93 @@ def object_row(body: Polyhedron, unit: WorkUnit) -> ObjectRow:
     )
 
 
-@dataclass(slots=True)
-class MakingRows:
-    """Rows of one object at one friction, while they are made."""
+class _Making:
+    """The rows and files of a unit of work while they are made."""
 
-    body: Polyhedron
-    unit: WorkUnit
-    grasps: list[GraspRow] = field(default_factory=list[GraspRow])
-    trials: list[TrialRow] = field(default_factory=list[TrialRow])
-    executions: list[ExecutionRow] = field(default_factory=list[ExecutionRow])
+    def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
+        self.unit, self.body, self.config = unit, body, unit.config
+        self.grasps, self.trials = list[GraspRow](), list[TrialRow]()
+        self.executions = list[ExecutionRow]()
+        self.files = {mesh_path(Path(), body.content_sha256).as_posix(): mesh_text(body)}
+        self.agenda = Agenda(
+            random_wrenches=self.config.random_wrenches, limits=self.config.limits,
+            seed=self.config.seed,
+        )  # fmt: skip
 
-    @property
-    def made(self) -> Rows:
-        """The rows, with that of the object."""
-        row = object_row(self.body, self.unit)
-        return Rows((row,), tuple(self.grasps), tuple(self.trials), tuple(self.executions))
+    def plan(self) -> None:
+        """Plan the best grasps of each family separately, and simulate them."""
+        config = self.config
+        for family in config.families:
+            planned = plan(
+                self.body, self.unit.friction, families=(family,), cones=config.cones,
+                limit=config.limit, seed=config.seed,
+            )  # fmt: skip
+            for grasp in planned.grasps:
+                begun = self._begun(
+                    grasp.contacts, grasp_id=self._name(grasp.id), name=grasp.id, label="grasp",
+                    kind=PLANNED, family=grasp.family, faces=grasp.faces,
+                    region_radius_m=grasp.radius,
+                )  # fmt: skip
+                self._try(begun, grasp, self.body)
 
-    def add(self, grasp: Grasp, verdict: Verdict, executed: Executed = None) -> None:
-        """Add the rows of a planned grasp, its negative controls, and the trials of all."""
-        begun = self._begun(grasp.contacts, name=grasp.id, label="grasp", kind=PLANNED)
-        begun = partial(
-            begun,
-            grasp_id=self.name(grasp.id),
-            family=grasp.family,
-            faces=grasp.faces,
-            region_radius_m=grasp.radius,
-        )
-        self._add_closed(begun, grasp, verdict, executed, self.body)
+    def judge(self) -> None:
+        """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
+        for given in self.unit.given:
+            try:
+                self._judge(given)
+            except (InputError, UndecidedError) as error:
+                contacts = tuple(map(Contact, np.array(given.points), np.array(given.normals)))
+                row = GraspRow(**self._begun_given(given, contacts, note=str(error)))
+                self.grasps.append(row)
 
-    def add_given(
-        self, given: GivenGrasp, grasp: Grasp, verdict: Verdict, seated: Seated,
-        executed: Executed = None,
-    ) -> None:  # fmt: skip
-        """Add rows of a force-closed given grasp, its negative controls, and all trials."""
-        begun = self._begun_given(given, grasp.contacts, moved_m=seated.moved_m)
-        begun = partial(begun, faces=self._faces(grasp))
-        self._add_closed(begun, grasp, verdict, executed, seated.body)
+    def _judge(self, given: GivenGrasp) -> None:
+        """Try a given grasp; one that is not in force closure is a negative control."""
+        seated = seat(self.body, given.points, given.normals)
+        proved = grasp_of(seated, self.unit.friction, given.id)
+        begun = self._begun_given(given, seated.contacts, moved_m=seated.moved_m)
+        if isinstance(proved, Grasp):
+            self._try(begun | {"faces": self._faces(proved)}, proved, seated.body)
+        else:
+            control = Control(GIVEN, self.unit.friction, proved)
+            self._add_refuted(begun, try_control(seated.body, control, self.agenda, Setup()))
 
-    def add_varied(self, made_from: str, tried: Tried) -> None:
+    def _try(self, begun: Cells, grasp: Grasp, body: Polyhedron) -> None:
+        """Simulate a grasp and what is varied of it, and add all rows."""
+        config, friction = self.config, self.unit.friction
+        verdict = validated_with(body, grasp, friction, self.agenda, config.learning)
+        if config.scenes and verdict.scene is not None:
+            self.files[f"scenes/{self._name(grasp.id)}.xml"] = verdict.scene.xml
+        executed = self._executed(grasp, body)
+        self._add_closed(begun, grasp, verdict, executed, body)
+        if config.learning is not None:
+            varying = Varying(config.learning, friction, self.agenda, config.execution)
+            for each in varying.of(body, grasp, verdict, executed):
+                self._add_varied(self._name(grasp.id), each)
+
+    def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
+        asked, learning = self.config.execution, self.config.learning
+        if asked is None:
+            return None
+        try:
+            settings = asked.for_body(body)
+            job = ExecutionJob(body, grasp, self.unit.friction, settings, enough=False)
+            return executed_by(
+                lambda each: executed_grasp(replace(job, settings=each)), settings,
+                () if learning is None else learning.seeds,
+            )  # fmt: skip
+        except InputError as error:
+            return str(error)
+
+    def _add_varied(self, made_from: str, tried: Tried) -> None:
         """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
-        variant, verdict = tried.variant, tried.verdict
+        variant, verdict, proved = tried.variant, tried.verdict, tried.variant.proved
         begun = self._begun(
-            variant.seated.contacts, name=variant.name, label=VARIED, kind=variant.kind
-        )
-        begun = partial(
-            begun,
-            grasp_id=f"{self.name(made_from)}:{variant.name}",
-            made_from=self.name(made_from),
+            variant.seated.contacts,
+            grasp_id=f"{made_from}:{variant.name}",
+            name=variant.name,
+            label=VARIED,
+            kind=variant.kind,
+            made_from=made_from,
             friction=variant.friction,
             friction_ratio=variant.friction_ratio,
             displaced_m=variant.displaced_m,
@@ -218,135 +188,111 @@ class MakingRows:
             mass_ratio=variant.mass_ratio,
         )
         if isinstance(verdict, ControlVerdict):
-            begun = partial(begun, critical_friction=variant.critical_friction)
+            begun |= {"critical_friction": variant.critical_friction}
             self._add_refuted(begun, verdict, tried.executed)
         else:
-            assert isinstance(variant.proved, Grasp)  # noqa: S101 - only closed ones have verdicts
-            begun = partial(begun, faces=self._faces(variant.proved))
-            self._add_closed(begun, variant.proved, verdict, tried.executed, variant.seated.body)
+            assert isinstance(proved, Grasp)  # noqa: S101 - only closed ones have verdicts
+            begun |= {"faces": self._faces(proved)}
+            self._add_closed(begun, proved, verdict, tried.executed, variant.seated.body)
 
-    def add_open(self, given: GivenGrasp, verdict: ControlVerdict, moved_m: float) -> None:
-        """Add rows of a given grasp that is not force-closed; it is a negative control."""
-        begun = self._begun_given(given, verdict.control.contacts, moved_m=moved_m)
-        self._add_refuted(begun, verdict)
-
-    def add_untried(self, given: GivenGrasp, why: str) -> None:
-        """Add the row of a given grasp that cannot be simulated."""
-        contacts = [
-            Contact(np.array(point), np.array(normal))
-            for point, normal in zip(given.points, given.normals, strict=True)
-        ]
-        self.grasps.append(self._begun_given(given, contacts, note=why)())
-
-    def _begun(self, contacts: Sequence[Contact], **more: Any) -> Begun:
-        """Begin a row with what is known of any contacts."""
-        figures = self._figures
-        return partial(
-            GraspRow,
-            object_id=self.body.content_sha256,
-            split=split_of(self.body.content_sha256, self.unit.config.seed),
-            friction=self.unit.friction,
-            contacts=len(contacts),
-            contact_points_m=[contact.position.tolist() for contact in contacts],
-            contact_normals=[contact.normal.tolist() for contact in contacts],
-            **({} if figures is None else figures.of_contacts(self.body, contacts)),
+    def _begun(self, contacts: Sequence[Contact], **more: Any) -> dict[str, Any]:
+        """Return the cells that are known of any contacts, and more."""
+        return {
+            "object_id": self.body.content_sha256,
+            "split": split_of(self.body.content_sha256, self.config.seed),
+            "friction": self.unit.friction,
+            "contacts": len(contacts),
+            "contact_points_m": [contact.position.tolist() for contact in contacts],
+            "contact_normals": [contact.normal.tolist() for contact in contacts],
+            **contact_cells(self.config, self.body, contacts),
             **more,
-        )
+        }
 
-    def _begun_given(self, given: GivenGrasp, contacts: Sequence[Contact], **more: Any) -> Begun:
-        names = {"grasp_id": self.name(given.id), "name": given.name}
-        return self._begun(contacts, label=GIVEN, kind=GIVEN, **names, **more)
+    def _begun_given(
+        self, given: GivenGrasp, contacts: Sequence[Contact], **more: Any
+    ) -> dict[str, Any]:
+        more |= {"grasp_id": self._name(given.id), "name": given.name}
+        return self._begun(contacts, label=GIVEN, kind=GIVEN, **more)
 
     def _faces(self, grasp: Grasp) -> tuple[int, ...] | None:
         """Return faces of the object; on curved surfaces contacts have some made for them alone."""
         return None if self.body.patches is not None else grasp.faces
 
-    def _add_closed(
-        self, begun: Begun, grasp: Grasp, verdict: Verdict, executed: Executed, body: Polyhedron
-    ) -> None:
-        figures = self._figures
-        proved = partial(
-            GraspRow,
-            force_closed=True,
-            closure_margin=grasp.closure_margin,
-            critical_friction=grasp.critical_friction,
-            region_kind=grasp.regions[0].kind,
-            region_radii_m=[region.inscribed_radius for region in grasp.regions],
-            ferrari_canny_lower_n=grasp.ferrari_canny[0],
-            ferrari_canny_upper_n=grasp.ferrari_canny[1],
-            held=verdict.held,
-            outcome=verdict.outcome.value,
-            trials=len(verdict.wrenches),
-            mismatches=len(verdict.mismatches),
-            verdict=figures_in(GraspRow, "verdict", verdict),
-            friction_ratio=ratio_of(verdict.friction, grasp.critical_friction),
-            **({} if figures is None else figures.of_grasp(body, grasp, verdict.friction)),
-        )
-        row = self._added(partial(proved, **begun.keywords), verdict.wrenches, executed, body)
-        for control in verdict.controls:
-            kind = control.control.name
-            refuted = self._begun(control.control.contacts, name=row.name, label=kind, kind=kind)
-            grasp_id = f"{row.grasp_id}:{kind}"
-            refuted = partial(refuted, grasp_id=grasp_id, control_of=row.grasp_id)
-            self._add_refuted(refuted, control)
-
-    def _add_refuted(
-        self, begun: Begun, verdict: ControlVerdict, executed: Executed = None
-    ) -> None:
-        control = verdict.control
-        first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
-        begun = partial(
-            begun,
-            friction=control.friction,
-            force_closed=False,
-            closure_margin=control.certificate.margin,
-            held=first is None,
-            outcome=(Outcome.HELD if first is None else first.hold.outcome).value,
-            trials=len(verdict.tried),
-            mismatches=int(not verdict.let_go),
-        )
-        self._added(begun, verdict.tried, executed, self.body)
-
-    def _added(
-        self, begun: Begun, tried: Sequence[WrenchVerdict] | Sequence[ControlTrial],
-        executed: Executed, body: Polyhedron,
-    ) -> GraspRow:  # fmt: skip
-        """Add a row with what its execution found, and the rows of its trials."""
-        row = begun(**execution_cells(executed))
-        figures = self._figures
-        if figures is not None and row.mass_kg is not None:
-            row = replace(row, **figures.of_executed(body, row.placed, row.friction, row.mass_kg))
-        self.grasps.append(row)
-        self.trials += [_trial_row(row.grasp_id, number, each) for number, each in enumerate(tried)]
-        asked = self.unit.config.execution
-        if asked is not None:
-            more = () if figures is None else figures.asked.seeds
-            seeds = (asked.seed, *more)
-            self.executions += execution_rows(row.grasp_id, executed, seeds, asked.misplacements)
-        return row
-
-    @property
-    def _figures(self) -> Figures | None:
-        config = self.unit.config
-        if config.learning is None:
-            return None
-        return Figures(config.learning, config.execution, config.seed)
-
-    def name(self, grasp: str) -> str:
+    def _name(self, grasp: str) -> str:
         """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
+    def _add_closed(
+        self, begun: Cells, grasp: Grasp, verdict: Verdict, executed: Executed, body: Polyhedron
+    ) -> None:
+        """Add the rows of a grasp in force closure, of its negative controls, and of all trials."""
+        proved = {
+            "force_closed": True,
+            "closure_margin": grasp.closure_margin,
+            "critical_friction": grasp.critical_friction,
+            "region_kind": grasp.regions[0].kind,
+            "region_radii_m": [region.inscribed_radius for region in grasp.regions],
+            "ferrari_canny_lower_n": grasp.ferrari_canny[0],
+            "ferrari_canny_upper_n": grasp.ferrari_canny[1],
+            "held": verdict.held,
+            "outcome": verdict.outcome.value,
+            "trials": len(verdict.wrenches),
+            "mismatches": len(verdict.mismatches),
+            "verdict": figures_in(GraspRow, "verdict", verdict),
+            "friction_ratio": ratio_of(verdict.friction, grasp.critical_friction),
+            **closed_cells(self.config, body, grasp, verdict.friction),
+        }
+        row = self._added(proved | {**begun}, verdict.wrenches, executed, body)
+        for each in verdict.controls:
+            kind = each.control.name
+            refuted = self._begun(
+                each.control.contacts, grasp_id=f"{row.grasp_id}:{kind}", name=row.name,
+                label=kind, kind=kind, control_of=row.grasp_id,
+            )  # fmt: skip
+            self._add_refuted(refuted, each)
+
+    def _add_refuted(
+        self, begun: Cells, verdict: ControlVerdict, executed: Executed = None
+    ) -> None:
+        """Add the rows of contacts that are proved not to be in force closure, and their trials."""
+        control = verdict.control
+        first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
+        refuted = {
+            "friction": control.friction,
+            "force_closed": False,
+            "closure_margin": control.certificate.margin,
+            "held": first is None,
+            "outcome": (Outcome.HELD if first is None else first.hold.outcome).value,
+            "trials": len(verdict.tried),
+            "mismatches": int(not verdict.let_go),
+        }
+        self._added({**begun, **refuted}, verdict.tried, executed, self.body)
+
+    def _added(
+        self, cells: Cells, tried: Sequence[WrenchVerdict] | Sequence[ControlTrial],
+        executed: Executed, body: Polyhedron,
+    ) -> GraspRow:  # fmt: skip
+        """Add a row with what its execution found, and the rows of its trials."""
+        row = GraspRow(**cells, **execution_cells(executed))
+        if row.mass_kg is not None:
+            more = squeeze_cells(self.config, body, row.placed, row.friction, row.mass_kg)
+            row = replace(row, **more)
+        self.grasps.append(row)
+        self.trials += [_trial_row(row.grasp_id, number, each) for number, each in enumerate(tried)]
+        self.executions += execution_rows(row.grasp_id, executed, self.config)
+        return row
+
 
 def _trial_row(grasp_id: str, number: int, tried: WrenchVerdict | ControlTrial) -> TrialRow:
-    planned = isinstance(tried, WrenchVerdict)
+    planned = tried if isinstance(tried, WrenchVerdict) else None
     return TrialRow(
         grasp_id=grasp_id,
         trial=number,
         name=tried.name,
         wrench_n_nm=tried.wrench,
-        predicted_limit=tried.predicted_limit if planned else None,
+        predicted_limit=planned and planned.predicted_limit,
         required_friction=tried.required_friction,
         hold=tried.hold,
-        simulated_limit=tried.simulated_limit if planned else None,
-        verdict=figures_in(TrialRow, "verdict", tried if planned else None),
+        simulated_limit=planned and planned.simulated_limit,
+        verdict=figures_in(TrialRow, "verdict", planned),
     )

@@ -40,8 +40,16 @@ from sim_validate.datasets.config import (
 )
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
-from sim_validate.datasets.rows import GIVEN, ROWS, GraspRow, ObjectRow, Rows, Tables, TrialRow
-from sim_validate.datasets.varied import VARIED
+from sim_validate.datasets.rows import (
+    GIVEN,
+    ROWS,
+    VARIED,
+    GraspRow,
+    ObjectRow,
+    Rows,
+    Tables,
+    TrialRow,
+)
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.kit.paths import path_inside
 from sim_validate.planning.grasps_json import NAMED, some

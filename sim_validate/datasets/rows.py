@@ -34,6 +34,8 @@ from sim_validate.execution.verdict import Execution, ExecutionTrial
 
 GIVEN = "given"
 """Label of grasps that another tool made."""
+VARIED = "varied"
+"""Label of rows that are made from a grasp and may hold or not."""
 NOT_TRIED = "not_tried"
 """Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
 anything else about them."""

@@ -43,6 +43,7 @@ from sim_validate.closure.validate import tested, validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.config import CONTROLS, Learning
 from sim_validate.datasets.figures import Executed, executed_by
+from sim_validate.datasets.rows import VARIED
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute
@@ -67,8 +68,6 @@ UNMOVED = (None,) * FINGERS
 """What is known of the regions' ends where no contact moved."""
 LEAST_WAY = 0.1
 """Least way that a contact's move is measured by, in object radii: regions may be points."""
-VARIED = "varied"
-"""Label of rows that are made from a grasp and may hold or not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -81,15 +81,6 @@ class UnitRecord(RecordFile):
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
-    """A finished unit of work that has rows."""
-
-    unit: WorkUnit
-    object_id: str
-    split: SplitName
-
-
-@dataclass(frozen=True, slots=True)
 class Staging:
     """The folder that holds finished units of work until the dataset is complete."""
 
@@ -122,20 +113,16 @@ class Staging:
         """Record that a unit cannot be computed, with the reason."""
         self._put(unit, {}, reason=reason)
 
-    def result(self, unit: WorkUnit) -> Finished | str:
+    def record(self, unit: WorkUnit) -> UnitRecord:
         """Look up how a unit ended: with its object and split, or with a reason for no rows."""
-        record = self._record(unit)
-        if record.object_id is None or record.split is None:
-            return record.reason or ""
-        return Finished(unit, record.object_id, record.split)
+        return UnitRecord.read(self._of(unit) / UnitRecord.FILE)
 
     def done(self, unit: WorkUnit) -> bool:
         """Tell whether a unit is finished or quarantined, and all its files are as written."""
         try:
-            record = self._record(unit)
             return all(
                 _sha256(read_bytes(path_inside(self._of(unit), name), MOST_BYTES)) == sha256
-                for name, sha256 in record.files.items()
+                for name, sha256 in self.record(unit).files.items()
             )
         except (OSError, InputError):
             return False
@@ -158,9 +145,6 @@ class Staging:
 
     def _of(self, unit: WorkUnit) -> Path:
         return self.folder / unit.id
-
-    def _record(self, unit: WorkUnit) -> UnitRecord:
-        return UnitRecord.read(self._of(unit) / UnitRecord.FILE)
 
     def _put(self, unit: WorkUnit, files: Mapping[str, bytes], **more: Any) -> None:
         hashes = {name: _sha256(data) for name, data in files.items()}

@@ -48,7 +48,7 @@ def dataset(tmp_path_factory):
         license="CC-BY-4.0",
     )
     built = build(config, folder / "ds", Here(), silent)
-    assert (built.units, built.quarantined) == (6, 0)
+    assert (built.manifest.units, built.manifest.quarantined) == (6, 0)
     return folder / "ds"
 
 
