@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, cast, get_args
+from typing import Annotated, Literal, TypeAlias, cast, get_args
 
 from grasp_core.checked import MOST_COUNT, shown
 from grasp_core.errors import InputError, about
@@ -215,12 +215,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
     given = read_tables(path)
     with about(path):
-        return config_from_settings(given)
-
-
-def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
-    """Build a configuration from named settings with the types that TOML has."""
-    return DatasetConfig.of_table(given)
+        return DatasetConfig.of_table(given)
 
 
 def _is_date(text: str) -> bool:

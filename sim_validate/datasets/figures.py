@@ -4,15 +4,15 @@ A cell is null where its figure does not exist for the contacts: fewer than four
 contacts that are not in force closure no witness forces.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any, TypeAlias
 
-from grasp_core.closure.contacts import stacked
+from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.cones.spanning import span_angle
-from grasp_core.errors import GraspError
+from grasp_core.errors import GraspError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
 from grasp_core.hands.named_hands import load_hand
@@ -21,9 +21,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.values import FINGERS, Contact, Grasp
 from sim_validate.datasets.columns import Cells, figures_in
-from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.rows import ExecutionRow, GraspRow
-from sim_validate.execution.execute import tip_radius
+from sim_validate.execution.execute import execute, tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
 from sim_validate.settings.executions import ExecutionSettings, TrialKind
 
@@ -71,22 +71,29 @@ def trial_cells(trials: Sequence[ExecutionTrial]) -> dict[str, Any]:
 
 
 def executed_by(
-    execute: Callable[[ExecutionSettings], ExecutedGrasp], settings: ExecutionSettings,
-    seeds: Sequence[int],
+    body: Polyhedron, contacts: Sequence[Contact], friction: float, settings: ExecutionSettings,
+    asked: Learning | None, name: str,
 ) -> ExecutedGrasp:  # fmt: skip
-    """Execute contacts, and once more for each seed with objects misplaced by it."""
-    first = execute(settings)
-    if first.execution is None or MISPLACED not in settings.trials:
-        return first
-    trials = list(first.execution.trials)
-    for place, seed in enumerate(seeds, start=1):
-        more = execute(replace(settings, trials=(MISPLACED,), seed=seed)).execution
-        of_seed = () if more is None else more.trials
+    """Execute contacts, and once more for each seed asked for with objects misplaced by it.
+
+    Contacts without a squeeze are a result with a reason.
+    """
+    about = name, "", contacts_sha256(contacts)
+    try:
+        first = execute(body, contacts, friction, settings, enough=False)
+    except NoForcesError as error:
+        return ExecutedGrasp(*about, None, str(error))
+    if asked is None or MISPLACED not in settings.trials:
+        return ExecutedGrasp(*about, first)
+    trials = list(first.trials)
+    for place, seed in enumerate(asked.seeds, start=1):
+        again = replace(settings, trials=(MISPLACED,), seed=seed)
+        more = execute(body, contacts, friction, again, enough=False).trials
         trials += [
             replace(trial, name=f"{MISPLACED} {place * settings.misplacements + number}")
-            for number, trial in enumerate(of_seed)
+            for number, trial in enumerate(more)
         ]
-    return replace(first, execution=replace(first.execution, trials=tuple(trials)))
+    return ExecutedGrasp(*about, replace(first, trials=tuple(trials)))
 
 
 def execution_rows(name: str, executed: Executed, config: DatasetConfig) -> Iterator[ExecutionRow]:

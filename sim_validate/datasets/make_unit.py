@@ -43,7 +43,6 @@ from sim_validate.datasets.units import GivenGrasp, WorkUnit
 from sim_validate.datasets.varied import Tried, Varying, ratio_of, validated_with
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.execution.jobs import ExecutionJob, executed_grasp
 
 PLANNED = "planned"
 """Kind of the grasps that were planned for their friction."""
@@ -158,16 +157,12 @@ class _Making:
                 self._add_varied(self._name(grasp.id), each)
 
     def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
-        asked, learning = self.config.execution, self.config.learning
-        if asked is None:
+        config, friction = self.config, self.unit.friction
+        if config.execution is None:
             return None
         try:
-            settings = asked.for_body(body)
-            job = ExecutionJob(body, grasp, self.unit.friction, settings, enough=False)
-            return executed_by(
-                lambda each: executed_grasp(replace(job, settings=each)), settings,
-                () if learning is None else learning.seeds,
-            )  # fmt: skip
+            settings = config.execution.for_body(body)
+            return executed_by(body, grasp.contacts, friction, settings, config.learning, grasp.id)
         except InputError as error:
             return str(error)
 
