@@ -277,16 +277,15 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
 def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
     for name, columns in manifest.tables.items():
         splits = {
-            split: sum(each.rows or 0 for each in manifest.of_table(name) if each.split == split)
+            split: manifest.count(name, split)
             for split, _ in reversed(SPLITS)
-            if any(each.split == split for each in manifest.of_table(name))
+            if manifest.of_table(name, split)
         }
-        keys = " and ".join(f"`{key}`" for key in KEYS[name])
         yield {
             "name": name,
             "row": inspect.getdoc(ROWS[name]),
             "splits": splits,
-            "sorted_by": keys,
+            "sorted_by": " and ".join(f"`{key}`" for key in KEYS[name]),
             "columns": columns,
         }
 

@@ -1,11 +1,9 @@
 """Reads a finished dataset, or one split of it: its tables as arrays, or row by row.
 
 All tables are sorted by the beginning of their rows' names, which are the first letters of the
-object's hash, so that rows can be read grouped by object, with only one object in memory.
-
-Meshes are files in metres that give exactly the same solid.
-
-A contact set can be taken out with how its trials ended, to be simulated again.
+object's hash, so that rows can be read grouped by object, with only one object in memory. Meshes
+are files in metres that give exactly the same solid. A contact set can be taken out with how its
+trials ended, to be simulated again.
 """
 
 import hashlib
@@ -70,16 +68,16 @@ class Selection:
 
     def paths(self, name: Name) -> list[Path]:
         """List the files of a table, each checked to be unchanged."""
-        return [self._whole(each) for each in self._listed(name)]
+        return [self._whole(each) for each in self.manifest.of_table(name, self.split)]
 
     def counts(self) -> dict[Name, int]:
         """Number of rows of each table."""
-        return {name: sum(each.rows or 0 for each in self._listed(name)) for name in self.tables}
+        return {name: self.manifest.count(name, self.split) for name in self.tables}
 
     def rows(self, kind: type[RowOf], **cells: str | bool) -> Iterator[RowOf]:
         """Yield rows of a class, or those with some cells, without holding all in memory."""
         name: Name = next(name for name, each in ROWS.items() if each is kind)
-        for each in self._listed(name):
+        for each in self.manifest.of_table(name, self.split):
             found = 0
             for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
                 for number, row in enumerate(batch.to_pylist(), start=found):
@@ -107,9 +105,6 @@ class Selection:
             )
         return path
 
-    def _listed(self, name: Name) -> list[Listed]:
-        return [each for each in self.manifest.of_table(name) if self.split in (None, each.split)]
-
     def config(self) -> DatasetConfig:
         """Read the configuration of the dataset."""
         return config_from_toml(self.folder / "config.toml")
@@ -136,11 +131,7 @@ def select(folder: Path, split: str | None = None) -> Selection:
 
 def splits_in_words(manifest: Manifest) -> str:
     """Say how many objects each split has."""
-    files = manifest.of_table("objects")
-    counts = [
-        f"{split} {sum(each.rows or 0 for each in files if each.split == split)}"
-        for split, _ in reversed(SPLITS)
-    ]
+    counts = [f"{split} {manifest.count('objects', split)}" for split, _ in reversed(SPLITS)]
     return f"{', '.join(counts)} objects"
 
 

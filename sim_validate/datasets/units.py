@@ -73,11 +73,6 @@ def given_text(given: Sequence[GivenGrasp]) -> str:
     return json.dumps({"grasps": grasps}, indent=1) + "\n"
 
 
-def given_sha256(given: Sequence[GivenGrasp]) -> str:
-    """Hash the names and numbers of given grasps."""
-    return hashlib.sha256(json.dumps([astuple(grasp) for grasp in given]).encode()).hexdigest()
-
-
 def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
     """Parse contacts to judge from the text of a contacts file."""
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
@@ -133,10 +128,12 @@ class WorkUnit:
     @property
     def id(self) -> str:
         """Name of the unit: 32 hexadecimal digits, the same wherever the mesh file lies."""
-        settings = shared_settings(self.config)
-        given = given_sha256(self.given)
+        table = as_table(self.config)
+        settings = {name: value for name, value in table.items() if name not in APART}
+        given = json.dumps([astuple(grasp) for grasp in self.given])
+        digest = hashlib.sha256(given.encode()).hexdigest()
         own = sorted(provenance().items())
-        decisive = [self.source_sha256, self.friction, given, settings, own]
+        decisive = [self.source_sha256, self.friction, digest, settings, own]
         return hashlib.sha256(json.dumps(decisive).encode()).hexdigest()[:32]
 
 
@@ -159,11 +156,6 @@ def provenance() -> Mapping[str, str]:
             digest.update(path.read_bytes())
     more = {"pyarrow": version("pyarrow"), "code_sha256": digest.hexdigest()}
     return MappingProxyType(versions() | more)
-
-
-def shared_settings(config: DatasetConfig) -> dict[str, object]:
-    """Return the settings that decide the rows of every unit, such as the seed, but no objects."""
-    return {name: value for name, value in as_table(config).items() if name not in APART}
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:

@@ -20,7 +20,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.build import CONFIG, CONTACTS, TWIN
 from sim_validate.datasets.columns import Cells
-from sim_validate.datasets.config import KEYS, Name, config_from_toml, id_beginning
+from sim_validate.datasets.config import KEYS, DatasetConfig, Name, config_from_toml, id_beginning
 from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.manifest import (
     MANIFEST,
@@ -69,8 +69,9 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
         return faults
     faults: list[str] = []
     try:
-        faults += _manifest_faults(folder, manifest)
-        faults += _content_faults(folder, manifest)
+        config = config_from_toml(folder / CONFIG)
+        faults += _manifest_faults(folder, manifest, config)
+        faults += _content_faults(folder, manifest, config)
         if sample is not None and not faults:
             faults += _sample_faults(folder, manifest, sample)
     except InputError as error:
@@ -78,8 +79,7 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     return faults
 
 
-def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    config = config_from_toml(folder / CONFIG)
+def _content_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
     for each in manifest.files:
         if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
             yield (
@@ -121,8 +121,7 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
             yield f"{each.path}: the file differs from what was written (its sha256 differs)"
 
 
-def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    config = config_from_toml(folder / CONFIG)
+def _manifest_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
     if manifest.groups != config.groups:
