@@ -170,8 +170,8 @@ class GraspItem(_SuiteItem):
     def runtest(self) -> None:
         """Fail if the grasp is worse, gone, missing or new, or cannot be compared."""
         from grasp_core.errors import GraspError
+        from sim_validate.baselines.check import explained, passing
         from sim_validate.baselines.compare import Status, failing
-        from sim_validate.baselines.explain import explained, passing
         from sim_validate.baselines.part import ChangedPartError
 
         suite = self.suite
@@ -198,7 +198,7 @@ class BlessItem(_SuiteItem):
 
     def runtest(self) -> None:
         """Simulate all grasps and write the baseline."""
-        from sim_validate.baselines.explain import written
+        from sim_validate.baselines.check import written
 
         found, now = self.suite.bless(), self.suite.present
         self.user_properties.append(("grasps", len(found.entries)))

@@ -169,13 +169,6 @@ class RecordedPart(Declared):
         return found
 
 
-def recorded_part(planned: Polyhedron, tested: Polyhedron) -> RecordedPart | None:
-    """Record the part that a baseline is written on; None if it is the planned one."""
-    if planned.content_sha256 == tested.content_sha256:
-        return None
-    return RecordedPart(planned.content_sha256, tested.vertices, tested.triangles, tested.surface)
-
-
 @dataclass(frozen=True, slots=True, repr=False)
 class How(Settings):
     """How the grasps of a baseline are simulated."""

@@ -6,15 +6,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.kinds import Range, Share
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.records.grasps_json import load_grasps
-from grasp_core.settings import CHOSEN, Settings, for_users, named
+from grasp_core.settings import CHOSEN, Settings, for_users, named, value_of
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
-from sim_validate.baselines.explain import not_survived, unstable
+from sim_validate.baselines.check import not_survived, unstable
 from sim_validate.baselines.part import TABLE, IfChanged, Source, present, source_of
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
@@ -30,7 +31,7 @@ SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GraspCase:
+class GraspCase(Declared):
     """A grasp on its object, and the friction at which to test it."""
 
     body: Polyhedron
@@ -50,12 +51,10 @@ def case_of(
     kinds: list[type[Any]] = [type(each) for each in given]
     if kinds == [GraspCase]:
         case: GraspCase = given[0]
-        return case if friction is None else replace(case, friction=_number(friction))
-    if kinds[:2] == [Polyhedron, Grasp] and len(given) <= len(("object", "grasp", "friction")):
-        named = [] if friction is None else [friction]
-        frictions = [*given[2:], *named]
-        if len(frictions) <= 1:
-            return GraspCase(given[0], given[1], _number(*frictions) if frictions else FRICTION)
+        return case if friction is None else replace(case, friction=friction)
+    frictions = [*given[2:], *([] if friction is None else [friction])]
+    if kinds[:2] == [Polyhedron, Grasp] and len(frictions) <= 1:
+        return GraspCase(given[0], given[1], frictions[0] if frictions else FRICTION)
     got = ", ".join(kind.__name__ for kind in kinds)
     raise InputError(
         f"{asking}: expected a grasp_case, or an object, a grasp and a friction; got {got}"
@@ -70,7 +69,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
         )
     known = ("friction", TABLE) if args else SETTINGS
     named(settings, known, "@pytest.mark.grasp")
-    friction = _number(settings.get("friction", FRICTION))
+    friction = value_of(float, settings.get("friction", FRICTION), "friction")
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
     wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
@@ -90,7 +89,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
 
 def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> list[GraspCase]:
     saved = load_grasps(path)
-    friction = _number(settings.get("friction", saved.friction))
+    friction = value_of(float, settings.get("friction", saved.friction), "friction")
     _check_any(saved.grasps, saved.body, friction)
     asked = IfChanged.of_table(settings.get(TABLE, {}), TABLE)
     source = source_of(saved, path, [folder], scale=asked.scale)
@@ -111,12 +110,6 @@ def _check_any(grasps: Sequence[Grasp], body: Polyhedron, friction: float) -> No
             f"@pytest.mark.grasp: no grasp of {body.name} was found at friction {friction:g}; try "
             "a higher friction"
         )
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"friction must be a number, got {value!r}")
-    return float(value)
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,11 +28,9 @@ from grasp_core.transferring.face_changes import (
 )
 from grasp_core.transferring.settings import IfChanged
 from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
-from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
+from sim_validate.baselines.baseline import Baseline, RecordedPart
 
 TABLE = "changed_part"
-
-
 CARRY = IfChanged()
 
 
@@ -152,7 +150,11 @@ class Present:
     @property
     def recorded(self) -> RecordedPart | None:
         """Return what a baseline must keep of the part; None where it is the planned one."""
-        return None if self.carried is None else recorded_part(self.carried.old, self.carried.new)
+        planned, tested = self.planned, self.saved.body
+        if planned.content_sha256 == tested.content_sha256:
+            return None
+        solid = (tested.vertices, tested.triangles, tested.surface)
+        return RecordedPart(planned.content_sha256, *solid)
 
     @property
     def gone(self) -> dict[str, str]:

@@ -4,20 +4,34 @@ Rows are sorted by object, then by their table's key, so the files do not depend
 in which run each unit was computed. Only the rows of one object, and rows that wait to be written,
 are in memory. The manifest, which lists all files, is written last; then the staging folder is
 removed.
+
+The README.md describes the dataset to people and to the Hugging Face Hub, a website for datasets
+that calls this page a card; `card.md.jinja` holds its sentences. A user's own words are escaped: in
+the header as quoted strings, in the text as Markdown.
 """
 
+import inspect
+import re
 import shutil
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
 
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.provenance import arithmetic
-from sim_validate.datasets.card import CARD, card_text
-from sim_validate.datasets.config import DatasetConfig, config_to_toml
-from sim_validate.datasets.given_contacts import given_text
+from scenes.drawing.pages import filled
+from sim_validate.datasets.config import (
+    KEYS,
+    REFERENCES,
+    SPLITS,
+    DatasetConfig,
+    Name,
+    config_to_toml,
+    quoted,
+)
 from sim_validate.datasets.manifest import (
     MANIFEST,
     QUARANTINE,
@@ -30,15 +44,29 @@ from sim_validate.datasets.manifest import (
     write_manifest,
 )
 from sim_validate.datasets.parquet import TableFiles, pyarrow
-from sim_validate.datasets.rows import dataset_tables
-from sim_validate.datasets.staging import Finished, Staging
-from sim_validate.datasets.units import WorkUnit, provenance, units_of, units_sha256
-from sim_validate.datasets.workers import Engine, drive
+from sim_validate.datasets.rows import ROWS, dataset_tables
+from sim_validate.datasets.units import WorkUnit, given_text, provenance, units_of, units_sha256
+from sim_validate.datasets.workers import Engine, Staging, UnitRecord, drive
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
 from sim_validate.kit.files import path_inside
 from sim_validate.kit.result_folders import alone_in
 
+CARD = "README.md"
+SIZES = (
+    (10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"),
+    (10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"),
+)  # fmt: skip
+"""Bounds on the number of rows, and the name that the Hugging Face Hub has for datasets below each.
+"""
+LARGEST = "10B<n<100B"
+MARKS = frozenset("\\`*_[]<>|~&#!$@")
+"""Characters that can begin Markdown or HTML within a line."""
+SPDX = re.compile(r"[A-Za-z0-9.+-]+")
+"""Pattern of a licence's name in SPDX; in small letters it is that of the Hugging Face Hub, but for
+a few such as ODbL-1.0, there `odbl`."""
+ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
+"""Pattern of a web address that can stand in Markdown as a link unchanged."""
 DATA = "data"
 TWIN = "the same object as"
 """First words of the reason why an object with the same mesh as another has no rows."""
@@ -51,15 +79,16 @@ OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
 """Names of all files and folders that the folder of a dataset may hold."""
 
 
-@dataclass(frozen=True, slots=True)
-class Built:
-    """The result of a build: how many units of work and rows the dataset has."""
+Finished: TypeAlias = tuple[WorkUnit, UnitRecord]
+"""A unit of work that has rows, with its record."""
 
-    units: int
+
+class Built(NamedTuple):
+    """The result of a build."""
+
+    manifest: Manifest
     made: int
     """Number of units of work that were computed in this run."""
-    quarantined: int
-    rows: Mapping[str, int]
 
 
 def build(
@@ -69,10 +98,7 @@ def build(
     report: Callable[[int, int], None],
     timeout_s: float | None = None,
 ) -> Built:
-    """Build a dataset, or resume an interrupted build.
-
-    Takes `report` (finished, total).
-    """
+    """Build a dataset, or resume an interrupted build; `report` takes (finished, total)."""
     pyarrow()  # before any work, so that a missing library is named at once
     units = units_of(config)
     _refuse_sources_inside(units, config, folder)
@@ -140,7 +166,7 @@ def _as_built(folder: Path, units: Sequence[WorkUnit], made: int = 0) -> Built:
                 f"{path}: this file of a finished dataset is missing or damaged (see `dataset "
                 "verify`); give another --out to make it again"
             )
-    return Built(len(units), made, manifest.quarantined, manifest.rows)
+    return Built(manifest, made)
 
 
 def _finish(
@@ -151,8 +177,8 @@ def _finish(
         shutil.rmtree(folder / name, ignore_errors=True)
     good, quarantined = _sorted_out(units, staging)
     tables = _write_tables(config, good, staging, folder)
-    for each in good:
-        staging.copy_files(each.unit, folder)
+    for unit, _ in good:
+        staging.copy_files(unit, folder)
     given = {each.id: each for unit in units for each in unit.given}
     if given:
         in_order = [given[name] for name in sorted(given)]
@@ -183,25 +209,19 @@ def _sorted_out(
 ) -> tuple[list[Finished], list[LeftOut]]:
     """List units with rows of their own, sorted by object, and the reasons why others have none."""
     good, quarantined = list[Finished](), list[LeftOut]()
-    first: dict[tuple[str, float], str] = {}
+    first: dict[tuple[str | None, float], str] = {}
     for unit in sorted(units, key=lambda each: (each.object, each.friction)):
-        found = staging.result(unit)
-        if isinstance(found, Finished):
-            other = first.setdefault((found.object_id, unit.friction), unit.object)
+        record = staging.record(unit)
+        reason = record.reason
+        if reason is None:
+            other = first.setdefault((record.object_id, unit.friction), unit.object)
             if other == unit.object:
-                good.append(found)
+                good.append((unit, record))
                 continue
-            found = f"{TWIN} {other}"
-        quarantined.append(
-            LeftOut(
-                object=unit.object,
-                source_sha256=unit.source_sha256,
-                friction=unit.friction,
-                given=tuple(each.id for each in unit.given),
-                reason=found,
-            )
-        )
-    return sorted(good, key=lambda each: (each.object_id, each.unit.friction)), quarantined
+            reason = f"{TWIN} {other}"
+        given = tuple(each.id for each in unit.given)
+        quarantined.append(LeftOut(unit.object, unit.source_sha256, unit.friction, given, reason))
+    return sorted(good, key=lambda each: (str(each[1].object_id), each[0].friction)), quarantined
 
 
 def _write_tables(
@@ -210,13 +230,81 @@ def _write_tables(
     tables = dataset_tables(config.groups)
     about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
     with TableFiles(folder / DATA, about, tables) as files:
-        for _, same in groupby(good, key=lambda each: each.object_id):
-            of_object = list(same)
+        for (_, split), same in groupby(good, key=lambda each: (each[1].object_id, each[1].split)):
+            of_object = [unit for unit, _ in same]
             for name in tables:
                 chosen = of_object[:1] if name == "objects" else of_object
-                paths = [staging.table(each.unit, name) for each in chosen]
-                files.add(name, of_object[0].split, paths)
+                files.add(name, str(split), [staging.table(unit, name) for unit in chosen])
         return [
             replace(listed(folder, path), table=name, split=split, rows=rows)
             for name, split, path, rows in files.close()
         ]
+
+
+def card_text(config: DatasetConfig, manifest: Manifest) -> str:
+    """Write the README.md of a dataset."""
+    rows, tables = manifest.rows, list(_tables(manifest))
+    (of_grasps,) = (table["splits"] for table in tables if table["name"] == "grasps")
+    chances = [
+        f"{name} {upto - before:.0%}"
+        for (name, upto), before in zip(SPLITS, (0.0, *(upto for _, upto in SPLITS)), strict=False)
+    ]
+    return filled(
+        "card.md.jinja",
+        Path(__file__).parent,
+        config=config,
+        settings=config_to_toml(config),
+        manifest=manifest,
+        rows=rows,
+        tables=tables,
+        executed=config.execution,
+        hub_license=config.license.lower() if SPDX.fullmatch(config.license) else "",
+        credits={
+            "Creator": _as_markdown(config.creator),
+            "Address": _as_address(config.url),
+            "Published": _as_markdown(config.published),
+            "Licence": _as_address(config.license),
+        },
+        size=next((size for upto, size in SIZES if sum(rows.values()) < upto), LARGEST),
+        chances=", ".join(reversed(chances)),
+        split=next(iter(of_grasps), "train"),
+        quoted=quoted,
+        markdown=_as_markdown,
+        references=_reference,
+    )
+
+
+def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
+    for name, columns in manifest.tables.items():
+        splits = {
+            split: manifest.count(name, split)
+            for split, _ in reversed(SPLITS)
+            if manifest.of_table(name, split)
+        }
+        yield {
+            "name": name,
+            "row": inspect.getdoc(ROWS[name]),
+            "splits": splits,
+            "sorted_by": " and ".join(f"`{key}`" for key in KEYS[name]),
+            "columns": columns,
+        }
+
+
+def _reference(table: Name, column: str) -> str:
+    """Say which row of another table a column names; empty if it names none."""
+    if (target := REFERENCES.get((table, column))) is None:
+        return ""
+    return f" Names a row of `{target[0]}` by its `{target[1]}`."
+
+
+def _as_address(text: str) -> str:
+    """Write a web address as a link, and any other text of a user as Markdown."""
+    if text.isprintable() and ADDRESS.fullmatch(text) is not None:
+        return f"<{text}>"
+    return _as_markdown(text)
+
+
+def _as_markdown(text: str) -> str:
+    """Write a user's text on one line, with all Markdown and HTML escaped."""
+    line = "".join(letter if letter.isprintable() else " " for letter in text).strip()
+    return "".join(f"\\{letter}" if letter in MARKS else letter for letter in line)

@@ -10,8 +10,7 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
 from sim_validate.datasets import flags as dataset_flags
-from sim_validate.datasets.build import build
-from sim_validate.datasets.card import CARD
+from sim_validate.datasets.build import CARD, build
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,
@@ -20,7 +19,6 @@ from sim_validate.datasets.config import (
     config_from_toml,
 )
 from sim_validate.datasets.isaac import export
-from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.datasets.workers import Engine
@@ -47,20 +45,20 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     _warn_of_missing(config, reporter)
     with reporter.progress("building") as steps, _engine(work) as engine:
         built = build(config, out, engine, steps.update, work.timeout_s)
-    rows = built.rows
+    manifest, rows = built.manifest, built.manifest.rows
     reporter.say(
-        f"{out}: {built.units} units, {built.made} made now, {built.quarantined} quarantined; "
+        f"{out}: {manifest.units} units, {built.made} made now, {manifest.quarantined} "
+        f"quarantined; "
         f"{rows['objects']} objects, {rows['grasps']} grasps and controls, {rows['trials']} trials"
         + (f", {rows['executions']} trials of executions" if config.execution else "")
     )
-    manifest = read_manifest(out)
     reporter.say(splits_in_words(manifest))
-    if built.quarantined:
+    if manifest.quarantined:
         reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
     reporter.document(
         {"out": str(out), "manifest": {"schema": manifest.SCHEMA, **record_of(manifest)}}
     )
-    return Exit.PARTIAL if built.quarantined else Exit.GOOD
+    return Exit.PARTIAL if manifest.quarantined else Exit.GOOD
 
 
 def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:

@@ -2,6 +2,8 @@
 
 Everything that decides a row is here. So the hash of the resolved text, together with the hashes of
 the meshes and the versions, identifies what a dataset can hold.
+
+The tables that a dataset has are named here as well, since flags need the names.
 """
 
 from collections import Counter
@@ -9,15 +11,42 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, cast
+from typing import Annotated, Literal, TypeAlias, cast, get_args
 
 from grasp_core.checked import MOST_COUNT, shown
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import METHODS, ConeKind, Count, Friction, Method, RandomWrenches, Range
 from grasp_core.mesh_files.limits import FaceKind, Lengths
 from grasp_core.settings import Settings, as_table
-from sim_validate.datasets.tables import EXECUTED
 from sim_validate.settings import ExecutionSettings, LimitSearch
+
+Name: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
+NAMES: tuple[Name, ...] = get_args(Name)
+SplitName: TypeAlias = Literal["train", "validation", "test"]
+SPLITS: tuple[tuple[SplitName, float], ...] = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
+"""Upper ends of each split's share of hashes: an object is in the first split whose end is above
+its hash."""
+SHORT = 16
+"""Number of digits of an object's hash in the names of its grasps."""
+KEYS: Mapping[Name, tuple[str, ...]] = {
+    "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
+    "executions": ("grasp_id", "trial"),
+}  # fmt: skip
+"""Columns by which the rows of a table are sorted; no two rows have the same values in them."""
+REFERENCES: Mapping[tuple[Name, str], tuple[Name, str]] = {
+    ("grasps", "object_id"): ("objects", "object_id"),
+    ("trials", "grasp_id"): ("grasps", "grasp_id"),
+    ("executions", "grasp_id"): ("grasps", "grasp_id"),
+}
+"""Columns whose cells name a row of another table, with the column there that holds the name."""
+EXECUTED = "executed"
+"""The group of columns of a dataset with executions, which has one table more."""
+
+
+def id_beginning(object_id: str, friction: float) -> str:
+    """Return the first part of the names of all grasps of one object at one friction."""
+    return f"{object_id[:SHORT]}-{friction}-"
+
 
 EXECUTION = "execution"
 LEARNING = "learning"
@@ -185,12 +214,7 @@ def config_from_toml(path: Path) -> DatasetConfig:
 
     given = read_tables(path)
     with about(path):
-        return config_from_settings(given)
-
-
-def config_from_settings(given: Mapping[str, Any]) -> DatasetConfig:
-    """Build a configuration from named settings with the types that TOML has."""
-    return DatasetConfig.of_table(given)
+        return DatasetConfig.of_table(given)
 
 
 def _is_date(text: str) -> bool:

@@ -4,34 +4,32 @@ A cell is null where its figure does not exist for the contacts: fewer than four
 contacts that are not in force closure no witness forces.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any, TypeAlias
 
-from grasp_core.closure.contacts import stacked
+from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.cones.spanning import span_angle
-from grasp_core.errors import GraspError
+from grasp_core.errors import GraspError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
-from grasp_core.hands.hand import Hand
 from grasp_core.hands.named_hands import load_hand
 from grasp_core.hands.reach import reach_with
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.values import FINGERS, Contact, Grasp
-from sim_validate.datasets.columns import figures_in
-from sim_validate.datasets.config import Learning
+from sim_validate.datasets.columns import Cells, figures_in
+from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.rows import ExecutionRow, GraspRow
-from sim_validate.execution.execute import tip_radius
+from sim_validate.execution.execute import execute, tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
 from sim_validate.settings import ExecutionSettings, TrialKind
 
 Executed: TypeAlias = ExecutedGrasp | str | None
 """An execution, the reason why it was refused, or None where none is asked for."""
 MISPLACED: TrialKind = "misplaced"
-Cells: TypeAlias = Mapping[str, Any]
 
 
 def execution_cells(executed: Executed) -> dict[str, Any]:
@@ -73,48 +71,73 @@ def trial_cells(trials: Sequence[ExecutionTrial]) -> dict[str, Any]:
 
 
 def executed_by(
-    execute: Callable[[ExecutionSettings], ExecutedGrasp], settings: ExecutionSettings,
-    seeds: Sequence[int],
+    body: Polyhedron, contacts: Sequence[Contact], friction: float, settings: ExecutionSettings,
+    asked: Learning | None, name: str,
 ) -> ExecutedGrasp:  # fmt: skip
-    """Execute contacts, and once more for each seed with objects misplaced by it."""
-    first = execute(settings)
-    if first.execution is None or MISPLACED not in settings.trials:
-        return first
-    trials = list(first.execution.trials)
-    for place, seed in enumerate(seeds, start=1):
-        more = execute(replace(settings, trials=(MISPLACED,), seed=seed)).execution
-        of_seed = () if more is None else more.trials
+    """Execute contacts, and once more for each seed asked for with objects misplaced by it.
+
+    Contacts without a squeeze are a result with a reason.
+    """
+    about = name, "", contacts_sha256(contacts)
+    try:
+        first = execute(body, contacts, friction, settings, enough=False)
+    except NoForcesError as error:
+        return ExecutedGrasp(*about, None, str(error))
+    if asked is None or MISPLACED not in settings.trials:
+        return ExecutedGrasp(*about, first)
+    trials = list(first.trials)
+    for place, seed in enumerate(asked.seeds, start=1):
+        again = replace(settings, trials=(MISPLACED,), seed=seed)
+        more = execute(body, contacts, friction, again, enough=False).trials
         trials += [
             replace(trial, name=f"{MISPLACED} {place * settings.misplacements + number}")
-            for number, trial in enumerate(of_seed)
+            for number, trial in enumerate(more)
         ]
-    return replace(first, execution=replace(first.execution, trials=tuple(trials)))
+    return ExecutedGrasp(*about, replace(first, trials=tuple(trials)))
 
 
-def execution_rows(
-    name: str, executed: Executed, seeds: Sequence[int] = (), misplacements: int = 1
-) -> Iterator[ExecutionRow]:
+def execution_rows(name: str, executed: Executed, config: DatasetConfig) -> Iterator[ExecutionRow]:
     """Yield a row for each trial of an execution, each misplaced one with its seed."""
-    found = executed.execution if isinstance(executed, ExecutedGrasp) else None
+    asked = config.execution
+    if asked is None or not isinstance(executed, ExecutedGrasp):
+        return
+    seeds = (asked.seed, *(() if config.learning is None else config.learning.seeds))
     misplaced = 0
-    for number, trial in enumerate(() if found is None else found.trials):
+    for number, trial in enumerate(executed.trials):
         seed = None
         if trial.kind == MISPLACED:
-            seed = seeds[misplaced // misplacements] if seeds else None
+            seed = seeds[misplaced // asked.misplacements]
             misplaced += 1
         yield ExecutionRow(name, number, trial, seed)
 
 
-@cache
-def hand_named(name: str) -> Hand:
-    """Return a built-in hand, one value for all grasps of a process, as searches are kept by it."""
-    return load_hand(name)
+hand_named = cache(load_hand)
+"""Return a built-in hand, one value for all grasps of a process, as searches are kept by it."""
 
 
-def hand_cells(hand: Hand, body: Polyhedron, grasp: Grasp, friction: float, seed: int) -> Cells:
-    """Look for a pose of a hand in a grasp, and return the cells that tell of it."""
-    found = reach_with(hand, body, grasp, friction, seed=seed)
-    cells: dict[str, Any] = {"hand_reached": found.reached, "hand_reason": found.reason}
+def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact]) -> Cells:
+    """Return the figures on request that any contacts have, closed or not."""
+    if config.learning is None or "closure" not in config.learning.figures:
+        return {}
+    points, normals = stacked(contacts)
+    angle = span_angle(normals) if len(contacts) == FINGERS else None
+    smallest = None
+    with suppress(GraspError):  # too few contacts span too little
+        smallest = smallest_singular_value(
+            points, center=body.center_of_mass, torque_scale=body.radius
+        )
+    return {"span_angle_rad": angle, "smallest_singular_value": smallest}
+
+
+def closed_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:
+    """Return the figures on request that only grasps in force closure have, and a hand's pose."""
+    cells, asked = dict[str, Any](), config.learning
+    if asked is not None and "closure" in asked.figures:
+        cells["witness_forces_n"] = grasp.witness.forces
+    if asked is None or not asked.hand:
+        return cells
+    found = reach_with(hand_named(asked.hand), body, grasp, friction, seed=config.seed)
+    cells |= {"hand_reached": found.reached, "hand_reason": found.reason}
     if not found.reached:
         return cells
     contacts = found.contacts or ()
@@ -130,56 +153,20 @@ def hand_cells(hand: Hand, body: Polyhedron, grasp: Grasp, friction: float, seed
     }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Figures:
-    """Which figures are asked for, and how strong fingers are."""
-
-    asked: Learning
-    execution: ExecutionSettings | None
-    seed: int = 0
-    """Seed of the postures from which a hand looks for its pose."""
-
-    def of_contacts(self, body: Polyhedron, contacts: Sequence[Contact]) -> Cells:
-        """Return the figures that any contacts have, closed or not."""
-        if "closure" not in self.asked.figures:
-            return {}
-        points, normals = stacked(contacts)
-        angle = span_angle(normals) if len(contacts) == FINGERS else None
-        cells: dict[str, Any] = {"span_angle_rad": angle, "smallest_singular_value": None}
-        with suppress(GraspError):  # too few contacts span too little
-            cells["smallest_singular_value"] = smallest_singular_value(
-                points, center=body.center_of_mass, torque_scale=body.radius
-            )
-        return cells
-
-    def of_grasp(self, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:
-        """Return the figures that only grasps in force closure have."""
-        cells = dict[str, Any]()
-        if "closure" in self.asked.figures:
-            cells["witness_forces_n"] = grasp.witness.forces
-        if self.asked.hand:
-            cells |= hand_cells(hand_named(self.asked.hand), body, grasp, friction, self.seed)
-        return cells
-
-    def of_executed(
-        self, body: Polyhedron, contacts: Sequence[Contact], friction: float, mass_kg: float
-    ) -> Cells:
-        """Return the figures that only executed contacts have."""
-        if self.execution is None:
-            return {}
-        settings = self.execution.for_body(body)
-        cells: dict[str, Any] = {"tip_radius_m": tip_radius(body, contacts, settings)}
-        if "least_squeeze" not in self.asked.figures:
-            return cells
-        try:
+def squeeze_cells(
+    config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact], friction: float,
+    mass_kg: float,
+) -> Cells:  # fmt: skip
+    """Return the figures on request that only executed contacts have."""
+    if config.learning is None or config.execution is None:
+        return {}
+    settings = config.execution.for_body(body)
+    cells: dict[str, Any] = {"tip_radius_m": tip_radius(body, contacts, settings)}
+    if "least_squeeze" in config.learning.figures:
+        with suppress(GraspError):  # no push carries the weight every way, or it is unstable
             least = best_squeeze(
                 body, contacts, friction, any_direction(mass_kg),
                 stiffness=settings.tip_stiffness_n_per_m, tip_radius_m=cells["tip_radius_m"],
             )  # fmt: skip
-        except GraspError:  # no push carries the weight in every direction, or it is unstable
-            return cells
-        return {
-            **cells,
-            "least_push_n": least.max_push_n,
-            "least_squeeze_n": least.grip.squeeze,
-        }
+            cells |= {"least_push_n": least.max_push_n, "least_squeeze_n": least.grip.squeeze}
+    return cells

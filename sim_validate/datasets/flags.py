@@ -8,8 +8,7 @@ from tyro.conf import Positional, subcommand
 
 from grasp_core.kinds import Count, Seed, Share
 from grasp_core.settings import Settings
-from sim_validate.datasets.config import Content, Learning, PlannedContent
-from sim_validate.datasets.tables import SplitName
+from sim_validate.datasets.config import Content, Learning, PlannedContent, SplitName
 from sim_validate.kit.command_flags import PLAIN, Positive, Spoken
 from sim_validate.kit.processes import available_cores
 

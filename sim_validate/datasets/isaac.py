@@ -26,12 +26,10 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.layout import arrange
 from scenes.settings import FingerSettings
-from sim_validate.datasets.config import quoted
-from sim_validate.datasets.meshes import mesh_path, stored_body
-from sim_validate.datasets.open_dataset import Selection, select
+from sim_validate.datasets.config import SHORT, Name, SplitName, quoted
+from sim_validate.datasets.open_dataset import Selection, mesh_path, select, stored_body
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow
-from sim_validate.datasets.tables import SHORT, Name, SplitName
 from sim_validate.kit.files import whole_folder, write_lines
 
 AXES = "xyz"

@@ -1,25 +1,51 @@
-"""Computes one unit of work: grasps are planned or given, simulated, and turned into rows."""
+"""Computes one unit of work: grasps are planned or given, simulated, and turned into rows.
 
-from collections.abc import Mapping
+Rows are of one object at one friction; its split is chosen by the hash of its mesh.
+"""
+
+import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
-from grasp_core.values import Grasp
-from sim_validate.closure.controls import Control, try_control
-from sim_validate.closure.verdict import Verdict
-from sim_validate.datasets.figures import Executed, executed_by
-from sim_validate.datasets.given_contacts import GivenGrasp
-from sim_validate.datasets.make_rows import MakingRows
-from sim_validate.datasets.meshes import mesh_path, mesh_text
-from sim_validate.datasets.rows import GIVEN, Rows
-from sim_validate.datasets.units import WorkUnit
-from sim_validate.datasets.varied import Varying, validated_with
+from grasp_core.values import Contact, Grasp
+from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict, try_control
+from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.datasets.columns import Cells, figures_in
+from sim_validate.datasets.config import SPLITS, SplitName, id_beginning
+from sim_validate.datasets.figures import (
+    Executed,
+    closed_cells,
+    contact_cells,
+    executed_by,
+    execution_cells,
+    execution_rows,
+    squeeze_cells,
+)
+from sim_validate.datasets.open_dataset import mesh_path, mesh_text
+from sim_validate.datasets.rows import (
+    GIVEN,
+    VARIED,
+    ExecutionRow,
+    GraspRow,
+    ObjectRow,
+    Rows,
+    TrialRow,
+)
+from sim_validate.datasets.units import GivenGrasp, WorkUnit
+from sim_validate.datasets.varied import Tried, Varying, ratio_of, validated_with
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.execute import ExecutionJob, executed_grasp
+from sim_validate.engine.traces import Outcome
+
+PLANNED = "planned"
+"""Kind of the grasps that were planned for their friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,34 +64,63 @@ def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
         making.judge()
     else:
         making.plan()
-    return Made(making.found.made, making.files)
+    trials, executions = tuple(making.trials), tuple(making.executions)
+    rows = Rows((_object_row(body, unit),), tuple(making.grasps), trials, executions)
+    return Made(rows, making.files)
+
+
+def split_of(object_id: str, seed: int) -> SplitName:
+    """Choose the split of an object by its hash, so that adding objects moves no other object."""
+    digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
+    share = int.from_bytes(digest[:8], "big") / 2.0**64
+    return next(name for name, upto in SPLITS if share < upto)
+
+
+def _object_row(body: Polyhedron, unit: WorkUnit) -> ObjectRow:
+    return ObjectRow(
+        object_id=body.content_sha256,
+        source_name=Path(unit.object).name,
+        source_sha256=unit.source_sha256,
+        split=split_of(body.content_sha256, unit.config.seed),
+        vertices=len(body.vertices),
+        triangles=len(body.triangles),
+        faces=len(body.faces),
+        curved=body.patches is not None,
+        volume_m3=body.volume,
+        volume_source=body.surface.volume_source,
+        radius_m=body.radius,
+        center_of_mass_m=body.center_of_mass,
+    )
 
 
 class _Making:
     """The rows and files of a unit of work while they are made."""
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
-        self.unit, self.body = unit, body
-        self.found = MakingRows(body, unit)
-        path = mesh_path(Path(), body.content_sha256)
-        self.files = {path.as_posix(): mesh_text(body)}
-        config = unit.config
+        self.unit, self.body, self.config = unit, body, unit.config
+        self.grasps, self.trials = list[GraspRow](), list[TrialRow]()
+        self.executions = list[ExecutionRow]()
+        self.files = {mesh_path(Path(), body.content_sha256).as_posix(): mesh_text(body)}
         self.agenda = Agenda(
-            random_wrenches=config.random_wrenches, limits=config.limits, seed=config.seed
-        )
+            random_wrenches=self.config.random_wrenches, limits=self.config.limits,
+            seed=self.config.seed,
+        )  # fmt: skip
 
     def plan(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""
-        config = self.unit.config
+        config = self.config
         for family in config.families:
             planned = plan(
                 self.body, self.unit.friction, families=(family,), cones=config.cones,
                 limit=config.limit, seed=config.seed,
             )  # fmt: skip
             for grasp in planned.grasps:
-                tried, executed = self._tried(grasp, self.body), self._executed(grasp, self.body)
-                self.found.add(grasp, tried, executed)
-                self._vary(grasp, self.body, tried, executed)
+                begun = self._begun(
+                    grasp.contacts, grasp_id=self._name(grasp.id), name=grasp.id, label="grasp",
+                    kind=PLANNED, family=grasp.family, faces=grasp.faces,
+                    region_radius_m=grasp.radius,
+                )  # fmt: skip
+                self._try(begun, grasp, self.body)
 
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
@@ -73,46 +128,166 @@ class _Making:
             try:
                 self._judge(given)
             except (InputError, UndecidedError) as error:
-                self.found.add_untried(given, str(error))
+                contacts = tuple(map(Contact, np.array(given.points), np.array(given.normals)))
+                row = GraspRow(**self._begun_given(given, contacts, note=str(error)))
+                self.grasps.append(row)
 
     def _judge(self, given: GivenGrasp) -> None:
-        friction = self.unit.friction
+        """Try a given grasp; one that is not in force closure is a negative control."""
         seated = seat(self.body, given.points, given.normals)
-        grasp = grasp_of(seated, friction, given.id)
-        if isinstance(grasp, Grasp):
-            tried, executed = self._tried(grasp, seated.body), self._executed(grasp, seated.body)
-            self.found.add_given(given, grasp, tried, seated, executed)
-            self._vary(grasp, seated.body, tried, executed)
-            return
-        control = Control(GIVEN, friction, grasp)
-        verdict = try_control(seated.body, control, self.agenda, Setup())
-        self.found.add_open(given, verdict, seated.moved_m)
+        proved = grasp_of(seated, self.unit.friction, given.id)
+        begun = self._begun_given(given, seated.contacts, moved_m=seated.moved_m)
+        if isinstance(proved, Grasp):
+            self._try(begun | {"faces": self._faces(proved)}, proved, seated.body)
+        else:
+            control = Control(GIVEN, self.unit.friction, proved)
+            self._add_refuted(begun, try_control(seated.body, control, self.agenda, Setup()))
 
-    def _tried(self, grasp: Grasp, body: Polyhedron) -> Verdict:
-        asked = self.unit.config.learning
-        verdict = validated_with(body, grasp, self.unit.friction, self.agenda, asked)
-        if self.unit.config.scenes and verdict.scene is not None:
-            self.files[f"scenes/{self.found.name(grasp.id)}.xml"] = verdict.scene.xml
-        return verdict
-
-    def _vary(self, grasp: Grasp, body: Polyhedron, verdict: Verdict, executed: Executed) -> None:
-        config = self.unit.config
-        if config.learning is None:
-            return
-        varying = Varying(config.learning, self.unit.friction, self.agenda, config.execution)
-        for each in varying.of(body, grasp, verdict, executed):
-            self.found.add_varied(grasp.id, each)
+    def _try(self, begun: Cells, grasp: Grasp, body: Polyhedron) -> None:
+        """Simulate a grasp and what is varied of it, and add all rows."""
+        config, friction = self.config, self.unit.friction
+        verdict = validated_with(body, grasp, friction, self.agenda, config.learning)
+        if config.scenes and verdict.scene is not None:
+            self.files[f"scenes/{self._name(grasp.id)}.xml"] = verdict.scene.xml
+        executed = self._executed(grasp, body)
+        self._add_closed(begun, grasp, verdict, executed, body)
+        if config.learning is not None:
+            varying = Varying(config.learning, friction, self.agenda, config.execution)
+            for each in varying.of(body, grasp, verdict, executed):
+                self._add_varied(self._name(grasp.id), each)
 
     def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
-        asked = self.unit.config.execution
-        if asked is None:
+        config, friction = self.config, self.unit.friction
+        if config.execution is None:
             return None
         try:
-            settings, learning = asked.for_body(body), self.unit.config.learning
-            job = ExecutionJob(body, grasp, self.unit.friction, settings, enough=False)
-            return executed_by(
-                lambda each: executed_grasp(replace(job, settings=each)), settings,
-                () if learning is None else learning.seeds,
-            )  # fmt: skip
+            settings = config.execution.for_body(body)
+            return executed_by(body, grasp.contacts, friction, settings, config.learning, grasp.id)
         except InputError as error:
             return str(error)
+
+    def _add_varied(self, made_from: str, tried: Tried) -> None:
+        """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
+        variant, verdict, proved = tried.variant, tried.verdict, tried.variant.proved
+        begun = self._begun(
+            variant.seated.contacts,
+            grasp_id=f"{made_from}:{variant.name}",
+            name=variant.name,
+            label=VARIED,
+            kind=variant.kind,
+            made_from=made_from,
+            friction=variant.friction,
+            friction_ratio=variant.friction_ratio,
+            displaced_m=variant.displaced_m,
+            region_exit_m=variant.exits_m,
+            mass_ratio=variant.mass_ratio,
+        )
+        if isinstance(verdict, ControlVerdict):
+            begun |= {"critical_friction": variant.critical_friction}
+            self._add_refuted(begun, verdict, tried.executed)
+        else:
+            assert isinstance(proved, Grasp)  # noqa: S101 - only closed ones have verdicts
+            begun |= {"faces": self._faces(proved)}
+            self._add_closed(begun, proved, verdict, tried.executed, variant.seated.body)
+
+    def _begun(self, contacts: Sequence[Contact], **more: Any) -> dict[str, Any]:
+        """Return the cells that are known of any contacts, and more."""
+        return {
+            "object_id": self.body.content_sha256,
+            "split": split_of(self.body.content_sha256, self.config.seed),
+            "friction": self.unit.friction,
+            "contacts": len(contacts),
+            "contact_points_m": [contact.position.tolist() for contact in contacts],
+            "contact_normals": [contact.normal.tolist() for contact in contacts],
+            **contact_cells(self.config, self.body, contacts),
+            **more,
+        }
+
+    def _begun_given(
+        self, given: GivenGrasp, contacts: Sequence[Contact], **more: Any
+    ) -> dict[str, Any]:
+        more |= {"grasp_id": self._name(given.id), "name": given.name}
+        return self._begun(contacts, label=GIVEN, kind=GIVEN, **more)
+
+    def _faces(self, grasp: Grasp) -> tuple[int, ...] | None:
+        """Return faces of the object; on curved surfaces contacts have some made for them alone."""
+        return None if self.body.patches is not None else grasp.faces
+
+    def _name(self, grasp: str) -> str:
+        """Return the name of a grasp, which no other grasp of the dataset has."""
+        return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
+
+    def _add_closed(
+        self, begun: Cells, grasp: Grasp, verdict: Verdict, executed: Executed, body: Polyhedron
+    ) -> None:
+        """Add the rows of a grasp in force closure, of its negative controls, and of all trials."""
+        proved = {
+            "force_closed": True,
+            "closure_margin": grasp.closure_margin,
+            "critical_friction": grasp.critical_friction,
+            "region_kind": grasp.regions[0].kind,
+            "region_radii_m": [region.inscribed_radius for region in grasp.regions],
+            "ferrari_canny_lower_n": grasp.ferrari_canny[0],
+            "ferrari_canny_upper_n": grasp.ferrari_canny[1],
+            "held": verdict.held,
+            "outcome": verdict.outcome.value,
+            "trials": len(verdict.wrenches),
+            "mismatches": len(verdict.mismatches),
+            "verdict": figures_in(GraspRow, "verdict", verdict),
+            "friction_ratio": ratio_of(verdict.friction, grasp.critical_friction),
+            **closed_cells(self.config, body, grasp, verdict.friction),
+        }
+        row = self._added(proved | {**begun}, verdict.wrenches, executed, body)
+        for each in verdict.controls:
+            kind = each.control.name
+            refuted = self._begun(
+                each.control.contacts, grasp_id=f"{row.grasp_id}:{kind}", name=row.name,
+                label=kind, kind=kind, control_of=row.grasp_id,
+            )  # fmt: skip
+            self._add_refuted(refuted, each)
+
+    def _add_refuted(
+        self, begun: Cells, verdict: ControlVerdict, executed: Executed = None
+    ) -> None:
+        """Add the rows of contacts that are proved not to be in force closure, and their trials."""
+        control = verdict.control
+        first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
+        refuted = {
+            "friction": control.friction,
+            "force_closed": False,
+            "closure_margin": control.certificate.margin,
+            "held": first is None,
+            "outcome": (Outcome.HELD if first is None else first.hold.outcome).value,
+            "trials": len(verdict.tried),
+            "mismatches": int(not verdict.let_go),
+        }
+        self._added({**begun, **refuted}, verdict.tried, executed, self.body)
+
+    def _added(
+        self, cells: Cells, tried: Sequence[WrenchVerdict] | Sequence[ControlTrial],
+        executed: Executed, body: Polyhedron,
+    ) -> GraspRow:  # fmt: skip
+        """Add a row with what its execution found, and the rows of its trials."""
+        row = GraspRow(**cells, **execution_cells(executed))
+        if row.mass_kg is not None:
+            more = squeeze_cells(self.config, body, row.placed, row.friction, row.mass_kg)
+            row = replace(row, **more)
+        self.grasps.append(row)
+        self.trials += [_trial_row(row.grasp_id, number, each) for number, each in enumerate(tried)]
+        self.executions += execution_rows(row.grasp_id, executed, self.config)
+        return row
+
+
+def _trial_row(grasp_id: str, number: int, tried: WrenchVerdict | ControlTrial) -> TrialRow:
+    planned = tried if isinstance(tried, WrenchVerdict) else None
+    return TrialRow(
+        grasp_id=grasp_id,
+        trial=number,
+        name=tried.name,
+        wrench_n_nm=tried.wrench,
+        predicted_limit=planned and planned.predicted_limit,
+        required_friction=tried.required_friction,
+        hold=tried.hold,
+        simulated_limit=planned and planned.simulated_limit,
+        verdict=figures_in(TrialRow, "verdict", planned),
+    )

@@ -19,8 +19,8 @@ from grasp_core.files.json_text import object_of
 from grasp_core.files.records import RecordFile, from_record, record_of, recorded
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import Number, Range
+from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.rows import Tables, dataset_tables, groups_asked
-from sim_validate.datasets.tables import Name, SplitName
 from sim_validate.kit.files import require_inside
 
 MANIFEST = "manifest.json"
@@ -85,11 +85,17 @@ class Manifest(RecordFile):
     @recorded
     def rows(self) -> Mapping[str, int]:
         """Number of rows of each table."""
-        return {name: sum(each.rows or 0 for each in self.of_table(name)) for name in self.tables}
+        return {name: self.count(name) for name in self.tables}
 
-    def of_table(self, name: Name) -> tuple[Listed, ...]:
-        """List the files of a table."""
-        return tuple(each for each in self.files if each.table == name)
+    def of_table(self, name: Name, split: str | None = None) -> tuple[Listed, ...]:
+        """List the files of a table, in one split or in all of them."""
+        return tuple(
+            each for each in self.files if each.table == name and split in (None, each.split)
+        )
+
+    def count(self, name: Name, split: str | None = None) -> int:
+        """Count the rows of a table, in one split or in all of them."""
+        return sum(each.rows or 0 for each in self.of_table(name, split))
 
 
 def listed(folder: Path, path: Path) -> Listed:

@@ -1,25 +1,56 @@
 """Reads a finished dataset, or one split of it: its tables as arrays, or row by row.
 
 All tables are sorted by the beginning of their rows' names, which are the first letters of the
-object's hash, so that rows can be read grouped by object, with only one object in memory.
+object's hash, so that rows can be read grouped by object, with only one object in memory. Meshes
+are files in metres that give exactly the same solid. A contact set can be taken out with how its
+trials ended, to be simulated again.
 """
 
+import hashlib
+import json
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, islice
 from pathlib import Path
 from typing import Any
 
 from grasp_core.checked import one_of, path_of
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
+from grasp_core.files.json_text import object_of
+from grasp_core.files.records import from_record, record_of
+from grasp_core.mesh_files.limits import FaceKind, MeshChoices
+from grasp_core.mesh_files.reading import MeshFile, read_triangles
+from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
+from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
+from grasp_core.objects.surface import Surface
+from grasp_core.planning.given_contacts import seat
+from sim_validate.closure.replaying import Recorded, Wanted
 from sim_validate.datasets.columns import RowOf, row_of
-from sim_validate.datasets.config import CREDITS, DatasetConfig, config_from_toml
+from sim_validate.datasets.config import (
+    CREDITS,
+    KEYS,
+    SHORT,
+    SPLITS,
+    DatasetConfig,
+    Name,
+    config_from_toml,
+)
 from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
-from sim_validate.datasets.rows import ROWS, Rows, Tables
-from sim_validate.datasets.tables import KEYS, SHORT, SPLITS, Name
+from sim_validate.datasets.rows import (
+    GIVEN,
+    ROWS,
+    VARIED,
+    GraspRow,
+    ObjectRow,
+    Rows,
+    Tables,
+    TrialRow,
+)
+from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.kit.files import path_inside
+from sim_validate.planning.asked_objects import NAMED, some
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +68,16 @@ class Selection:
 
     def paths(self, name: Name) -> list[Path]:
         """List the files of a table, each checked to be unchanged."""
-        return [self._whole(each) for each in self._listed(name)]
+        return [self._whole(each) for each in self.manifest.of_table(name, self.split)]
 
     def counts(self) -> dict[Name, int]:
         """Number of rows of each table."""
-        return {name: sum(each.rows or 0 for each in self._listed(name)) for name in self.tables}
+        return {name: self.manifest.count(name, self.split) for name in self.tables}
 
     def rows(self, kind: type[RowOf], **cells: str | bool) -> Iterator[RowOf]:
         """Yield rows of a class, or those with some cells, without holding all in memory."""
         name: Name = next(name for name, each in ROWS.items() if each is kind)
-        for each in self._listed(name):
+        for each in self.manifest.of_table(name, self.split):
             found = 0
             for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
                 for number, row in enumerate(batch.to_pylist(), start=found):
@@ -74,9 +105,6 @@ class Selection:
             )
         return path
 
-    def _listed(self, name: Name) -> list[Listed]:
-        return [each for each in self.manifest.of_table(name) if self.split in (None, each.split)]
-
     def config(self) -> DatasetConfig:
         """Read the configuration of the dataset."""
         return config_from_toml(self.folder / "config.toml")
@@ -103,11 +131,7 @@ def select(folder: Path, split: str | None = None) -> Selection:
 
 def splits_in_words(manifest: Manifest) -> str:
     """Say how many objects each split has."""
-    files = manifest.of_table("objects")
-    counts = [
-        f"{split} {sum(each.rows or 0 for each in files if each.split == split)}"
-        for split, _ in reversed(SPLITS)
-    ]
+    counts = [f"{split} {manifest.count('objects', split)}" for split, _ in reversed(SPLITS)]
     return f"{', '.join(counts)} objects"
 
 
@@ -157,3 +181,85 @@ def _groups(chosen: Selection, name: Name) -> Iterator[tuple[str, tuple[Any, ...
     beginnings = groupby(chosen.rows(ROWS[name]), key=lambda row: str(getattr(row, key))[:SHORT])
     for beginning, rows in beginnings:
         yield beginning, tuple(rows)
+
+
+FOLDER = "meshes"
+SURFACE = "# surface "
+"""Beginning of the first line, a comment that says what is known of the triangles."""
+
+
+def mesh_text(body: Polyhedron) -> str:
+    """Write a solid as an OBJ file in metres, whose numbers read back unchanged.
+
+    Its first line is a comment with what is known of its surface, as in a `grasps.json`.
+    """
+    said = SURFACE + json.dumps(record_of(body.surface), sort_keys=True)
+    points = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in body.vertices.tolist()]
+    triangles = [f"f {i} {j} {k}\n" for i, j, k in (body.triangles + 1).tolist()]
+    return "".join([said, "\n", *points, *triangles])
+
+
+def mesh_path(folder: Path, object_id: str) -> Path:
+    """Return the path of an object's mesh in a dataset."""
+    return path_inside(folder, f"{FOLDER}/{object_id}.obj")
+
+
+def stored_surface(folder: Path, object_id: str) -> MeshFile:
+    """Read the triangles of an object of a dataset [m]."""
+    path = mesh_path(folder, object_id)
+    mesh = read_triangles(path, DEFAULT_LIMITS)
+    if (found := content_hash(mesh.vertices, mesh.triangles)) != object_id:
+        raise InputError(
+            f"{path}: this is the mesh of another object, whose hash is {found}; see `graspproof "
+            "dataset verify`"
+        )
+    return mesh
+
+
+def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Polyhedron:
+    """Read an object of a dataset from its canonical mesh."""
+    path, mesh = mesh_path(folder, object_id), stored_surface(folder, object_id)
+    said, known = mesh.data.partition(b"\n")[0].decode("utf-8", "replace"), None
+    with about(path):
+        if said.startswith(SURFACE):
+            with about("first line"):
+                known = from_record(Surface, object_of(said.removeprefix(SURFACE), "surface"))
+        return polyhedron_from_mesh(
+            mesh.vertices, mesh.triangles, MeshChoices(faces=faces), name=name,
+            source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,
+        )  # fmt: skip
+
+
+def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
+    """Read a grasp or a negative control from the tables of a dataset."""
+    chosen = select(folder)
+    if wanted.grasp is None or wanted.trial is not None or wanted.grasps is not None:
+        raise InputError(
+            f"{folder} is a dataset: name a grasp with --grasp GRASP_ID, and give neither --trial "
+            "nor --grasps"
+        )
+    name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
+    row = next(chosen.rows(GraspRow, grasp_id=name), None)
+    if row is None or not row.was_tried:
+        there = some(row.grasp_id for row in islice(chosen.rows(GraspRow), NAMED))
+        raise InputError(
+            f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
+        )
+    config = chosen.config()
+    objects = chosen.rows(ObjectRow, object_id=row.object_id)
+    source = next((each.source_name for each in objects), row.object_id)
+    body = stored_body(folder, row.object_id, source, config.faces)
+    if row.label in (GIVEN, VARIED):  # on curved surfaces given contacts have faces of their own
+        body = seat(body, row.points, row.normals).body
+    return Recorded(
+        name=name,
+        body=body,
+        contacts=row.placed,
+        friction=row.friction,
+        setup=Setup(),
+        agenda=Agenda(random_wrenches=config.random_wrenches, seed=config.seed),
+        control=None if row.force_closed else row.label,
+        outcomes={
+            each.name: each.hold.outcome.value for each in chosen.rows(TrialRow, grasp_id=name)
+        },
+    )

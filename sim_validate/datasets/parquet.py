@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
 from sim_validate.datasets.columns import CellKind, Cells, Column
+from sim_validate.datasets.config import KEYS, Name
 from sim_validate.datasets.rows import TABLES, Tables
-from sim_validate.datasets.tables import KEYS, Name
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES: Mapping[CellKind, str] = {
@@ -66,21 +66,25 @@ def parquet_bytes(
     name: Name, rows: Sequence[Cells], about: Mapping[str, str], tables: Tables = TABLES
 ) -> bytes:
     """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
-    arrow, keys = pyarrow(), KEYS[name]
-    by_key = {tuple(row[key] for key in keys): row for row in rows}
-    if len(by_key) < len(rows):
-        raise InputError(f"table {name}: two rows have the same {' and '.join(keys)}")
-    ordered = [row for _, row in sorted(by_key.items(), key=lambda pair: pair[0])]
+    arrow, held = pyarrow(), io.BytesIO()
     schema = schema_of(tables[name]).with_metadata(dict(sorted(about.items())))
     try:
-        arrays = [
-            arrow.array([row.get(each.name) for row in ordered], type=each.type) for each in schema
-        ]
+        table = arrow.Table.from_pylist(list(rows), schema=schema)
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
-    held = io.BytesIO()
-    pyarrow_parquet().write_table(arrow.Table.from_arrays(arrays, schema=schema), held, **PAGES)
+    pyarrow_parquet().write_table(_in_order(table, name), held, **PAGES)
     return held.getvalue()
+
+
+def _in_order(table: Any, name: Name) -> Any:
+    """Return a table sorted by its keys, which no two rows may share."""
+    keys = list(KEYS[name])
+    if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
+        raise InputError(
+            f"table {name}: two rows have the same {' and '.join(keys)}; build the dataset again "
+            "into an empty folder"
+        )
+    return table.sort_by([(key, "ascending") for key in keys])
 
 
 def each_batch(path: Path, name: Name, tables: Tables = TABLES) -> Iterator[Any]:
@@ -195,18 +199,11 @@ class TableFiles:
 
     def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
         """Add the rows of some files; their keys must come after all that were added before."""
-        arrow, keys = pyarrow(), list(KEYS[name])
-        table = arrow.concat_tables([read_table(path, name, self._tables) for path in paths])
-        table = table.sort_by([(key, "ascending") for key in keys])
-        if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
-            raise InputError(
-                f"table {name}: two rows have the same {' and '.join(keys)}; build the dataset "
-                "again into an empty folder"
-            )
-        if not table.num_rows:
-            return
-        part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
-        part.add(table.replace_schema_metadata(self._about))
+        tables = [read_table(path, name, self._tables) for path in paths]
+        table = _in_order(pyarrow().concat_tables(tables), name)
+        if table.num_rows:
+            part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
+            part.add(table.replace_schema_metadata(self._about))
 
     def close(self) -> list[tuple[Name, str, Path, int]]:
         """Write the rows that still wait; list the files with table, split and number of rows."""

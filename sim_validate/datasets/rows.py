@@ -28,12 +28,14 @@ from sim_validate.datasets.columns import (
     cells_of,
     columns_of,
 )
-from sim_validate.datasets.tables import EXECUTED, NAMES, Name, SplitName
+from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 
 GIVEN = "given"
 """Label of grasps that another tool made."""
+VARIED = "varied"
+"""Label of rows that are made from a grasp and may hold or not."""
 NOT_TRIED = "not_tried"
 """Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
 anything else about them."""

@@ -3,26 +3,100 @@
 A unit is one object at one friction. Its name is a hash of all that decides its rows: the bytes of
 the mesh, the configuration, the versions of the packages, and this project's own code. So results
 of an earlier run count exactly if they would come out the same.
+
+Contacts that other tools made are read here; each set of four is one grasp to judge.
 """
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 
-from grasp_core.errors import GraspError, InputError
+from grasp_core.arrays import Array
+from grasp_core.errors import GraspError, InputError, about
+from grasp_core.files.json_text import value_of
+from grasp_core.files.text_files import read_text
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.provenance import versions
+from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
 from grasp_core.settings import as_table
+from grasp_core.values import FINGERS
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
-from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
+
+NO_FRICTION = 1.0
+"""Friction put in for files that state none; it is never used, because a dataset's configuration
+has its own."""
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class GivenGrasp:
+    """Four contacts made by another tool, in the object's frame."""
+
+    id: str
+    """Name that this package gives the grasp, which may be part of a file name."""
+    name: str
+    """Name that the other tool's file gives the grasp."""
+    points: tuple[Triple, ...]
+    """Contact points, (4, 3) [m]."""
+    normals: tuple[Triple, ...]
+    """Unit vectors into the object, (4, 3)."""
+
+
+def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
+    """Read contacts made by other tools."""
+    text = read_text(path)
+    with about(path):
+        return given_from_json(text, outward=outward)
+
+
+def given_text(given: Sequence[GivenGrasp]) -> str:
+    """Write given grasps as a contacts file, with normals into the object."""
+    grasps = [
+        {
+            "id": grasp.name,
+            "contacts": [
+                {"position_m": point, "normal": normal}
+                for point, normal in zip(grasp.points, grasp.normals, strict=True)
+            ],
+        }
+        for grasp in given
+    ]
+    return json.dumps({"grasps": grasps}, indent=1) + "\n"
+
+
+def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
+    """Parse contacts to judge from the text of a contacts file."""
+    sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
+    stated = value_of(text)
+    planned = "schema" in stated  # graspproof planned these, and they may be judged at any friction
+    remedy = "friction: remove it from the contacts file, because a dataset has its own frictions"
+    if not planned and "friction" in stated:
+        raise InputError(remedy)
+    for row, each in enumerate(sets):
+        if not planned and (each.friction != NO_FRICTION).any():
+            raise InputError(f"grasps[{row}] ({each.id}): {remedy}")
+        if len(each.positions) != FINGERS:
+            raise InputError(
+                f"grasps[{row}] ({each.id}): expected 4 contacts, got {len(each.positions)}"
+            )
+    return tuple(
+        GivenGrasp(f"given-{i:06}", each.id, _rows(each.positions), _rows(each.normals))
+        for i, each in enumerate(sets)
+    )
+
+
+def _rows(array: Array) -> tuple[Triple, ...]:
+    return tuple((float(x), float(y), float(z)) for x, y, z in array)
+
 
 CHUNK = 2**20
 PART = 25
@@ -54,10 +128,12 @@ class WorkUnit:
     @property
     def id(self) -> str:
         """Name of the unit: 32 hexadecimal digits, the same wherever the mesh file lies."""
-        settings = shared_settings(self.config)
-        given = given_sha256(self.given)
+        table = as_table(self.config)
+        settings = {name: value for name, value in table.items() if name not in APART}
+        given = json.dumps([astuple(grasp) for grasp in self.given])
+        digest = hashlib.sha256(given.encode()).hexdigest()
         own = sorted(provenance().items())
-        decisive = [self.source_sha256, self.friction, given, settings, own]
+        decisive = [self.source_sha256, self.friction, digest, settings, own]
         return hashlib.sha256(json.dumps(decisive).encode()).hexdigest()[:32]
 
 
@@ -80,11 +156,6 @@ def provenance() -> Mapping[str, str]:
             digest.update(path.read_bytes())
     more = {"pyarrow": version("pyarrow"), "code_sha256": digest.hexdigest()}
     return MappingProxyType(versions() | more)
-
-
-def shared_settings(config: DatasetConfig) -> dict[str, object]:
-    """Return the settings that decide the rows of every unit, such as the seed, but no objects."""
-    return {name: value for name, value in as_table(config).items() if name not in APART}
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:

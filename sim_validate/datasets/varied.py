@@ -11,18 +11,15 @@ import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import (
     InputError,
-    NoForcesError,
     SolverError,
     UndecidedError,
     UnfaithfulError,
@@ -43,9 +40,9 @@ from sim_validate.closure.validate import tested, validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.config import CONTROLS, Learning
 from sim_validate.datasets.figures import Executed, executed_by
+from sim_validate.datasets.rows import VARIED
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.execution.execute import execute
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.settings import ExecutionSettings
 
@@ -67,8 +64,6 @@ UNMOVED = (None,) * FINGERS
 """What is known of the regions' ends where no contact moved."""
 LEAST_WAY = 0.1
 """Least way that a contact's move is measured by, in object radii: regions may be points."""
-VARIED = "varied"
-"""Label of rows that are made from a grasp and may hold or not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -282,25 +277,14 @@ class Varying:
         return try_control(seated.body, control, self.agenda, Setup())
 
     def _executed(self, variant: Variant) -> Executed:
+        body, contacts = variant.seated.body, variant.seated.contacts
         if self.execution is None:
             return None
         try:
-            settings = self.execution.for_body(variant.seated.body)
+            settings = self.execution.for_body(body)
             if variant.mass_kg is not None:
                 settings = replace(settings, mass_kg=variant.mass_kg)
-            return executed_by(partial(_executed_with, variant), settings, self.asked.seeds)
+            return executed_by(body, contacts, variant.friction, settings, self.asked, variant.name)
         except (InputError, UnfaithfulError) as error:
             # a varied mass or friction may be beyond what the simulator is faithful for
             return str(error)
-
-
-def _executed_with(variant: Variant, settings: ExecutionSettings) -> ExecutedGrasp:
-    """Execute the contacts of a variant; contacts without a squeeze are a result with a reason."""
-    contacts = variant.seated.contacts
-    found, reason = None, None
-    try:
-        found = execute(variant.seated.body, contacts, variant.friction, settings, enough=False)
-    except NoForcesError as error:
-        reason = str(error)
-    family = variant.proved.family if isinstance(variant.proved, Grasp) else ""
-    return ExecutedGrasp(variant.name, family, contacts_sha256(contacts), found, reason)

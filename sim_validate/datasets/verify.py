@@ -20,8 +20,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.build import CONFIG, CONTACTS, TWIN
 from sim_validate.datasets.columns import Cells
-from sim_validate.datasets.config import config_from_toml
-from sim_validate.datasets.given_contacts import read_given
+from sim_validate.datasets.config import KEYS, DatasetConfig, Name, config_from_toml, id_beginning
 from sim_validate.datasets.make_unit import made_of
 from sim_validate.datasets.manifest import (
     MANIFEST,
@@ -32,12 +31,10 @@ from sim_validate.datasets.manifest import (
     read_left_out,
     read_manifest,
 )
-from sim_validate.datasets.meshes import stored_body
-from sim_validate.datasets.open_dataset import Selection, by_object
+from sim_validate.datasets.open_dataset import Selection, by_object, stored_body
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GraspRow, ObjectRow, Rows
-from sim_validate.datasets.tables import KEYS, Name, id_beginning
-from sim_validate.datasets.units import WorkUnit, provenance
+from sim_validate.datasets.units import WorkUnit, provenance, read_given
 from sim_validate.datasets.verify_rows import object_faults
 from sim_validate.execution.verdict import may_slip
 from sim_validate.kit.files import path_inside
@@ -72,8 +69,9 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
         return faults
     faults: list[str] = []
     try:
-        faults += _manifest_faults(folder, manifest)
-        faults += _content_faults(folder, manifest)
+        config = config_from_toml(folder / CONFIG)
+        faults += _manifest_faults(folder, manifest, config)
+        faults += _content_faults(folder, manifest, config)
         if sample is not None and not faults:
             faults += _sample_faults(folder, manifest, sample)
     except InputError as error:
@@ -81,8 +79,7 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     return faults
 
 
-def _content_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    config = config_from_toml(folder / CONFIG)
+def _content_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
     for each in manifest.files:
         if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
             yield (
@@ -124,8 +121,7 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
             yield f"{each.path}: the file differs from what was written (its sha256 differs)"
 
 
-def _manifest_faults(folder: Path, manifest: Manifest) -> Iterator[str]:
-    config = config_from_toml(folder / CONFIG)
+def _manifest_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
     if config.sha256 != manifest.config_sha256:
         yield f"{CONFIG}: the file is not the configuration that the manifest names"
     if manifest.groups != config.groups:

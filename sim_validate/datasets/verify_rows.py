@@ -31,13 +31,12 @@ from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS
 from sim_validate.datasets.build import CONFIG
 from sim_validate.datasets.columns import agrees
-from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.figures import Figures, hand_named, trial_cells
-from sim_validate.datasets.make_rows import PLANNED
-from sim_validate.datasets.meshes import stored_body, stored_surface
-from sim_validate.datasets.rows import GIVEN, ROUNDING, GraspRow, ObjectRow, Rows
-from sim_validate.datasets.tables import KEYS, NAMES
-from sim_validate.datasets.varied import RATIOS, VARIED
+from sim_validate.datasets.config import KEYS, NAMES, DatasetConfig
+from sim_validate.datasets.figures import contact_cells, hand_named, trial_cells
+from sim_validate.datasets.make_unit import PLANNED
+from sim_validate.datasets.open_dataset import stored_body, stored_surface
+from sim_validate.datasets.rows import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
+from sim_validate.datasets.varied import RATIOS
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial
@@ -183,25 +182,24 @@ def _requested_faults(folder: Path, config: DatasetConfig, rows: Rows) -> Iterat
                 if row.executed and not found:
                     found += _squeeze_faults(row, body, config.execution)
             if config.learning is not None:
-                figures = Figures(config.learning, config.execution)
-                found += _learning_faults(row, by_name, of_object, body, figures)
+                found += _learning_faults(row, by_name, of_object, body, config)
             yield from (f"grasps: {row.grasp_id}: {fault}" for fault in found)
 
 
 def _learning_faults(
     row: GraspRow, by_name: Mapping[str, GraspRow], of_object: ObjectRow, body: Polyhedron,
-    figures: Figures,
+    config: DatasetConfig,
 ) -> Iterator[str]:  # fmt: skip
     if row.label == VARIED:
         yield from _varied_faults(row, by_name, is_curved=of_object.curved)
     else:
         yield from _disagreements(row, {"kind": LABELS.get(row.label, row.label)}, "label")
     if row.was_tried:
-        yield from _disagreements(row, figures.of_contacts(body, row.placed), "the contacts")
+        yield from _disagreements(row, contact_cells(config, body, row.placed), "the contacts")
     if row.witness_forces_n is not None:
         yield from _witness_faults(row, row.witness_forces_n, body)
-    if figures.asked.hand:
-        yield from _hand_faults(row, hand_named(figures.asked.hand), body)
+    if config.learning is not None and config.learning.hand:
+        yield from _hand_faults(row, hand_named(config.learning.hand), body)
 
 
 def _varied_faults(

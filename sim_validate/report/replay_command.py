@@ -10,7 +10,7 @@ from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.mujoco.closure_scene import write_scene
 from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
 from sim_validate.datasets.manifest import MANIFEST
-from sim_validate.datasets.recorded import recorded_in_dataset
+from sim_validate.datasets.open_dataset import recorded_in_dataset
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit

@@ -18,14 +18,14 @@ from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.datasets.config import DatasetConfig, config_from_settings, config_to_toml
-from sim_validate.datasets.given_contacts import given_from_json
+from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.manifest import (
     Listed,
     Manifest,
     left_out_from,
 )
-from sim_validate.datasets.staging import UnitRecord
+from sim_validate.datasets.units import given_from_json
+from sim_validate.datasets.workers import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
@@ -273,7 +273,7 @@ def _same_config(data: bytes, found: DatasetConfig) -> None:
         came = getattr(found, name)
         assert (list(came) if isinstance(came, tuple) else came) == value
     again = tomllib.loads(config_to_toml(found))
-    assert config_from_settings(again) == found
+    assert DatasetConfig.of_table(again) == found
 
 
 FLAGS = b"""friction = 0.4
@@ -329,7 +329,7 @@ TARGETS = (
     Target("setup", _setup, lambda: [SETUP], _same_setup, "toml"),
     Target("suite", _suite, lambda: [SUITE], _same_suite, "toml"),
     Target("dataset-config",
-           lambda data: config_from_settings(tables_of_toml(text_of(data))),
+           lambda data: DatasetConfig.of_table(tables_of_toml(text_of(data))),
            lambda: [config_to_toml(DatasetConfig(objects=("wedge",))).encode()], _same_config,
            "toml"),
     Target("flags", lambda data: flags_from(tables_of_toml(text_of(data)), KNOWN), lambda: [FLAGS],

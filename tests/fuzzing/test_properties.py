@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import grasp_core as gc
-from sim_validate.datasets.given_contacts import GivenGrasp, given_from_json, given_text
+from sim_validate.datasets.units import GivenGrasp, given_from_json, given_text
 from tests.fuzzing.targets import targets
 
 JSON_READERS = [name for name, target in targets().items() if target.written == "json"]

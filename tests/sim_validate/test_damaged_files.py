@@ -9,7 +9,7 @@ import scenes
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.manifest import Manifest
-from sim_validate.datasets.staging import UnitRecord
+from sim_validate.datasets.workers import UnitRecord
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.main import main

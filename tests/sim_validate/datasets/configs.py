@@ -42,6 +42,6 @@ def rows_of(folder, name):
 def build_small(folder, config=SMALL):
     """Build it, and check that it is what tests rely on."""
     built = build(config, folder, Here(), silent)
-    assert built.rows["objects"] == len(config.objects)
+    assert built.manifest.rows["objects"] == len(config.objects)
     assert len(list(folder.glob("data/grasps/*.parquet"))) == 3
     return folder

@@ -19,7 +19,7 @@ def small_dataset(tmp_path_factory):
 def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("dataset") / "ds"
     built = build(CONFIG, folder, Here(), silent)
-    assert (built.units, built.made, built.quarantined) == (4, 4, 0)
+    assert (built.manifest.units, built.made, built.manifest.quarantined) == (4, 4, 0)
     return folder
 
 
@@ -34,7 +34,7 @@ def learned(tmp_path_factory):
     pytest.importorskip("pyarrow")
     folder = tmp_path_factory.mktemp("learned") / "ds"
     built = build(LEARNED, folder, Here(), silent)
-    assert (built.units, built.quarantined) == (2, 0)
+    assert (built.manifest.units, built.manifest.quarantined) == (2, 0)
     return folder
 
 

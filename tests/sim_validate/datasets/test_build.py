@@ -110,7 +110,7 @@ def test_a_finished_dataset_is_left_alone(copy):
     before, engine = contents(copy), Here()
     built = build(CONFIG, copy, engine, silent)
     assert not engine.submitted
-    assert built.rows["objects"] == 2
+    assert built.manifest.rows["objects"] == 2
     assert contents(copy) == before
 
 
@@ -125,7 +125,11 @@ def test_a_bad_object_is_quarantined_with_its_reason_and_the_others_are_there(tm
         CONFIG, objects=(str(bad), str(twin), str(tmp_path / "again.stl")), frictions=(0.5,)
     )
     built = build(config, tmp_path / "ds", Here(), silent)
-    assert (built.units, built.quarantined, built.rows["objects"]) == (3, 2, 1)
+    assert (built.manifest.units, built.manifest.quarantined, built.manifest.rows["objects"]) == (
+        3,
+        2,
+        1,
+    )
     lines = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
     reasons = {json.loads(line)["object"]: json.loads(line)["reason"] for line in lines}
     assert "the same object as" in reasons[str(twin)]
@@ -143,7 +147,7 @@ def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_p
 
     engine = Here(crash)
     built = build(CONFIG, tmp_path / "ds", engine, silent)
-    assert built.quarantined == 1
+    assert built.manifest.quarantined == 1
     assert len(engine.submitted) == 6
     (line,) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
     assert json.loads(line)["friction"] == 0.5
@@ -231,7 +235,7 @@ def test_a_dataset_without_any_grasp_is_one(tmp_path):
     config = DatasetConfig(objects=("wedge",), frictions=(0.1,), families=("regulus",),
                            cones="normal")  # fmt: skip
     built = build(config, tmp_path / "ds", Here(), silent)
-    assert built.rows == {"objects": 1, "grasps": 0, "trials": 0}
+    assert built.manifest.rows == {"objects": 1, "grasps": 0, "trials": 0}
     assert verify(tmp_path / "ds", Sample(1.0)) == []
     grasps = sim_validate.load_dataset(tmp_path / "ds")["grasps"]
     assert grasps["contact_points_m"].shape == (0, 4, 3)

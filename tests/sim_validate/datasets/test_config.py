@@ -3,7 +3,6 @@ import pytest
 import grasp_core as gc
 from sim_validate.datasets.config import (
     DatasetConfig,
-    config_from_settings,
     config_from_toml,
     config_to_toml,
 )
@@ -12,7 +11,7 @@ SETTINGS = {"objects": ["wedge", "dodecahedron"], "frictions": [0.3, 1], "limit"
 
 
 def test_a_configuration_is_the_same_when_it_is_written_and_read_again(tmp_path):
-    config = config_from_settings(SETTINGS)
+    config = DatasetConfig.of_table(SETTINGS)
     path = tmp_path / "dataset.toml"
     path.write_text(config_to_toml(config))
     assert config_from_toml(path) == config
@@ -41,12 +40,12 @@ def test_names_with_quotes_and_control_characters_survive(tmp_path):
 )
 def test_what_is_refused_names_the_setting_and_what_was_expected(changed, message):
     with pytest.raises(gc.InputError, match=message):
-        config_from_settings(SETTINGS | changed)
+        DatasetConfig.of_table(SETTINGS | changed)
 
 
 def test_a_configuration_without_objects_is_refused():
     with pytest.raises(gc.InputError, match="objects: missing; add it"):
-        config_from_settings({})
+        DatasetConfig.of_table({})
 
 
 @pytest.mark.parametrize("text", ["objects = [", 'objects = ["wedge"]\nlimit = "many"'])

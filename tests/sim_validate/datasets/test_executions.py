@@ -36,7 +36,7 @@ CONFIG = DatasetConfig(
 def executed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("executed") / "ds"
     built = build(CONFIG, folder, Here(), silent)
-    assert (built.quarantined, built.rows["executions"]) == (0, 2)
+    assert (built.manifest.quarantined, built.manifest.rows["executions"]) == (0, 2)
     return folder
 
 
@@ -158,4 +158,4 @@ def test_a_grasp_without_a_squeeze_did_not_survive_and_a_refused_one_is_not_know
     }  # fmt: skip
     assert "survived" not in execution_cells("the tips overlap")
     assert execution_cells(None) == {}
-    assert list(execution_rows("a", unheld)) == []
+    assert list(execution_rows("a", unheld, CONFIG)) == []

@@ -18,10 +18,9 @@ import grasp_core as gc
 import sim_validate
 from grasp_core.geometry.nearest_points import nearest_on_surface
 from sim_validate.datasets.build import build
-from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.config import SPLITS, DatasetConfig, SplitName
 from sim_validate.datasets.isaac import export, yaml_number
 from sim_validate.datasets.manifest import read_manifest, write_manifest
-from sim_validate.datasets.tables import SPLITS, SplitName
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import whole_folder
 from sim_validate.main import main
@@ -49,7 +48,7 @@ def dataset(tmp_path_factory):
         license="CC-BY-4.0",
     )
     built = build(config, folder / "ds", Here(), silent)
-    assert (built.units, built.quarantined) == (6, 0)
+    assert (built.manifest.units, built.manifest.quarantined) == (6, 0)
     return folder / "ds"
 
 

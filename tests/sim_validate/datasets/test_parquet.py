@@ -4,12 +4,10 @@ import pytest
 import grasp_core as gc
 from sim_validate.datasets import parquet
 from sim_validate.datasets.columns import Column
-from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.make_rows import split_of
-from sim_validate.datasets.make_unit import made_of
+from sim_validate.datasets.config import KEYS, DatasetConfig
+from sim_validate.datasets.make_unit import made_of, split_of
 from sim_validate.datasets.parquet import each_batch, parquet_bytes, read_table
 from sim_validate.datasets.rows import TABLES
-from sim_validate.datasets.tables import KEYS
 from sim_validate.datasets.units import body_of, units_of
 
 pytest.importorskip("pyarrow")

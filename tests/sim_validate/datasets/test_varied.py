@@ -10,7 +10,7 @@ from grasp_core.errors import UnfaithfulError
 from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import validate
-from sim_validate.datasets import varied as varied_grasps
+from sim_validate.datasets import figures as varied_figures
 from sim_validate.datasets.config import (
     Learning,
     config_from_toml,
@@ -156,7 +156,7 @@ def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
     (grasp,) = gc.plan(WEDGE, 0.5, families=("concurrent",), limit=1).grasps
     varying = Varying(Learning(moved_out=1), 0.5, Agenda(), LEARNED.execution)
     verdict = validate(WEDGE, grasp, 0.5, agenda=Agenda(controls=False))
-    monkeypatch.setattr(varied_grasps, "execute", unfaithful)
+    monkeypatch.setattr(varied_figures, "execute", unfaithful)
     (tried,) = varying.of(WEDGE, grasp, verdict, None)
     assert tried.executed == "the simulator is not faithful here"
     assert execution_cells(tried.executed)["executed"] is False

@@ -12,8 +12,7 @@ import grasp_core as gc
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
 from sim_validate.datasets.manifest import read_manifest, write_manifest
-from sim_validate.datasets.meshes import mesh_text
-from sim_validate.datasets.open_dataset import load_dataset
+from sim_validate.datasets.open_dataset import load_dataset, mesh_text
 from sim_validate.datasets.verify import Sample, drawn, verify
 from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
@@ -107,8 +106,8 @@ def test_a_dataset_of_tiny_triangles_verifies(tmp_path):
     mesh.write_text(mesh_text(gc.Polyhedron.from_mesh(points, corners)))
     config = dataclasses.replace(CONFIG, objects=(str(mesh),), frictions=(0.5,))
     built = build(config, tmp_path / "ds", Here(), silent)
-    assert built.rows["objects"] == 1
-    assert built.rows["grasps"] >= 2
+    assert built.manifest.rows["objects"] == 1
+    assert built.manifest.rows["grasps"] >= 2
     assert verify(tmp_path / "ds") == []
 
 
@@ -169,7 +168,7 @@ def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
     paths = (str(tmp_path / "a" / "model.obj"), str(bad))
     config = dataclasses.replace(CONFIG, objects=paths, frictions=(0.5,))
     built = build(config, tmp_path / "ds", Here(), silent)
-    assert built.quarantined == 1
+    assert built.manifest.quarantined == 1
     assert verify(tmp_path / "ds", Sample(1.0)) == []
     forged(tmp_path / "ds", "trials", lambda rows: shifted(rows, "displacement_m"))
     assert any("displacement_m" in fault for fault in verify(tmp_path / "ds", Sample(1.0)))

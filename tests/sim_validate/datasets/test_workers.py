@@ -11,9 +11,8 @@ from grasp_core.processes import local_processes
 from sim_validate.datasets import workers
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.staging import Staging
 from sim_validate.datasets.units import WorkerError, provenance, units_of
-from sim_validate.datasets.workers import Task, do_task, do_unit, drive
+from sim_validate.datasets.workers import Staging, Task, do_task, do_unit, drive
 from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
 
@@ -89,7 +88,7 @@ def test_a_worker_that_cannot_begin_ends_the_run(tmp_path):
 
     with pytest.raises(WorkerError, match=r"units of work .ModuleNotFoundError: No module"):
         build(CONFIG, tmp_path / "ds", Here(lack), silent)
-    assert build(CONFIG, tmp_path / "ds", Here(), silent).quarantined == 0
+    assert build(CONFIG, tmp_path / "ds", Here(), silent).manifest.quarantined == 0
 
 
 def test_a_worker_that_does_not_see_a_mesh_ends_the_run(tmp_path):
@@ -123,7 +122,7 @@ def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monk
 
     monkeypatch.setattr(workers, "made_of", faulty)
     built = build(config, tmp_path / "ds", Here(), silent)
-    assert (built.quarantined, built.rows["objects"]) == (1, 1)
+    assert (built.manifest.quarantined, built.manifest.rows["objects"]) == (1, 1)
     left_out = (tmp_path / "ds" / "quarantine.jsonl").read_text()
     assert "internal error: ZeroDivisionError: a bug" in left_out
 
