@@ -186,6 +186,14 @@ def trusted(kind: type[Item], /, **given: Any) -> Item:
     return made
 
 
+def altered(value: Item, /, **given: Any) -> Item:
+    """Copy a frozen value with some other fields, which were checked before, unchecked."""
+    made, put = object.__new__(type(value)), object.__setattr__
+    for name in cast("Any", value).__dataclass_fields__:
+        put(made, name, given[name] if name in given else getattr(value, name))
+    return made
+
+
 def kept(value: object, name: str) -> Any:
     """Return a field as it is; None where it would have to be computed first."""
     try:
