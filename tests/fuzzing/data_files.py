@@ -6,8 +6,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import to_jsonable_python
-
 import grasp_core as gc
 from grasp_core.files.records import RecordFile, record_of
 from grasp_core.files.text_files import text_of
@@ -132,7 +130,7 @@ REGIONS = {
 
 def _same_record(data: bytes, found: Any) -> None:
     """Every field that is spoken of is as it is written."""
-    _compare(json.loads(data), to_jsonable_python(found))
+    _compare(json.loads(data), found)
 
 
 def _compare(stated: Any, found: Any) -> None:
