@@ -15,7 +15,7 @@ that a copy equals its original. Fields that are declared with `compare=False` d
 imported here, since command-line help waits for it.
 """
 
-from collections.abc import Mapping, Sized
+from collections.abc import Callable, Mapping, Sized
 from dataclasses import MISSING, Field, fields
 from functools import cache
 from textwrap import shorten
@@ -279,3 +279,35 @@ def vector(value: Any) -> str:
     sizes = [float(x) for x in value]
     nothing = NOTHING * max(map(abs, sizes), default=0.0)
     return f"({', '.join(f'{0.0 if abs(x) < nothing else x:.6g}' for x in sizes)})"
+
+
+Draw = Callable[[Any], str | None]
+"""A function that returns the HTML of a value, or None where it has no picture of it."""
+
+_DRAWN_WITH: list[Draw] = []
+"""The function that was handed over, or none."""
+
+
+class InNotebooks:
+    """Base of values that show a picture at the end of a notebook's cell.
+
+    A package that stands on this one draws it: `scenes` hands over a function when it is imported,
+    and values ask for it. Without `scenes` notebooks show `repr`.
+    """
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str | None:
+        """Return HTML with a picture; None where there is none, so that notebooks show `repr`."""
+        try:
+            return self._html()
+        except Exception:  # a picture that fails must not hide the value, which still has a text
+            return None
+
+    def _html(self) -> str | None:
+        return _DRAWN_WITH[0](self) if _DRAWN_WITH else None
+
+
+def draw_with(draw: Draw) -> None:
+    """Hand over the function that draws values; a second one takes the place of the first."""
+    _DRAWN_WITH[:] = [draw]
