@@ -158,12 +158,10 @@ def plan(kind: type, *, exact: bool = False) -> Plan:
     takers = tuple((name, takes(each, exact=exact)) for name, each in types(kind).items())
     shapes = ((name, getattr(rule, "shape", ()))
               for name, each in types(kind).items() for rule in rules(each))  # fmt: skip
-    lettered = tuple((name, shape) for name, shape in shapes if any(map(_is_text, shape)))
+    lettered = tuple(
+        (name, shape) for name, shape in shapes if any(isinstance(n, str) for n in shape)
+    )
     return Plan(takers, lettered)
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
 
 
 def rules(kind: Any) -> tuple[Any, ...]:
