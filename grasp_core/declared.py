@@ -37,6 +37,10 @@ SHORT_VECTOR = 6
 NOTHING = 1e-12
 """Share of a vector's largest number below which a number is shown as zero."""
 Item = TypeVar("Item")
+Draw = Callable[[Any], str | None]
+"""A function that returns the HTML of a value, or None where it has no picture of it."""
+_DRAWN_WITH: list[Draw] = []
+"""The function that was handed over, or none."""
 
 
 class FieldError(InputError):
@@ -277,13 +281,6 @@ def vector(value: Any) -> str:
     sizes = [float(x) for x in value]
     nothing = NOTHING * max(map(abs, sizes), default=0.0)
     return f"({', '.join(f'{0.0 if abs(x) < nothing else x:.6g}' for x in sizes)})"
-
-
-Draw = Callable[[Any], str | None]
-"""A function that returns the HTML of a value, or None where it has no picture of it."""
-
-_DRAWN_WITH: list[Draw] = []
-"""The function that was handed over, or none."""
 
 
 class InNotebooks:

@@ -56,6 +56,18 @@ from grasp_core.solvers.ties import first_best
 
 GRAVITY_M_PER_S2 = 9.80665
 """Standard gravity."""
+ANGLES = 96
+"""Directions of the grid on which minima of (4) are bracketed."""
+MINIMA = 3
+"""Most minima of (4) over the circle."""
+NEWTON_STEPS = 12
+"""Each halves the bracket at least; from a good start four reach rounding."""
+GOLDEN_STEPS = 70
+"""Golden sections for a multiplier, each to 0.62 of the interval: down to rounding."""
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+ROUNDING = 1e-12
+"""Least eigenvalue of (5) that counts as none, relative to its largest entry: a thousand times
+what rounding leaves. Forces near the tip of a cone may leave it by its root, a millionth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -106,20 +118,6 @@ def any_direction(
     offset[:3] = mass * frozen(gravity, (3,), "gravity", most=LARGEST)
     axes[:3] = mass * most * np.eye(3)
     return LoadSet(offset, axes)
-
-
-ANGLES = 96
-"""Directions of the grid on which minima of (4) are bracketed."""
-MINIMA = 3
-"""Most minima of (4) over the circle."""
-NEWTON_STEPS = 12
-"""Each halves the bracket at least; from a good start four reach rounding."""
-GOLDEN_STEPS = 70
-"""Golden sections for a multiplier, each to 0.62 of the interval: down to rounding."""
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-ROUNDING = 1e-12
-"""Least eigenvalue of (5) that counts as none, relative to its largest entry: a thousand times
-what rounding leaves. Forces near the tip of a cone may leave it by its root, a millionth."""
 
 
 @dataclass(frozen=True, eq=False)

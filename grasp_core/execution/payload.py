@@ -60,6 +60,16 @@ from grasp_core.values import Contact, Grasp
 UNITS_LOST = 16.0
 """Rounding units by which the volume of a triangle's cone may be off, relative to the product of
 its sides and its distance: differences, products and sums lose about one each."""
+GAP = 1e-3
+"""Gap between the bounds of the free mass, relative to it, at which no more rays follow."""
+RAYS = 200
+"""Most rays; twenty to eighty are usual."""
+NOTHING = 1e-6
+"""Free mass that is none, in pushes over gravity: the accuracy of conic programs is a tenth."""
+ROUNDING = 1e-9
+"""Slack of bounds, relative to them."""
+FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+"""Directions of the first rays, whose hull contains the origin."""
 
 
 def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
@@ -111,18 +121,6 @@ def _is_closed(triangles: Indices) -> bool:
     edges = [tuple(edge) for t in triangles.tolist() for edge in zip(t, t[1:] + t[:1], strict=True)]
     known = set(edges)
     return len(known) == len(edges) and all((b, a) in known for a, b in edges)
-
-
-GAP = 1e-3
-"""Gap between the bounds of the free mass, relative to it, at which no more rays follow."""
-RAYS = 200
-"""Most rays; twenty to eighty are usual."""
-NOTHING = 1e-6
-"""Free mass that is none, in pushes over gravity: the accuracy of conic programs is a tenth."""
-ROUNDING = 1e-9
-"""Slack of bounds, relative to them."""
-FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
-"""Directions of the first rays, whose hull contains the origin."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -59,6 +59,10 @@ STARTS = 8
 """Tangent directions of each case in the first program."""
 BOUNDING = 1e-6
 """Least c.y of (4), relative to |c| |y|, that bounds the scale."""
+NEAR = 1e-5
+"""Share by which a load larger than the worst makes a contact slip, or a joint reach its torque."""
+NONE = 1e-9
+"""Scale that is none, in pushes over the change of contact forces at scale one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,12 +231,6 @@ class Survival:
         longest = max_push_n * np.sqrt(1.0 + self.friction[: self.contacts] ** 2)
         slack = float(np.linalg.norm(left, axis=1) @ longest)
         return (float(rows.b @ multipliers + max_push_n * rows.d @ multipliers) + slack) / taken
-
-
-NEAR = 1e-5
-"""Share by which a load larger than the worst makes a contact slip, or a joint reach its torque."""
-NONE = 1e-9
-"""Scale that is none, in pushes over the change of contact forces at scale one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -75,6 +75,12 @@ CONE_ROUNDS, CONE_IMPROVEMENT = 12, 1e-4
 """Most rounds in exact cones, and the share by which the coefficient must fall in each. The excess
 falls by half or more in a round, faster unless a finger idles; the search ends some 1e-4 above the
 least."""
+NO_PUSH = 1e-9
+"""Share of the largest push below which a push counts as none: a hundred times the solver's error.
+"""
+IMBALANCE = 1e-9
+"""Largest imbalance of the answer, in units of the largest push, for contacts of unit size."""
+Objective: TypeAlias = Literal["least_norm", "least_friction", "closest"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -331,14 +337,6 @@ def _cone_program(
         b[len(equations) + side * count :][:count] = limit / unit
     each = (3,) * int((~flat).sum())
     return ConicProgram(last, A, b, len(equations), count * len(bounded), (*each, *lengths))
-
-
-NO_PUSH = 1e-9
-"""Share of the largest push below which a push counts as none: a hundred times the solver's error.
-"""
-IMBALANCE = 1e-9
-"""Largest imbalance of the answer, in units of the largest push, for contacts of unit size."""
-Objective: TypeAlias = Literal["least_norm", "least_friction", "closest"]
 
 
 def contact_forces(

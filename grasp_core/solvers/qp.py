@@ -46,6 +46,10 @@ ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
 EXACT = 1e-6
 """Error up to which the solution of (2) is accepted, in its equations, the constraints or the
 objective: a hundred times the accuracy asked of ProxQP."""
+KERNEL = "grasp_core.solvers.nearest_point_kernel"
+NEAREST = 1e-11
+"""Accepted violation of the conditions, relative to x: some thousand rounding errors, and a
+hundredth of any difference that matters."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,12 +123,6 @@ def _qpsolvers() -> Any:
             "libgomp (on Debian: apt-get install libgomp1)"
         )
     return module
-
-
-KERNEL = "grasp_core.solvers.nearest_point_kernel"
-NEAREST = 1e-11
-"""Accepted violation of the conditions, relative to x: some thousand rounding errors, and a
-hundredth of any difference that matters."""
 
 
 def least_distance(C: Array, D: Array, *, accuracy: float = NEAREST) -> Array:
