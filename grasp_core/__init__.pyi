@@ -37,10 +37,10 @@ from grasp_core.hands.named_hands import load_hand as load_hand
 from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
+from grasp_core.mesh_files.limits import PatchLimits as PatchLimits
 from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
 from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
 from grasp_core.objects.surface import Face as Face
-from grasp_core.objects.surface import PatchLimits as PatchLimits
 from grasp_core.objects.surface import Surface as Surface
 from grasp_core.optimizing.best.best_grasp import best_grasp as best_grasp
 from grasp_core.optimizing.best.result import BestGrasp as BestGrasp

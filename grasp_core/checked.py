@@ -5,7 +5,7 @@ command-line flags can use the same bounds.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
@@ -26,34 +26,6 @@ MOST_SEED = 2**64 - 1
 MOST_EDGES = 10_000
 """Largest number of edges of a pyramid that replaces a friction cone: it equals the cone to seven
 digits."""
-MOST_RANDOM_WRENCHES, MOST_TRIALS = 10_000, 100_000
-BOUNDS: Mapping[str, Mapping[str, Any]] = {
-    "friction_or_zero": {"least": 0.0, "most": LARGEST_FRICTION},
-    "patches": {"least": 4, "most": 200},  # what the planner takes
-    "patch_spread_deg": {"above": 0.0, "most": 45.0},  # above it nothing is flat
-    "patch_depth": {"above": 0.0, "most": 0.1},
-    "reserve": {"least": 0.0, "below": 1.0},
-    "max_cones": {"least": 64, "most": 1_000_000},  # a search begins with the 64 orthants
-    "gap": {"least": 1e-4, "most": 0.9},  # less is left to rounding, more the first twist proves
-    "time_limit_s": {"least": 0.0, "most": 1e7},
-    "ceiling": {"least": 1, "most": 10**8},
-    "changed_by_deg": {"least": 0.0, "most": 45.0},
-    "torque_limit_n_m": {"above": 0.0, "most": 1e6},
-    "hand_clearance_m": {"least": 0.0, "most": 0.02},
-    "starts": {"least": 1, "most": 10_000},
-    "torsion_m": {"least": 0.0, "most": 1.0},
-    "damping_ratio": {"least": 0.01, "most": 10.0},
-    "lift_s": {"least": 0.05, "most": 100.0},  # ten samples at least
-    "shake_hz": {"least": 0.1, "most": 25.0},  # eight samples a cycle at least
-    "off_deg": {"least": 0.0, "most": 180.0},
-    "misplacements": {"least": 1, "most": 1000},  # it bounds the time that a file can ask for
-    "noise_shift": {"least": 0.0, "most": 1.0},
-    "noise_turn_deg": {"least": 0.0, "most": 45.0},
-    "noise_normal_deg": {"least": 0.0, "most": 45.0},
-    "noise_friction": {"least": 0.0, "most": 1.0},
-    "noise_mass": {"least": 0.0, "most": 1.0},
-}
-"""Ends of the ranges of settings that Python and flags take alike, as `number` names them."""
 HUGE = 10**100
 """Whole numbers above this are shown by their size: Python does not write the largest ones."""
 SHOWN = 60

@@ -46,6 +46,9 @@ _DRAWN_WITH: list[Draw] = []
 class FieldError(InputError):
     """Error for a field of the wrong type or size; `name` is that of the field."""
 
+    owner: type | None = None
+    """Class of the field."""
+
     def __init__(self, name: str, fault: str) -> None:
         super().__init__(name, fault)
         self.name, self.fault = name, fault
@@ -125,7 +128,9 @@ def check(value: object) -> None:
             plain = take(given)
         except UnfitError as fault:
             said = str(fault) or f"must be {words(types(kind)[name])}, got {shown_of(given)}"
-            raise FieldError(name, said) from None
+            error = FieldError(name, said)
+            error.owner = kind
+            raise error from None
         if plain is not given:
             object.__setattr__(value, name, plain)
     check_letters(value)

@@ -9,7 +9,8 @@ import numpy as np
 
 from grasp_core.checked import function, number, one_of, several, shown
 from grasp_core.errors import InputError
-from grasp_core.values import Grasp, Method
+from grasp_core.kinds import Method
+from grasp_core.values import Grasp
 
 SHOWN_IDS = 5
 """Largest number of ids that a message lists."""

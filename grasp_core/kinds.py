@@ -14,9 +14,17 @@ from enum import Enum
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeAlias, Union, cast, get_args, get_origin
 
-from grasp_core.checked import LARGEST, LARGEST_FRICTION, MOST_COUNT, MOST_SEED, SMALLEST, Range
+from grasp_core.checked import (
+    LARGEST,
+    LARGEST_FRICTION,
+    MOST_COUNT,
+    MOST_EDGES,
+    MOST_SEED,
+    SMALLEST,
+    Range,
+)
 
 Take = Callable[[Any], Any]
 """A function that returns a value in the plain form of a kind; `UnfitError` if it is not of it."""
@@ -100,12 +108,38 @@ Signed = Annotated[float, Range(least=-LARGEST, most=LARGEST)]
 NotNegative = Annotated[float, Range(least=0.0, most=LARGEST)]
 Friction = Annotated[float, Range(least=SMALLEST, most=LARGEST_FRICTION)]
 FrictionOrZero = Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)]
+Share = Annotated[float, Range(least=0.0, most=1.0)]
+Gap = Annotated[float, Range(least=1e-4, most=0.9)]
+"""A gap of a proof: less is left to rounding, and more the first twist proves."""
+TimeLimit = Annotated[float, Range(least=0.0, most=1e7)]
+Cases = Annotated[int, Range(least=1, most=10**8)]
+Reserve = Annotated[float, Range(least=0.0, below=1.0)]
+MaxCones = Annotated[int, Range(least=64, most=1_000_000)]
+"""Number of cones of a proof of regions, which begins with the 64 orthants."""
+FaceTurn = Annotated[float, Range(least=0.0, most=45.0)]
+"""An angle between normals of like faces [deg]: beyond it, a face of a box and its chamfer would be
+like each other."""
+TorqueLimit = Annotated[float, Range(above=0.0, most=1e6)]
+HandClearance = Annotated[float, Range(least=0.0, most=0.02)]
+Starts = Annotated[int, Range(least=1, most=10_000)]
+Edges = Annotated[int, Range(least=3, most=MOST_EDGES)]
+RandomWrenches = Annotated[int, Range(least=0, most=10_000)]
+Repeats = Annotated[int, Range(least=0, most=100_000)]
 Count = Annotated[int, Range(least=1, most=MOST_COUNT)]
 Number = Annotated[int, Range(least=0, most=MOST_COUNT)]
 """A number of things, of which there may be none."""
 Seed = Annotated[int, Range(least=0, most=MOST_SEED)]
 Vector = tuple[float, float, float]
 Direction = Annotated[Vector, Size()]
+Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
+"""The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
+others."""
+Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
+"""How grasps are searched for: by one of the paper's three constructions, or free of any family."""
+METHODS: tuple[Method, ...] = get_args(Method)
+ConeKind: TypeAlias = Literal["tilted", "normal"]
+RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "payload", "diverse"]
+"""What makes one grasp better than another (see `plan`)."""
 OrInfinity = Annotated[float, Null(math.inf)]
 """A number that is infinite where nothing ever happens; null in files."""
 Measured = Annotated[float, Null(math.nan)]

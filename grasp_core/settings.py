@@ -12,13 +12,15 @@ What functions take, tables of files and flags of commands are such classes, and
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields, replace
 from textwrap import shorten
-from typing import Any, Self, cast, get_args
+from typing import Any, Self, TypeVar, cast, get_args
 
 from grasp_core.checked import shown
 from grasp_core.declared import Declared, FieldError, default_of, types
 from grasp_core.errors import InputError
-from grasp_core.kinds import inside
+from grasp_core.kinds import UnfitError, inside, takes, words
 
+Given = TypeVar("Given", bound="Settings")
+Given = TypeVar("Given", bound="Settings")
 LONGEST_LINE = 200
 """Largest number of characters of the text that shows settings."""
 CHOSEN = "chosen by the program"
@@ -113,3 +115,38 @@ def named(
 def at(where: str, name: str) -> str:
     """Return where a field is that stands in a table or record."""
     return f"{where}.{name}" if where else name
+
+
+def extended(kind: type[Given], part: Settings, **more: Any) -> Given:
+    """Make settings of a class from those of a class that it extends, and from `more`.
+
+    Settings inside them are extended in the same way.
+    """
+    given: dict[str, Any] = {name: getattr(part, name) for name in types(type(part))} | more
+    for name, value in given.items():
+        own = inside(types(kind)[name], Settings)
+        if own is not None and isinstance(value, Settings) and not isinstance(value, own):
+            given[name] = extended(own, value)
+    return kind(**given)
+
+
+def value_of(kind: Any, value: Any, name: str) -> Any:
+    """Return a single value in the plain form of a kind; one that is not of it is an error."""
+    try:
+        return takes(kind)(value)
+    except UnfitError as fault:
+        said = str(fault) or f"must be {words(kind)}, got {shown(value)}"
+        raise FieldError(name, said) from None
+
+
+def as_table(settings: Settings) -> dict[str, Any]:
+    """Return the settings of users as the table of a file that gives them when it is read.
+
+    What is None is left out, as TOML has no word for it.
+    """
+    given = {name: getattr(settings, name) for name in for_users(type(settings))}
+    return {
+        name: as_table(value) if isinstance(value, Settings) else value
+        for name, value in given.items()
+        if value is not None
+    }

@@ -17,13 +17,8 @@ from grasp_core.declared import Declared, FieldError, counted, summary, vector
 from grasp_core.errors import InputError
 from grasp_core.files.records import Key, recorded
 from grasp_core.frames import poses_along
-from grasp_core.kinds import NotNegative, Null, Number, Range, Signed
+from grasp_core.kinds import Family, NotNegative, Null, Number, Range, Signed
 
-Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
-"""The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
-others."""
-Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
-"""How grasps are searched for: by one of the paper's three constructions, or free of any family."""
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[Number, Number, Number, Number]
 """Indices of four faces, in finger order."""

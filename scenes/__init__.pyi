@@ -10,11 +10,11 @@ from scenes.hand_files.loading import load_hand as load_hand
 from scenes.mujoco.closure_scene import Scene as Scene
 from scenes.mujoco.closure_scene import build_scene as build_scene
 from scenes.mujoco.closure_scene import write_scene as write_scene
-from scenes.mujoco.fingertips import FingerSettings as FingerSettings
 from scenes.mujoco.hand_scene import HandScene as HandScene
 from scenes.mujoco.hand_scene import build_hand_scene as build_hand_scene
-from scenes.mujoco.held import HeldSettings as HeldSettings
 from scenes.mujoco.held_mjcf import HeldScene as HeldScene
 from scenes.mujoco.held_mjcf import build_held_scene as build_held_scene
 from scenes.mujoco.layout import Layout as Layout
-from scenes.mujoco.physics import PhysicsSettings as PhysicsSettings
+from scenes.settings import FingerSettings as FingerSettings
+from scenes.settings import HeldSettings as HeldSettings
+from scenes.settings import PhysicsSettings as PhysicsSettings

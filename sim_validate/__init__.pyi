@@ -7,14 +7,11 @@ from sim_validate.closure.verdict import Verdict as Verdict
 from sim_validate.closure.verdict import Verdicts as Verdicts
 from sim_validate.closure.verdict import load_verdicts as load_verdicts
 from sim_validate.datasets.open_dataset import load_dataset as load_dataset
-from sim_validate.engine.schedules import HoldProtocol as HoldProtocol
 from sim_validate.engine.setup import Agenda as Agenda
 from sim_validate.engine.setup import NamedWrench as NamedWrench
-from sim_validate.engine.setup import Noise as Noise
 from sim_validate.engine.setup import Setup as Setup
 from sim_validate.engine.traces import Outcome as Outcome
 from sim_validate.execution.execute import execute as execute
-from sim_validate.execution.settings import ExecutionSettings as ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp as ExecutedGrasp
 from sim_validate.execution.verdict import Execution as Execution
 from sim_validate.execution.verdict import Executions as Executions
@@ -40,3 +37,6 @@ from sim_validate.protocols.published import protocol_names as protocol_names
 from sim_validate.report.charts.margin_charts import margin_figure as margin_figure
 from sim_validate.report.charts.wrench_charts import wrench_figure as wrench_figure
 from sim_validate.report.report import write_report as write_report
+from sim_validate.settings.executions import ExecutionSettings as ExecutionSettings
+from sim_validate.settings.trials import HoldProtocol as HoldProtocol
+from sim_validate.settings.trials import Noise as Noise

@@ -41,6 +41,7 @@ from sim_validate.kit.config_file import with_config
 from sim_validate.kit.examples import examples_for
 from sim_validate.kit.exit_codes import Exit, FlagsError, exit_code, reason_of
 from sim_validate.kit.flag_groups import Spoken
+from sim_validate.kit.flag_values import REGISTRY, flags_of
 
 Command = (
     Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
@@ -103,15 +104,24 @@ def main(argv: Sequence[str] | None = None) -> int:
                 "--config FILE.toml, whose keys are flags; flags given override it."
             ),
             args=flags,
+            registry=REGISTRY,
         )
     except SystemExit as stop:
         sys.stdout.write(examples_for(arguments))
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except FieldError as error:
-        return _complain(f"--{error.name.replace('_', '-')} {error.fault}", Exit.USAGE)
+        return _complain(f"{_flag_of(error)} {error.fault}", Exit.USAGE)
+    except InputError as error:  # settings that do not fit each other
+        return _complain(str(error), Exit.USAGE)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
+
+
+def _flag_of(error: FieldError) -> str:
+    found = (each.name for each in flags_of(Command)
+             if (each.owner, each.field) == (error.owner, error.name))  # fmt: skip
+    return "--" + next(found, error.name).replace("_", "-")
 
 
 def execute(command: Spoken) -> int:

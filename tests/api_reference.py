@@ -12,6 +12,8 @@ from typing import Any
 
 from docstring_parser import DocstringStyle, parse
 
+from grasp_core.settings import Settings
+
 PAGE = Path(__file__).parent.parent / "docs" / "api.md"
 PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
 UNTOLD = ("Key", "Shape", "UNRECORDED", "FLAT")
@@ -92,7 +94,16 @@ class Shown(ast.NodeTransformer):
 
 
 def members_of(kind: type) -> Iterator[str]:
-    """Fields with what is said below each, then properties and methods."""
+    """Fields with what is said below each, then properties and methods; inherited settings too."""
+    for parent in kind.__bases__:
+        if issubclass(parent, Settings) and parent is not Settings:
+            again = tuple(f"* `{name}:" for name in vars(kind).get("__annotations__", {}))
+            yield from (line for line in members_of(parent) if not line.startswith(again or "-"))
+    yield from own_members_of(kind)
+
+
+def own_members_of(kind: type) -> Iterator[str]:
+    """Members that a class declares itself."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     assert isinstance(tree, ast.ClassDef)
     for part, after in zip(tree.body, [*tree.body[1:], None], strict=True):

@@ -7,6 +7,7 @@ import io
 import math
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,6 @@ from sim_validate.report.charts.margin_charts import margin_figure
 from sim_validate.report.charts.motion_charts import motion_panels
 from sim_validate.report.charts.run_charts import fidelity_panel
 from sim_validate.report.charts.wrench_charts import wrench_figure
-from sim_validate.report.drawn_grasps import certified
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
@@ -73,10 +73,7 @@ def regions():
     """Certified regions of a regulus, for which the paper has none."""
     body, grasp = best("octahedron", "regulus", FRICTION)
     found = gc.certify_regions(body, grasp, FRICTION, max_cones=1250)
-    record = {"regions": [{"polygon_m": region.polygon,
-                           "inscribed_radius_m": region.inscribed_radius}
-                          for region in found.regions]}  # fmt: skip
-    return grasp_figure(body, certified(grasp, record), FRICTION)
+    return grasp_figure(body, replace(grasp, regions=found.regions), FRICTION)
 
 
 def wrenches():

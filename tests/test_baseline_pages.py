@@ -12,9 +12,9 @@ from grasp_core.settings import for_users
 from sim_validate.baselines.baseline import Entry, ExecutedFigures
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import Suite, suite_from_toml
-from sim_validate.engine.setup import Noise
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.settings.trials import Noise
 from tests.sim_validate.plugin.project import run_pytest, run_pytest_alone
 
 ROOT = Path(__file__).parent.parent
@@ -74,7 +74,7 @@ def test_all_settings_are_shown(tmp_path):
     assert suite.baseline == tmp_path / "wedge.baseline.json"
     assert suite.noise == dataclasses.replace(Noise(), friction=0.1)
     assert suite.survives
-    assert suite.execution.settings.trials == ("weight", "lift")
+    assert suite.execution.trials == ("weight", "lift")
 
 
 def test_all_fields_and_all_answers_are_described():

@@ -22,9 +22,9 @@ from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import Fate
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.flag_groups import TRIALS, Executing
 from sim_validate.main import main
 from sim_validate.planning.wrenches_json import wrenches_from_file
+from sim_validate.settings.executions import KINDS, ChosenExecution
 from tests import api_reference, file_reference
 from tests.sim_validate.datasets.configs import build_small
 
@@ -159,11 +159,9 @@ def test_the_fields_of_files_are_those_of_the_page(tmp_path):
 
 def test_the_page_of_executions_names_every_trial_fate_and_flag():
     page = PAGES["execution"]
-    assert listed("execution", "### The trials") == list(TRIALS)
+    assert listed("execution", "### The trials") == list(KINDS)
     assert all(f"`{fate}`" in page for fate in get_args(Fate))
-    groups = (Executing(), Executing().mass, Executing().tips)
-    names = [field.name for group in groups for field in fields(group)]
-    for name in set(names) - {"mass", "tips"}:
+    for name in (field.name for field in fields(ChosenExecution) if field.name != "trials"):
         assert f"`--{name.replace('_', '-')}" in page, name
 
 
@@ -206,7 +204,7 @@ def test_the_settings_of_a_dataset_are_all_shown(tmp_path):
     config = config_from_toml(path)
     shown = set(tomllib.loads(text))
     assert set(DatasetConfig.__dataclass_fields__) - shown == {"contacts", "outward", "learning"}
-    assert config.execution.settings.mass_kg == 0.3
+    assert config.execution.mass_kg == 0.3
     plain = DatasetConfig(objects=config.objects)
     told = {"objects", "frictions", "title", "license", "creator", "url", "published", "execution"}
     for name in shown - told:

@@ -14,8 +14,9 @@ from grasp_core.families.pencil import place_pencil
 from grasp_core.families.placements import LEAST_RADIUS, NoPlacement, Placement
 from grasp_core.families.regulus import nearly_symmetric, place_regulus
 from grasp_core.geometry.polygons import edge_rows
+from grasp_core.kinds import Family
 from grasp_core.objects.face_pieces import FacePiece, inscribed_radius
-from grasp_core.values import ContactRegion, Family, ForceCone
+from grasp_core.values import ContactRegion, ForceCone
 
 FingerOrder: TypeAlias = tuple[int, int, int, int]
 Region: TypeAlias = Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]

@@ -52,10 +52,11 @@ from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable, face
 from grasp_core.families.pencil import pencil_radius_bounds
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.regulus import regulus_bounds
+from grasp_core.kinds import Family
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import RESIDUAL
-from grasp_core.values import FINGERS, Family
+from grasp_core.values import FINGERS
 
 KERNEL = "grasp_core.families.corner_bounds_kernel"
 LEAST_SINE = 1e-6

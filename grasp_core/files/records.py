@@ -270,7 +270,7 @@ def _narrowed_read(kind: Any, *given: Any) -> Read | None:
 
 def _array_read(shape: tuple[int | str | None, ...], value: Any, where: str) -> Any:
     """Refuse true and false, which arrays would take for 1 and 0; an empty list has no rows."""
-    if value == [] and not isinstance(shape[0], int):
+    if isinstance(value, list) and not cast("list[Any]", value) and not isinstance(shape[0], int):
         import numpy as np
 
         return np.empty((0, *(size for size in shape[1:] if isinstance(size, int))))
@@ -279,7 +279,7 @@ def _array_read(shape: tuple[int | str | None, ...], value: Any, where: str) -> 
         items = [*chain.from_iterable(items)]
     if bool in found:
         raise InputError(f"{where}: expected numbers, got true or false among them")
-    return value
+    return cast("Any", value)
 
 
 def _items_read(parts: tuple[Any, ...]) -> Read | None:

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Shape, UnitVector, frozen_each
-from grasp_core.checked import BOUNDS, text
+from grasp_core.checked import text
 from grasp_core.declared import Declared, counted, summary
 from grasp_core.errors import InputError
 from grasp_core.files.records import Key
 from grasp_core.hands.couplings import Coupling, Drives, drives
-from grasp_core.kinds import Many, Range
+from grasp_core.kinds import Many, Range, TorqueLimit
 
 LARGEST_SIZE = 2.0
 """Largest length of a hand [m]: a larger one is in other units."""
@@ -106,7 +106,7 @@ class Joint(Declared):
     """Smallest angle [rad]."""
     highest: Annotated[Angle, Key("highest_rad")]
     """Largest angle [rad]."""
-    torque_limit_n_m: Annotated[float, Range(**BOUNDS["torque_limit_n_m"])] | None = None
+    torque_limit_n_m: TorqueLimit | None = None
     """Largest torque of the motor in either direction [N m]; None where no source states one."""
 
     def _check_together(self) -> None:

@@ -20,14 +20,11 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen
 from grasp_core.checked import (
-    BOUNDS,
     coefficient,
     instance,
-    number,
     seed_of,
     shown,
     switch,
-    whole,
 )
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, summary
@@ -39,9 +36,10 @@ from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.opening import opened
 from grasp_core.hands.pose_search import Asked, contact_choices, find_pose
-from grasp_core.kinds import Number, Range
+from grasp_core.kinds import HandClearance, Number, Starts
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.settings import value_of
 from grasp_core.values import FINGERS, Contact, Grasp
 
 ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]
@@ -67,7 +65,7 @@ class HandReach(Declared):
     """Reason why no pose was found, as a sentence; empty where one was found."""
     starts: Annotated[Number, Shown("starts")]
     """Number of starts that were tried."""
-    clearance_m: Annotated[float, Range(**BOUNDS["hand_clearance_m"])]
+    clearance_m: HandClearance
     """Least distance that was asked for between all that must not touch [m]."""
     fingers: Annotated[Indices, Shape("k", whole=True)] | None = None
     """The hand's finger at each contact that is used, (k,)."""
@@ -190,8 +188,8 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     switch(regions, "regions")
     asked = Asked(
         hand, body, grasp, coefficient(friction), up, height,
-        number(clearance_m, "clearance_m", **BOUNDS["hand_clearance_m"]), regions,
-        seed_of(seed), whole(starts, "starts", **BOUNDS["starts"]),
+        value_of(HandClearance, clearance_m, "clearance_m"), regions,
+        seed_of(seed), value_of(Starts, starts, "starts"),
     )  # fmt: skip
     closed, refuted, undecided = contact_choices(grasp, asked.friction, len(hand.fingers))
     if not closed:

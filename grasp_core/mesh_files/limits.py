@@ -1,18 +1,66 @@
-"""Limits a mesh file's bytes, triangles, planar faces and bodies."""
+"""Settings of how a mesh is taken: lengths, faces, and limits on what is read."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal, TypeAlias
 
-from grasp_core.kinds import Count
+from grasp_core.kinds import Count, Quantity, Range
 from grasp_core.settings import Settings
 
+FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
+Unit: TypeAlias = Literal["m", "cm", "mm", "in"]
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class MeshLimits(Settings):
     """Limits on a mesh file's size and content, which bound the time and memory of reading it."""
 
-    max_bytes: Count = 64 * 2**20
+    max_mesh_bytes: Count = 64 * 2**20
+    """Largest size of a mesh file that is read [bytes]."""
     max_triangles: Count = 200_000
+    """Largest number of triangles of a mesh."""
     max_faces: Count = 5_000
-    """Largest number of planar faces of the object."""
+    """Largest number of planar faces of an object."""
     max_parts: Count = 64
-    """Largest number of connected parts of the surface: separate bodies and inner cavities."""
+    """Largest number of separate parts of a surface: separate bodies and inner cavities."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PatchLimits(Settings):
+    """How flat a patch of a curved surface must be, and how many patches are kept.
+
+    Raises:
+        InputError: A limit is out of range.
+    """
+
+    spread_deg: Annotated[float, Range(above=0.0, most=45.0)] = 10.0
+    """Largest angle between the surface and a patch's plane [deg]; the friction angle to plan with
+    shrinks by as much."""
+    depth: Annotated[float, Range(above=0.0, most=0.1)] = 0.01
+    """Largest distance of the surface from a patch's plane, relative to the object's extent."""
+    most: Annotated[int, Range(least=4, most=200)] = 20
+    """Keep at most this many patches, those with the largest inscribed discs."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Lengths(Settings):
+    """What lengths the numbers of a mesh file mean."""
+
+    unit: Unit = "m"
+    """Unit of length in a mesh file."""
+    scale: Quantity = 1.0
+    """Factor on the coordinates of a mesh file, besides its unit."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class MeshChoices(MeshLimits):
+    """How a mesh is taken."""
+
+    faces: FaceKind = "auto"
+    """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface,
+    which may have holes; auto takes patches where there are more than 200 planar faces."""
+    patches: PatchLimits = PatchLimits()
+    flatness_m: Annotated[float, Range(least=0.0, most=20.0)] | None = None
+    """Distance within which corners count as in one plane [m]. If not given, it is a millionth of
+    the extent, or what the rounding of the file's coordinates explains."""
+    largest_part: bool = False
+    """Use the largest part of the mesh alone; otherwise at most 1 % of its surface is left out."""

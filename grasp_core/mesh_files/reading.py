@@ -49,9 +49,10 @@ def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
             message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
             raise MeshError(MeshRefusal.FORMAT, message)
         try:
-            data = bounded_bytes(path, limits.max_bytes)
-            if len(data) > limits.max_bytes:
-                message = f"the file is over the limit of {limits.max_bytes} bytes; simplify it"
+            data = bounded_bytes(path, limits.max_mesh_bytes)
+            if len(data) > limits.max_mesh_bytes:
+                most = limits.max_mesh_bytes
+                message = f"the file is over the limit of {most} bytes; simplify it"
                 raise MeshError(MeshRefusal.TOO_MANY, message)
             return mesh_of_bytes(kind, data, limits.max_triangles)
         except OSError as error:

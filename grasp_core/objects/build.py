@@ -14,17 +14,15 @@ Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 
 import hashlib
 import math
-from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen, real_array
-from grasp_core.declared import Declared
 from grasp_core.errors import InputError, MeshError, MeshRefusal
-from grasp_core.kinds import Range
-from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.limits import MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.polygons import check_corners, too_many
 from grasp_core.mesh_files.rounding import single_rounding
 from grasp_core.objects.booleans import Solid, hull
@@ -39,7 +37,7 @@ from grasp_core.objects.planar_faces import (
 from grasp_core.objects.sheets import check_bounds
 from grasp_core.objects.solid_checks import check_volume
 from grasp_core.objects.sound_surface import SoundSurface, sound_surface
-from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
+from grasp_core.objects.surface import Face, Surface
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
@@ -57,17 +55,6 @@ that is coarser than this, shapes and rounding cannot be told apart."""
 DEFAULT_LIMITS = MeshLimits()
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class MeshChoices(Declared):
-    """How a mesh is taken; `load_polyhedron` explains the fields."""
-
-    faces: FaceKind = "auto"
-    patches: PatchLimits | None = None
-    flatness_m: Annotated[float, Range(least=0.0, most=LARGEST_EXTENT_M)] | None = None
-    largest_part: bool = False
-    limits: MeshLimits = DEFAULT_LIMITS
-
-
 DEFAULT_CHOICES = MeshChoices()
 
 
@@ -81,17 +68,17 @@ def build(
     known: Surface | None = None,
 ) -> dict[str, Any]:
     """Check a triangle mesh and find its faces; return the fields of a `Polyhedron`."""
-    points, corners = _checked_arrays(vertices, triangles, choices.limits.max_triangles)
+    points, corners = _checked_arrays(vertices, triangles, choices.max_triangles)
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     off = single_rounding(points) if rounding is None else rounding
     blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
-    most, largest = choices.limits.max_parts, choices.largest_part
+    most, largest = choices.max_parts, choices.largest_part
     found = sound_surface(points, corners, blur, most_parts=most, largest_part=largest, known=known)
     flatness = Flatness.of(extent, blur)
     groups = _planar_groups(found, flatness, choices)
     if groups is None:
         found = found.outward(largest_part=largest)
-        patches = choices.patches or PatchLimits()
+        patches = choices.patches
         faces, said = _patched(found, patches)
     elif found.fault:
         raise found.fault
@@ -166,9 +153,9 @@ def _planar_groups(
     groups = coplanar_groups(found.points, found.corners, flatness, found.surface.caps)
     if choices.faces == "auto" and len(groups) > MAX_FACES:
         return None
-    if len(groups) > choices.limits.max_faces:
+    if len(groups) > choices.max_faces:
         message = (
-            f"{len(groups)} planar faces exceed the limit of {choices.limits.max_faces}; simplify "
+            f"{len(groups)} planar faces exceed the limit of {choices.max_faces}; simplify "
             "the mesh, or plan on nearly flat patches (--faces patches)"
         )
         raise MeshError(MeshRefusal.TOO_MANY, message)
@@ -182,7 +169,7 @@ def _patched(found: SoundSurface, limits: PatchLimits) -> tuple[tuple[Face, ...]
             MeshRefusal.NOT_FLAT,
             f"only {len(patches)} patches are within {limits.spread_deg:g} deg and "
             f"{limits.depth:g} of the extent from flat, but four fingers need four patches; "
-            "allow more (--patch-spread-deg, --patch-depth), or refine the mesh",
+            "allow more (--patches.spread-deg, --patches.depth), or refine the mesh",
         )
     lean = max((face.spread for face in patches), default=0.0)
     off = max((face.depth for face in patches), default=0.0)

@@ -40,8 +40,9 @@ from grasp_core.geometry.polygons import (
     plane_frame,
     signed_area,
 )
+from grasp_core.mesh_files.limits import PatchLimits
 from grasp_core.objects.planar_faces import NO_CAPS, triangle_neighbours
-from grasp_core.objects.surface import Face, PatchLimits
+from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import first_best, graded, largest_first, ranks, surpassing
 
 SMOOTHING = 10

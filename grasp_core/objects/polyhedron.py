@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
 from grasp_core.checked import (
     LARGEST,
+    instance,
     one_of,
     path_of,
     positive,
@@ -27,10 +28,11 @@ from grasp_core.checked import (
 from grasp_core.declared import Declared, InNotebooks, counted, summary
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import Range
-from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import read_triangles
-from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, MeshChoices, build
-from grasp_core.objects.surface import Face, FaceKind, PatchLimits, Surface
+from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
+from grasp_core.objects.surface import Face, Surface
+from grasp_core.settings import extended
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
@@ -106,7 +108,10 @@ class Polyhedron(Declared, InNotebooks):
         Raises:
             MeshError: The mesh is not a solid; its `reason` says why.
         """
-        choices = MeshChoices(faces, patches, flatness_m, largest_part)
+        choices = MeshChoices(
+            faces=faces, patches=patches or PatchLimits(), flatness_m=flatness_m,
+            largest_part=largest_part,
+        )  # fmt: skip
         return polyhedron_from_mesh(
             vertices, triangles, choices, name=name, center_of_mass=center_of_mass, kind=cls
         )
@@ -191,7 +196,10 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         MeshError: The file is not a solid; its `reason` says why.
     """
     one_of(unit, UNITS_M, "unit")
-    choices = MeshChoices(faces, patches, flatness_m, largest_part, limits)
+    choices = extended(
+        MeshChoices, instance(limits, MeshLimits, "limits"), faces=faces,
+        patches=patches or PatchLimits(), flatness_m=flatness_m, largest_part=largest_part,
+    )  # fmt: skip
     size = UNITS_M[unit] * positive(scale, "scale")
     path = path_of(path, "path")
     mesh = read_triangles(path, limits)

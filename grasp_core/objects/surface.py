@@ -6,7 +6,7 @@ no field, because such meshes are refused.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -14,13 +14,10 @@ from grasp_core.arrays import Indices, Point, Polygon, Shape, UnitVector
 from grasp_core.checked import LARGEST
 from grasp_core.declared import Declared, counted, summary
 from grasp_core.kinds import NotNegative, Number, Range
-from grasp_core.settings import Settings
 from grasp_core.values import RIGHT_ANGLE
 
 Places = Annotated[Indices, Shape(None, whole=True)]
 """Places of things in a list, (n,)."""
-FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
-"""Which faces to use: exactly planar ones, nearly flat patches, or whichever suits the surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -49,23 +46,6 @@ class Face(Declared):
     def __repr__(self) -> str:
         parts = [counted(len(self.polygon), "corner"), counted(len(self.holes), "hole")]
         return summary("Face", *parts, area=self.area, centroid=self.centroid, normal=self.normal)
-
-
-@dataclass(frozen=True, slots=True)
-class PatchLimits(Settings):
-    """How flat a patch of a curved surface must be, and how many patches are kept.
-
-    Raises:
-        InputError: A limit is out of range.
-    """
-
-    spread_deg: Annotated[float, Range(above=0.0, most=45.0)] = 10.0
-    """Largest angle between the surface and the patch's plane [deg]; the friction angle available
-    to the planner shrinks by it."""
-    depth: Annotated[float, Range(above=0.0, most=0.1)] = 0.01
-    """Largest distance of the surface from the plane, relative to the object's largest extent."""
-    most: Annotated[int, Range(least=4, most=200)] = 20
-    """Keep at most this many patches: those with the largest inscribed discs."""
 
 
 MM = 1e3

@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen_each
-from grasp_core.checked import BOUNDS, LARGEST, coefficient, number, several, whole
+from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.kinds import Cases
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
@@ -34,6 +35,7 @@ from grasp_core.optimizing.best.search import Searching, Stop
 from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
 from grasp_core.quality.measures import FERRARI_CANNY
+from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits
 from grasp_core.values import FINGERS, FaceQuadruple
 
@@ -106,7 +108,7 @@ def quality_ceiling(
     friction = coefficient(friction)
     number(known, "known", least=0.0, most=LARGEST)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
-    whole(parts, "parts", **BOUNDS["ceiling"])
+    value_of(Cases, parts, "parts")
     given = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
     radii = frozen_each(given, FINGERS, "finger_radius")
     if (radii < 0.0).any() or (radii > body.radius).any():

@@ -20,20 +20,11 @@ from grasp_core.declared import altered, kept, trusted
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
 from grasp_core.frames import kept_angle
+from grasp_core.kinds import Family, Method
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.values import (
-    Contact,
-    ContactRegion,
-    FaceQuadruple,
-    Family,
-    ForceCone,
-    Grasp,
-    Method,
-    Witness,
-    four,
-)
+from grasp_core.values import Contact, ContactRegion, FaceQuadruple, ForceCone, Grasp, Witness, four
 
 BALANCED = 1e-6
 """Largest wrench by which witness forces may miss balance, for normal parts that sum to one and an

@@ -29,13 +29,14 @@ from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.free import Absence
 from grasp_core.families.kernel_tables import Attempts
 from grasp_core.families.placing import Attempt, Settling
+from grasp_core.kinds import Method
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
 from grasp_core.planning.quadruples import Blocks, ConedQuadruples, WideQuadruples
 from grasp_core.planning.reach import Reach
 from grasp_core.planning.result import MethodCounts, Tally
 from grasp_core.solvers.ties import coarse, graded
-from grasp_core.values import FaceQuadruple, Method, four
+from grasp_core.values import FaceQuadruple, four
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
 """Fewest and most quadruples whose bounds are tightened together."""

@@ -8,6 +8,7 @@ from itertools import chain, islice
 from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.kinds import METHODS, Family, Method
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified
@@ -24,9 +25,9 @@ from grasp_core.planning.parts import (
     search_undecided,
 )
 from grasp_core.planning.reach import Finger, Reach, reach
-from grasp_core.planning.request import FAMILIES, METHODS, PlanRequest
+from grasp_core.planning.request import FAMILIES, PlanRequest
 from grasp_core.planning.result import Outcomes
-from grasp_core.values import FINGERS, FaceQuadruple, Family, Method
+from grasp_core.values import FINGERS, FaceQuadruple
 
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""

@@ -18,6 +18,7 @@ from typing import TypeAlias
 
 from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.families.placing import chosen_shapes
+from grasp_core.kinds import Family
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified
@@ -28,7 +29,7 @@ from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_bl
 from grasp_core.planning.reach import Reach
 from grasp_core.planning.request import PlanRequest
 from grasp_core.processes import local_processes
-from grasp_core.values import FINGERS, FaceQuadruple, Family, four
+from grasp_core.values import FINGERS, FaceQuadruple, four
 
 BATCH, LIMITED_BATCH = 1024, 64
 """Number of face quadruples that are decided together, and with a limit on the grasps."""
@@ -129,10 +130,10 @@ def _unasked(_: Certified) -> Reach:
 def in_standard_order(body: Polyhedron, request: PlanRequest) -> Standard:
     """Put an object into standard order, with faces cut as requested."""
     on = standard(body)
-    if request.clearance:
-        on = replace(on, body=clear_of_edges(on.body, request.clearance))
-    if request.share_faces is not None:
-        halved, owners = with_halves(on.body, request.share_faces)
+    if request.edge_clearance_m:
+        on = replace(on, body=clear_of_edges(on.body, request.edge_clearance_m))
+    if request.share_faces_m is not None:
+        halved, owners = with_halves(on.body, request.share_faces_m)
         on = replace(on, body=halved, owners=owners)
     return on
 

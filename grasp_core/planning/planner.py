@@ -18,6 +18,7 @@ from grasp_core.checked import function, whole
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
+from grasp_core.kinds import METHODS, ConeKind, Method, RankBy
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
@@ -27,10 +28,10 @@ from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, 
 from grasp_core.planning.parts import finding_elsewhere
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
-from grasp_core.planning.request import METHODS, ConeKind, PlanRequest, RankBy, check_request
+from grasp_core.planning.request import PlanRequest, check_request
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
-from grasp_core.values import Grasp, Method
+from grasp_core.values import Grasp
 
 
 def plan(  # noqa: PLR0913 - the contract's keywords
@@ -46,8 +47,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     max_face_parts: int = 1,
     complete: bool = False,
     finger: Finger | None = None,
-    clearance: float = 0.0,
-    share_faces: float | None = None,
+    edge_clearance_m: float = 0.0,
+    share_faces_m: float | None = None,
     progress: Progress | None = None,
     jobs: int = 1,
 ) -> Plan:
@@ -74,10 +75,10 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         max_face_parts: Most parts into which the free method may cut the faces of one quadruple.
         complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
         finger: Keep only grasps that such fingers reach on straight free lines.
-        clearance: Distance of contacts and their regions from all edges of their faces [m]. Faces
-            are cut back by this much, by somewhat more at corners that turn inwards; absence is
-            then proved for what is left of the faces.
-        share_faces: Let two fingers stand on one face, at least this far apart [m]; each face is
+        edge_clearance_m: Distance of contacts and their regions from all edges of their faces [m].
+            Faces are cut back by this much, by somewhat more at corners that turn inwards; absence
+            is then proved for what is left of the faces.
+        share_faces_m: Let two fingers stand on one face, at least this far apart [m]; each face is
             cut once for that, across its longest direction.
         progress: Called after each quadruple that is tried.
         jobs: Largest number of processes. Only searches for all grasps of objects with many faces
@@ -91,8 +92,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         SolverError: A program was neither solved nor proved infeasible.
     """
     request = PlanRequest(
-        friction, _listed(families), theta_deg, cones, limit, rank_by, seed, max_face_parts,
-        complete, finger, clearance, share_faces,
+        friction, _listed(families), theta_deg, cones, limit, rank_by, max_face_parts, complete,
+        edge_clearance_m, share_faces_m, seed, finger,
     )  # fmt: skip
     check_request(body, request)
     if progress is not None:
@@ -114,8 +115,8 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     seed: int = 0,
     max_face_parts: int = 1,
     finger: Finger | None = None,
-    clearance: float = 0.0,
-    share_faces: float | None = None,
+    edge_clearance_m: float = 0.0,
+    share_faces_m: float | None = None,
 ) -> Iterator[Grasp]:
     """Like `plan`, but yields each grasp as soon as it is certified, in no particular order.
 
@@ -125,7 +126,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     """
     request = PlanRequest(
         friction, _listed(families), theta_deg, cones, seed=seed, max_face_parts=max_face_parts,
-        finger=finger, clearance=clearance, share_faces=share_faces,
+        finger=finger, edge_clearance_m=edge_clearance_m, share_faces_m=share_faces_m,
     )  # fmt: skip
     check_request(body, request)
     on, searches = prepared(body, request)
@@ -190,8 +191,8 @@ def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, known: 
         return f"{name}: no grasp was found on its patches, which proves nothing about others"
     if "free" in counts.families:
         limits = f" at friction {math.tan(request.theta):.4g}"
-        if request.clearance:
-            limits += f" on faces cut back by {request.clearance:g} m from their edges"
+        if request.edge_clearance_m:
+            limits += f" on faces cut back by {request.edge_clearance_m:g} m from their edges"
         if known.open:
             return (
                 f"{name}: no grasp was found; {known.open} of {counts.quadruples} face "

@@ -2,26 +2,20 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import get_args
 
 from grasp_core.arrays import UNIT_SLACK
 from grasp_core.checked import SMALLEST, number
-from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Count, Friction, Many, NotNegative, Quantity, Seed
+from grasp_core.kinds import METHODS, Family, Method
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.values import Family, Method
+from grasp_core.planning.settings import PlanSettings
 
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The three families of grasps in the paper, each with its construction."""
-METHODS: tuple[Method, ...] = get_args(Method)
-"""Everything that `families` may name: the three constructions and `free`."""
-ConeKind: TypeAlias = Literal["tilted", "normal"]
-RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "payload", "diverse"]
-"""What makes one grasp better than another (see `plan`)."""
 ITS_RADIUS = ", the object's radius in m"
 FARTHEST_APPROACH = 1e3
 """Longest free line of a finger, in object radii."""
@@ -33,21 +27,10 @@ take some hundred megabytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlanRequest(Declared):
-    """What is to be planned: the friction and the other keywords of `plan`."""
+class PlanRequest(PlanSettings):
+    """What is to be planned: the settings, and the fingers that must reach their contacts."""
 
-    friction: Friction
-    families: Annotated[tuple[Method, ...], Many()]
-    theta_deg: Quantity | None = None
-    cones: ConeKind = "tilted"
-    limit: Count | None = None
-    rank_by: RankBy = "radius"
-    seed: Seed = 0
-    max_face_parts: Count = 1
-    complete: bool = False
     finger: Finger | None = None
-    clearance: NotNegative = 0.0
-    share_faces: NotNegative | None = None
 
     def _check_together(self) -> None:
         if self.complete and "free" not in self.families:
@@ -85,10 +68,10 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
 
 
 def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
-    number(request.clearance, "clearance", least=0.0, below=body.radius, where=ITS_RADIUS)
-    if request.share_faces is not None:
+    number(request.edge_clearance_m, "edge_clearance_m", below=body.radius, where=ITS_RADIUS)
+    if request.share_faces_m is not None:
         size, where = 2.0 * body.radius, ", the object's size, or None"
-        number(request.share_faces, "share_faces", least=0.0, below=size, where=where)
+        number(request.share_faces_m, "share_faces_m", below=size, where=where)
     if request.finger is not None:
         radius, approach = request.finger.radius_m, request.finger.approach_m
         number(radius, "finger.radius_m", most=body.radius, where=ITS_RADIUS)
@@ -107,7 +90,7 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
         "a limit (--limit)": request.limit is None,
         "families without the free method (--family)": "free" in request.families,
         "radius to rank by (--rank-by)": request.rank_by != "radius",
-        "no share_faces (--share-faces-m)": request.share_faces is not None,
+        "no --share-faces-m": request.share_faces_m is not None,
     }
     missing = [what for what, lacks in needed.items() if lacks]
     if faces > MAX_FACES and missing:

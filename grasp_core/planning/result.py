@@ -9,10 +9,10 @@ from typing import Annotated, Any, Protocol, TypeAlias, runtime_checkable
 from grasp_core.declared import Declared, InNotebooks, counted, summary
 from grasp_core.files.records import UNRECORDED, Key
 from grasp_core.grasp_tables import ById, chosen, data_frame
-from grasp_core.kinds import Friction, Number, Seed
+from grasp_core.kinds import Friction, Method, Number, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.values import Bounds, FaceQuadruple, Grasp, HalfAngle, Method
+from grasp_core.values import Bounds, FaceQuadruple, Grasp, HalfAngle
 
 LONGEST_REASON = 160
 """Most characters of a reason in the `repr` of a plan, so that it takes two lines at most."""
@@ -102,7 +102,7 @@ class PlanCounts(Declared):
 
     faces: Number
     quadruples: Number
-    """Number of sets of four faces; with `share_faces` also of sets with two halves of a face."""
+    """Number of sets of four faces; with `share_faces_m` also of sets with two halves of a face."""
     spanning: Number | None
     """Sets whose normals positively span at the least planned angle (P3); None where they were not
     counted, as above 200 faces."""

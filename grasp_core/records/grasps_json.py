@@ -16,14 +16,15 @@ from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of, shown, text_of
 from grasp_core.files.records import from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.limits import MeshLimits, PatchLimits
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.objects.surface import PatchLimits, Surface
+from grasp_core.objects.surface import Surface
 from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
+from grasp_core.settings import extended
 from grasp_core.values import Grasp
 
 SCHEMA = 2
@@ -67,7 +68,7 @@ class RecordedObject(Declared):
         body = polyhedron_from_mesh(
             self.mesh.vertices_m,
             self.mesh.triangles,
-            MeshChoices(faces=faces, patches=self.patches, limits=RECORDED),
+            extended(MeshChoices, RECORDED, faces=faces, patches=self.patches or PatchLimits()),
             name=self.name,
             source_sha256=self.source_sha256,
             center_of_mass=self.center_of_mass_m,

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import BOUNDS, coefficient, number, switch, whole
+from grasp_core.checked import coefficient, number, switch
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
@@ -30,12 +30,14 @@ from grasp_core.geometry.polygons import (
     tidy,
     with_fewer_corners,
 )
+from grasp_core.kinds import MaxCones, Reserve
 from grasp_core.objects.face_pieces import FacePiece, inscribed_radius, piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certificates import PLACED, CertifiedRegions
 from grasp_core.regions.growth import better_centers, larger_inside, shared_out
 from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
+from grasp_core.settings import value_of
 from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
@@ -81,10 +83,10 @@ def certify_regions(
         SolverError: A proof failed its check.
     """
     check_on_faces(body, grasp)
-    number(reserve, "reserve", **BOUNDS["reserve"])
+    value_of(Reserve, reserve, "reserve")
     switch(recenter, "recenter")
     number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
-    whole(max_cones, "max_cones", **BOUNDS["max_cones"])
+    value_of(MaxCones, max_cones, "max_cones")
     left = coefficient(friction) * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:

@@ -44,10 +44,11 @@ from typing import Annotated, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import BOUNDS, instance, number
+from grasp_core.checked import instance, number
 from grasp_core.declared import Declared, counted
 from grasp_core.errors import InputError
 from grasp_core.files.records import Key
+from grasp_core.kinds import FaceTurn
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -58,15 +59,15 @@ from grasp_core.planning.given_contacts import (
     nearest_in,
     nearest_like,
 )
+from grasp_core.settings import value_of
+from grasp_core.transferring.settings import Carrying
 
 Triple: TypeAlias = tuple[float, float, float]
 SHARE_OF_SIZE = 0.05
 """Default for how far a contact may move, relative to the old part's radius."""
-ANGLE_DEG = 5.0
-"""Default for the largest angle between the normals of like faces [deg]."""
-WIDEST_DEG = BOUNDS["changed_by_deg"]["most"]
-"""Largest such angle that is accepted [deg]: beyond it, a face of a box and its chamfer would be
-like each other."""
+ANGLE_DEG = Carrying().angle_deg
+WIDEST_DEG = 45.0
+"""Largest angle between the normals of like faces that is accepted [deg]."""
 SAME = 1e-9
 """Difference of distances, relative to the old part's radius, and of angles [rad] that is rounding:
 a face that has moved by exactly the allowed distance is still near enough."""
@@ -107,7 +108,7 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
     most = usual if distance is None else distance
     return Likeness(
         number(most, "distance", least=0.0, most=old.radius, where=where),
-        math.radians(number(angle_deg, "angle_deg", **BOUNDS["changed_by_deg"])),
+        math.radians(value_of(FaceTurn, angle_deg, "angle_deg")),
         SAME * old.radius,
     )
 

@@ -13,7 +13,7 @@ Fingers are spheres on three slides along (normal, tangent, tangent), each with 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -26,13 +26,11 @@ from grasp_core.files.text_files import write_parts
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.fingertips import FingerSettings
 from scenes.mujoco.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
 from scenes.mujoco.mjcf_text import Element, SceneText, add_element, as_texts, document, quaternion
-from scenes.mujoco.physics import PhysicsSettings, add_free_body, add_light, begin_scene
+from scenes.mujoco.physics import add_free_body, add_light, begin_scene
+from scenes.settings import FingerSettings, PhysicsSettings, Surface
 
-Surface = Literal["pads", "mesh"]
-"""What fingertips touch: one pad (a small box) each, or the convex hull of the object's mesh."""
 SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
     "The command `graspproof scene` with a mass writes the true one, under gravity."
@@ -85,7 +83,7 @@ def build_scene(
         )
     contacts = grasp if isinstance(grasp, Grasp) else listed_contacts(grasp, "grasp")
     physics = physics or PhysicsSettings()
-    layout = arrange(body, contacts, friction, fingers, physics.torsion_m)
+    layout = arrange(body, contacts, friction, fingers, physics)
     return Scene(to_text(layout, physics, surface), layout, physics, surface)
 
 
@@ -128,12 +126,12 @@ def add_object(
 ) -> None:  # fmt: skip
     """Add the object with what fingertips touch; where there is gravity it may be weightless."""
     lifted = {"gravcomp": 1.0} if weightless else {}
-    body = add_free_body(world, layout.mass_kg, layout.inertia_kg_m2, layout.center, lifted)
+    body = add_free_body(world, layout.object_kg, layout.inertia_kg_m2, layout.center, lifted)
     hull = {"name": "object", "type": "mesh", "mesh": "object", "conaffinity": 0,
             "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6), "mass": 0.0}  # fmt: skip
     if surface == "mesh":
         touched = {"contype": (1 << len(layout.contacts)) - 1}
-        friction = {"friction": (layout.friction, layout.torsion_m, 0.0)}
+        friction = {"friction": layout.rubbing}
         add_element(body, "geom", hull | touched | friction | contact)
         return
     add_element(body, "geom", hull | {"contype": 0})
@@ -148,7 +146,7 @@ def add_object(
             "quat": quaternion(outward),
             "contype": 1 << finger,
             "conaffinity": 0,
-            "friction": (layout.friction, layout.torsion_m, 0.0),
+            "friction": layout.rubbing,
             "mass": 0.0,
             "group": 3,
             "rgba": (0.9, 0.6, 0.2, 0.3),
@@ -176,8 +174,8 @@ def add_finger(
     add_element(
         body,
         "inertial",
-        {"pos": (0.0, 0.0, 0.0), "mass": drive.mass_kg,
-         "diaginertia": (0.4 * drive.mass_kg * drive.radius_m**2,) * 3},
+        {"pos": (0.0, 0.0, 0.0), "mass": drive.tip_mass_kg,
+         "diaginertia": (0.4 * drive.tip_mass_kg * drive.radius_m**2,) * 3},
     )  # fmt: skip
     tip = {
         "name": f"finger{finger}",
@@ -185,7 +183,7 @@ def add_finger(
         "size": drive.radius_m,
         "contype": 0,
         "conaffinity": 1 << finger,
-        "friction": (layout.friction, layout.torsion_m, 0.0),
+        "friction": layout.rubbing,
         "mass": 0.0,
         "group": 0,
         "rgba": (0.8, 0.25, 0.2, 1.0),

@@ -9,21 +9,16 @@ too large a sphere gives a smaller sphere, until no surface point is inside.
 """
 
 import math
-from dataclasses import dataclass
 from itertools import combinations
-from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.nearest_points import nearest_on_surface
-from grasp_core.kinds import Direction, Quantity, Range
 from grasp_core.objects.on_faces import ON_FACE, face_under
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.settings import CHOSEN, Settings
 from grasp_core.values import Contact
 
-Drive: TypeAlias = Literal["servo", "rigid"]
 TIP_RADIUS = 0.1
 """Fingertip radius that is used wherever such fingertips overlap nothing, in object radii."""
 LEAST_TIP_RADIUS = 1e-3
@@ -37,31 +32,6 @@ MAX_SHRINKING = 100
 FACING = 1e-9
 """Value of 4 - |m|^2, with m the difference of two unit normals, below which the normals count as
 opposite."""
-
-
-@dataclass(frozen=True, slots=True)
-class FingerSettings(Settings):
-    """How fingertips are built and driven; a setting that is None is chosen to suit the grasp.
-
-    Raises:
-        InputError: A number is out of range (1e-9 to 1e9), or a choice is unknown.
-    """
-
-    max_normal_force_n: Quantity = 10.0
-    """Largest normal force of each finger [N]."""
-    radius_m: Quantity | None = None
-    """Radius of the fingertips [m]; if None, a tenth of the object's radius, or less where that
-    would overlap something."""
-    mass_kg: Quantity | None = None
-    stiffness_n_per_m: Quantity | None = None
-    """Stiffness of the fingertips' servos [N/m]; None chooses it by the grasp size."""
-    approach: Direction | None = None
-    """Direction in which all fingers move towards the object. If None, each finger takes the
-    direction that was planned for it, or its contact normal."""
-    drive: Annotated[Drive, CHOSEN] = "servo"
-    """How fingertips are held: pushed by servos, or rigidly fixed in place."""
-    indentation: Annotated[float, Range(least=0.0, below=1.0), CHOSEN] = 0.0
-    """Depth of each fingertip in its face at the start, in grasp sizes; 0 means just touching."""
 
 
 def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:

@@ -44,10 +44,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.chains_mjcf import Chains, add_hand
 from scenes.mujoco.closure_scene import Scene, add_object, opened
-from scenes.mujoco.fingertips import FingerSettings
 from scenes.mujoco.layout import SQUEEZE, Layout, arrange
 from scenes.mujoco.mjcf_text import as_texts, document
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import FingerSettings, PhysicsSettings
 
 TOUCH = 3e-6
 """Depth of fingertips in their faces at the start, in grasp sizes: more than numbers of nine
@@ -116,13 +115,15 @@ def hand_layout(
     motors = hand_motors(hand, reach, down=down)
     squeeze = squeezing(motors, stance.forces)
     push, radii = float(np.abs(squeeze).max()), stance.tip_radii
-    tips = FingerSettings(max_normal_force_n=push, radius_m=float(radii.max()), indentation=TOUCH)
+    tips = FingerSettings(
+        max_normal_force_n=push, fingertip_radius_m=float(radii.max()), indentation=TOUCH
+    )
     base = arrange(body, stance.contacts, friction, tips)
     lever = mean_lever(motors)
     drive, pose = base.drive, stance.palm_pose.copy()
     pose[:3, 3] -= body.center_of_mass
     servo = rounded(drive.stiffness_n_per_m * lever**2)
-    armature = rounded(drive.mass_kg * lever**2)
+    armature = rounded(drive.tip_mass_kg * lever**2)
     own = {each.name: getattr(base, each.name) for each in fields(base)}
     own["squeeze"] = to_digits(SQUEEZE * np.einsum("kij,ki->kj", base.frames, squeeze))
     gravity = np.zeros(3) if down is None else GRAVITY_M_PER_S2 * direction(down, "down")
@@ -227,4 +228,4 @@ def _tip(layout: HandLayout, finger: int, contact: Mapping[str, object]) -> Mapp
     """Return what a fingertip touches: the pad at its contact, if it has one."""
     touching = [place for place, used in enumerate(layout.used_fingers) if used == finger]
     pads = {"conaffinity": 1 << touching[0]} if touching else {}
-    return {"friction": (layout.friction, layout.torsion_m, 0.0), **contact, **pads}
+    return {"friction": layout.rubbing, **contact, **pads}

@@ -13,7 +13,6 @@ with the damping ratio zeta and the tip's mass m_t. The springs' bases are fixed
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 
@@ -23,11 +22,10 @@ from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.kinds import Direction, Quantity, Range
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.settings import Settings
 from scenes.mujoco.surface import touched_solids
+from scenes.settings import HeldSettings
 
 
 def rotations(quaternions: Array) -> Array:
@@ -55,11 +53,6 @@ def hinged(angles: Array) -> Array:
     return turn
 
 
-TIP_MASS_KG = 0.05
-"""Mass of a fingertip with the part of its finger that moves with it, unless stated."""
-DAMPING_RATIO = 0.5
-"""Damping ratio of the held object, unless stated: it overshoots once, by a sixth."""
-UPRIGHT = (0.0, 0.0, -1.0)
 TOUCH = 1e-6
 """Depth of fingertips in their faces at the start, in object radii. Meshes are stored in single
 precision by the simulator, and a fingertip that does not touch yet would arrive with speed."""
@@ -67,20 +60,10 @@ ISOTROPIC = 1e-9
 """Relative difference of a spring's stiffnesses that counts as none."""
 
 
-@dataclass(frozen=True, slots=True)
-class HeldSettings(Settings):
-    """Masses and damping of what holds and is held, and the direction of gravity."""
-
-    tip_mass_kg: Quantity = TIP_MASS_KG
-    damping_ratio: Annotated[float, Range(least=0.01, most=10.0)] = DAMPING_RATIO
-    down: Direction = UPRIGHT
-    """Direction of gravity in the object's frame; its length does not matter."""
-
-    @property
-    def gravity(self) -> Array:
-        """Acceleration of gravity in the object's frame, (3,) [m/s^2]."""
-        down = np.asarray(self.down, dtype=np.float64)
-        return to_digits(GRAVITY_M_PER_S2 * down / np.linalg.norm(down))
+def gravity_of(settings: HeldSettings) -> Array:
+    """Return the acceleration of gravity in the object's frame, (3,) [m/s^2]."""
+    down = np.asarray(settings.down, dtype=np.float64)
+    return to_digits(GRAVITY_M_PER_S2 * down / np.linalg.norm(down))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +77,7 @@ class HeldLayout:
     solids: tuple[Array, ...]
     """Corners of each convex solid that fingertips can touch, (n, 3) each [m]."""
     radius_m: float
-    mass_kg: float
+    object_kg: float
     inertia_kg_m2: Array
     """Inertia about the centre of mass, along the world axes, (3, 3) [kg m^2]."""
     contacts: Array
@@ -182,11 +165,11 @@ class HeldLayout:
         springs = (self.axes * self.stiffness[:, None]) @ self.axes.transpose(0, 2, 1)
         stiff: Array = (maps @ springs @ maps.transpose(0, 2, 1)).sum(axis=0)
         mass: Array = self.tip_mass_kg * (maps @ maps.transpose(0, 2, 1)).sum(axis=0)
-        mass[:3, :3] += self.mass_kg * np.eye(3)
+        mass[:3, :3] += self.object_kg * np.eye(3)
         mass[3:, 3:] += self.inertia_kg_m2
         root = np.linalg.inv(np.linalg.cholesky(mass))
         own = float(np.linalg.eigvalsh(root @ stiff @ root.T)[-1])
-        cube = self.tip_mass_kg + 2.0 * self.mass_kg / (3.0 * len(self.contacts))
+        cube = self.tip_mass_kg + 2.0 * self.object_kg / (3.0 * len(self.contacts))
         return math.sqrt(max(own, self.stiffest / cube))
 
     @property
@@ -202,15 +185,13 @@ class HeldLayout:
 
 
 def held_layout(
-    body: Polyhedron, grip: Grip, mass_kg: float, settings: HeldSettings | None = None,
-    reach_m: float | None = None,
-) -> HeldLayout:  # fmt: skip
-    """Place an object of a given mass between the springs of a grip."""
+    body: Polyhedron, grip: Grip, settings: HeldSettings, reach_m: float | None = None
+) -> HeldLayout:
+    """Place an object between the springs of a grip."""
     check_body(body)
     check_grip(grip)
-    mass = positive(mass_kg, "mass_kg")
     reach = body.radius if reach_m is None else positive(reach_m, "reach_m")
-    settings = HeldSettings() if settings is None else instance(settings, HeldSettings, "settings")
+    mass = instance(settings, HeldSettings, "settings").mass_of(body)
     if not (grip.tip_radius_m > 0.0).all():
         raise InputError("tip_radius_m must be above zero: points cannot be simulated")
     normals = to_digits(grip.normals)
@@ -225,7 +206,7 @@ def held_layout(
         triangles=body.triangles,
         solids=touched_solids(body, contacts, reach),
         radius_m=body.radius,
-        mass_kg=mass,
+        object_kg=mass,
         inertia_kg_m2=to_digits(mass / body.volume * body.inertia),
         contacts=contacts,
         frames=frames,
@@ -236,7 +217,7 @@ def held_layout(
         damping=2.0 * settings.damping_ratio * np.sqrt(stiffness * share),
         tip_radius_m=grip.tip_radius_m,
         tip_mass_kg=settings.tip_mass_kg,
-        gravity=settings.gravity,
+        gravity=gravity_of(settings),
     )
 
 

@@ -41,7 +41,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.chains_mjcf import Chains, add_hand
 from scenes.mujoco.hand_scene import mean_lever, touching
-from scenes.mujoco.held import HeldLayout, HeldSettings, held_layout
+from scenes.mujoco.held import HeldLayout, held_layout
 from scenes.mujoco.held_mjcf import (
     FINGERTIPS,
     HeldScene,
@@ -51,7 +51,7 @@ from scenes.mujoco.held_mjcf import (
     opened,
 )
 from scenes.mujoco.mjcf_text import document
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import HeldSettings, PhysicsSettings
 
 EXECUTION = "an execution with the hand"
 STRETCHED = 0.02
@@ -221,18 +221,18 @@ def strong_motors(hand: Hand, reach: HandReach) -> Motors:
 
 
 def held_hand_layout(
-    hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
-    settings: HeldSettings, reach_m: float | None = None,
+    hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, settings: HeldSettings,
+    reach_m: float | None = None,
 ) -> HeldHandLayout:  # fmt: skip
     """Place an object of a given mass in a hand."""
-    base = held_layout(body, grip, mass_kg, settings, reach_m)
+    base = held_layout(body, grip, settings, reach_m)
     stance, motors = stance_of(hand, reach), strong_motors(hand, reach)
     size = mean_lever(motors) ** 2
     levers = motors.levers.reshape(len(motors.limits), -1, 3).transpose(1, 0, 2)
     shares = np.einsum("kij,kli,klm,kmj->kj", base.axes, levers, levers, base.axes)  # L'L, diagonal
     servo = instance(grip, HandGrip, "grip", "hand_grip makes one").servo_n_m_per_rad
     armature = settings.tip_mass_kg * size
-    share_kg = mass_kg / len(base.contacts) + settings.tip_mass_kg
+    share_kg = base.object_kg / len(base.contacts) + settings.tip_mass_kg
     damping = 2.0 * settings.damping_ratio * np.sqrt(servo * share_kg * size)
     pose = stance.palm_pose.copy()
     pose[:3, 3] -= body.center_of_mass
@@ -248,11 +248,11 @@ def held_hand_layout(
 
 
 def held_hand_scene(
-    hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, mass_kg: float,
-    settings: HeldSettings, reach_m: float | None = None,
+    hand: Hand, body: Polyhedron, reach: HandReach, grip: Grip, settings: HeldSettings,
+    reach_m: float | None = None,
 ) -> HeldScene:  # fmt: skip
     """Make a MuJoCo scene of an object with its true mass in a hand (see `held_hand_layout`)."""
-    layout = held_hand_layout(hand, body, reach, grip, mass_kg, settings, reach_m)
+    layout = held_hand_layout(hand, body, reach, grip, settings, reach_m)
     physics = held_physics(layout)
     return HeldScene(held_hand_text(layout, physics), layout, physics)
 

@@ -20,9 +20,10 @@ from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.held import HeldLayout, HeldSettings, held_layout
+from scenes.mujoco.held import HeldLayout, held_layout
 from scenes.mujoco.mjcf_text import Element, SceneText, add_element, document, quaternion
-from scenes.mujoco.physics import PhysicsSettings, add_free_body, add_light, begin_scene
+from scenes.mujoco.physics import add_free_body, add_light, begin_scene
+from scenes.settings import HeldSettings, PhysicsSettings
 
 PALM_ARMATURE = 1e7
 """Armature of the palm's joints, relative to what the palm carries."""
@@ -86,7 +87,7 @@ def held_physics(layout: HeldLayout) -> PhysicsSettings:
     steps = min(max(steps, FEWEST_STEPS), MOST_STEPS)
     step = SAMPLE_S / steps
     settling = CONTACT_STEPS * step
-    moved = 1.0 / (1.0 / layout.tip_mass_kg + 3.0 / layout.mass_kg)
+    moved = 1.0 / (1.0 / layout.tip_mass_kg + 3.0 / layout.object_kg)
     give = max(CONTACT_GIVE * moved / (layout.stiffest * settling**2), LEAST_GIVE)
     return PhysicsSettings(
         timestep=step, integrator="Euler", impratio=300.0, gravity=(x, y, z),
@@ -106,9 +107,8 @@ class HeldScene(SceneText):
 def build_held_scene(
     body: Polyhedron,
     grip: Grip,
-    mass_kg: float,
+    settings: HeldSettings,
     *,
-    settings: HeldSettings | None = None,
     physics: PhysicsSettings | None = None,
     reach_m: float | None = None,
 ) -> HeldScene:
@@ -117,8 +117,7 @@ def build_held_scene(
     Args:
         body: The object.
         grip: Contacts on it, with springs and squeeze (see `gc.grip`).
-        mass_kg: Mass of the object [kg].
-        settings: Masses and damping of the fingers, and the direction of gravity.
+        settings: Masses of object and fingers, damping, and the direction of gravity.
         physics: Simulation settings; None for those of `held_physics`.
         reach_m: Distance from the contacts up to which the surface is there to be touched; None for
             the object's radius. Scans with thousands of triangles are slow where it is large [m].
@@ -126,7 +125,7 @@ def build_held_scene(
     Raises:
         InputError: A number is out of range.
     """
-    layout = held_layout(body, grip, mass_kg, settings, reach_m)
+    layout = held_layout(body, grip, settings, reach_m)
     if physics is None:
         physics = held_physics(layout)
     elif not np.array_equal(instance(physics, PhysicsSettings, "physics").gravity, layout.gravity):
@@ -134,11 +133,10 @@ def build_held_scene(
             f"physics.gravity must be that of the settings, {layout.gravity.tolist()}, "
             f"got {physics.gravity}"
         )
-    if physics.torsion_m:
-        raise InputError(
-            f"physics.torsion_m must be zero, got {physics.torsion_m}: squeezes and payloads are "
-            "predicted for hard fingertips; leave it out, or simulate the grasp with validate"
-        )
+    physics.require_hard(
+        "here", "squeezes and payloads are predicted for hard fingertips; leave it out, or "
+        "simulate the grasp with validate",
+    )  # fmt: skip
     return HeldScene(held_text(layout, physics), layout, physics)
 
 
@@ -162,7 +160,7 @@ def opened(layout: HeldLayout, physics: PhysicsSettings) -> tuple[Element, Eleme
         layout.name, TRUE_MASS, physics, layout.radius_m, mesh, flags=FLAGS, solids=layout.solids
     )
     add_light(world, layout.radius_m)
-    body, contact = add_free_body(world, layout.mass_kg, layout.inertia_kg_m2), physics.contact()
+    body, contact = add_free_body(world, layout.object_kg, layout.inertia_kg_m2), physics.contact()
     smooth = {"conaffinity": 0, "friction": (0.0, 0.0, 0.0), "mass": 0.0, **contact}
     hull = {"name": "object", "type": "mesh", "mesh": "object", "contype": TABLE, "group": 1,
             "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
@@ -192,7 +190,7 @@ def add_start(root: Element, layout: HeldLayout) -> None:
 
 def palm_armature(layout: HeldLayout) -> Array:
     """Return the armature of the palm's slides and hinges, (6,) [kg, kg m^2]."""
-    carried = layout.mass_kg + len(layout.contacts) * layout.tip_mass_kg
+    carried = layout.object_kg + len(layout.contacts) * layout.tip_mass_kg
     slides = PALM_ARMATURE * carried
     return np.repeat([slides, slides * layout.radius_m**2], 3)
 
@@ -203,7 +201,7 @@ def add_palm(world: Element, layout: HeldLayout, name: str = "palm") -> Element:
     for place, (way, armature) in enumerate(zip(PALM, palm_armature(layout), strict=True)):
         kind, axis = ("slide", "hinge")[place // 3], np.eye(3)[place % 3]
         _joint(body, {"name": f"palm_{way}", "type": kind, "axis": axis, "armature": armature})
-    mass = PALM_SHARE * layout.mass_kg
+    mass = PALM_SHARE * layout.object_kg
     inertia = (mass * layout.radius_m**2,) * 3
     own = {"pos": (0.0, 0.0, 0.0), "mass": mass, "diaginertia": inertia}
     add_element(body, "inertial", own)

@@ -25,7 +25,8 @@ from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.fingertips import FingerSettings, fitting_radius
+from scenes.mujoco.fingertips import fitting_radius
+from scenes.settings import HARD, FingerSettings, Softness
 
 RESPONSE_TIME_S = 0.07
 """Square root of mass x grasp size / largest normal force [s]. It gives 1 kg for 10 N and 5 cm,
@@ -62,7 +63,7 @@ class FingerDrive(Declared):
     """How one fingertip is built and driven."""
 
     radius_m: float
-    mass_kg: float
+    tip_mass_kg: float
     stiffness_n_per_m: float
     damping_n_s_per_m: float
     max_normal_force_n: float
@@ -86,7 +87,7 @@ class Layout(ByValue):
     grasp_size_m: float
     """Root mean square lever of the contacts about the axis through `center` that they are closest
     to [m]."""
-    mass_kg: float
+    object_kg: float
     inertia_kg_m2: Array
     """Inertia about `center`, along the world axes, (3, 3) [kg m^2]."""
     contacts: Array
@@ -102,8 +103,12 @@ class Layout(ByValue):
     """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
     approach: Array
     """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
-    torsion_m: float = 0.0
-    """Torsional coefficient at every contact [m]; zero for hard fingertips."""
+    softness: Softness = HARD
+
+    @property
+    def rubbing(self) -> tuple[float, float, float]:
+        """Return the coefficients of every contact as in MJCF."""
+        return self.softness.rubbing(self.friction)
 
     @property
     def squeeze_forces(self) -> Array:
@@ -158,7 +163,7 @@ def arrange(
     grasp: Grasp | Sequence[Contact],
     friction: float,
     fingers: FingerSettings | None = None,
-    torsion_m: float = 0.0,
+    softness: Softness = HARD,
 ) -> Layout:
     """Place object, fingertips and drives for a grasp.
 
@@ -185,7 +190,7 @@ def arrange(
         radius_m=rounded(body.radius),
         center=to_digits(arms.mean(axis=0), body.radius),
         grasp_size_m=size,
-        mass_kg=mass,
+        object_kg=mass,
         inertia_kg_m2=_inertia(mass, positions, size),
         contacts=arms,
         frames=contact_frames(normals),
@@ -195,24 +200,26 @@ def arrange(
         ),
         friction=friction,
         drive=_drive(body, positions, normals, fingers, size),
-        squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, torsion_m),
+        squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, softness),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
-        torsion_m=torsion_m,
+        softness=softness,
     )
 
 
 def _drive(
     body: Polyhedron, positions: Array, normals: Array, fingers: FingerSettings, size: float
 ) -> FingerDrive:
-    mass = fingers.mass_kg or fingers.max_normal_force_n * RESPONSE_TIME_S**2 / size
+    mass = fingers.fingertip_mass_kg or fingers.max_normal_force_n * RESPONSE_TIME_S**2 / size
     stiffness = fingers.stiffness_n_per_m or STIFFNESS * fingers.max_normal_force_n / size
-    if fingers.radius_m is not None:
+    if fingers.fingertip_radius_m is not None:
         where = ", the object's radius in m, or None"
-        number(fingers.radius_m, "fingers.radius_m", most=body.radius, where=where)
-    radius = fingers.radius_m or rounded(fitting_radius(body, positions, normals))
+        number(
+            fingers.fingertip_radius_m, "fingers.fingertip_radius_m", most=body.radius, where=where
+        )
+    radius = fingers.fingertip_radius_m or rounded(fitting_radius(body, positions, normals))
     return FingerDrive(
         radius_m=radius,
-        mass_kg=mass,
+        tip_mass_kg=mass,
         stiffness_n_per_m=stiffness,
         damping_n_s_per_m=2.0 * math.sqrt(stiffness * mass),
         max_normal_force_n=fingers.max_normal_force_n,
@@ -253,17 +260,17 @@ def _inertia(mass: float, positions: Array, size: float) -> Array:
     return to_digits(0.25 * mass * (axes * levers) @ axes.T)
 
 
-def _pushes(positions: Array, normals: Array, friction: float, torsion_m: float) -> Array:
+def _pushes(positions: Array, normals: Array, friction: float, softness: Softness) -> Array:
     """Compute balanced forces, (k, 3), or normal ones without closure; the largest push is one."""
     arms, _, _ = unit_size(positions)
     _, _, margins = deepest_forces(arms[None], normals[None], np.array([friction]))
     try:
         # a proof takes long, and is not needed where hard fingers are open by far
-        hopeless = margins[0, 1] < OPEN and not torsion_m
-        found = (
-            None if hopeless else force_closure(positions, normals, friction, torsion_m=torsion_m)
-        )
-        forces = None if found is None else found.forces
+        hopeless = margins[0, 1] < OPEN and not softness.is_soft
+        forces = None
+        if not hopeless:
+            soft = softness.torsion_m
+            forces = force_closure(positions, normals, friction, torsion_m=soft).forces
     except UndecidedError:
         forces = None
     local = np.einsum("kij,ki->kj", contact_frames(normals), normals if forces is None else forces)

@@ -40,12 +40,12 @@ from scenes.mujoco.chains_mjcf import (
     placed,
 )
 from scenes.mujoco.closure_scene import add_finger, add_servos
-from scenes.mujoco.fingertips import FingerSettings
 from scenes.mujoco.hand_scene import hand_layout
 from scenes.mujoco.layout import SQUEEZE, arrange
 from scenes.mujoco.mjcf_text import Element, add_element, as_texts, document, quaternion
-from scenes.mujoco.physics import PhysicsSettings, add_free_body, begin_scene
+from scenes.mujoco.physics import add_free_body, begin_scene
 from scenes.mujoco.surface import touched_solids
+from scenes.settings import FingerSettings, PhysicsSettings
 
 COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "
@@ -105,7 +105,7 @@ def begun(
     root, world = begin_scene(
         body.name, COMMENT, physics, body.radius, mesh, flags=flags, solids=solids
     )
-    rubbing = as_texts({"friction": (friction, physics.torsion_m, 0.0), **physics.contact()})
+    rubbing = as_texts({"friction": physics.rubbing(friction), **physics.contact()})
     moving = add_free_body(world, *mass)
     seen = {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
             "mass": 0.0, "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
@@ -132,11 +132,11 @@ def fingertip_scene(
     physics: PhysicsSettings, fingers: FingerSettings,
 ) -> TestedScene:  # fmt: skip
     """Make the scene of a grasp, or of contacts of any origin."""
-    base = arrange(body, grasp, friction, fingers, physics.torsion_m)
+    base = arrange(body, grasp, friction, fingers, physics)
     mass, inertia = mass_properties(body, mass_kg)
     stiffness, share = base.drive.stiffness_n_per_m, TIP_MASS_KG + mass / len(base.contacts)
     damping = 2.0 * math.sqrt(stiffness * share)
-    drive = replace(base.drive, mass_kg=TIP_MASS_KG, damping_n_s_per_m=damping, rigid=False)
+    drive = replace(base.drive, tip_mass_kg=TIP_MASS_KG, damping_n_s_per_m=damping, rigid=False)
     layout = replace(base, drive=drive)
     root, world = begun(body, friction, (mass, inertia), physics)
     contact, actuators = as_texts(physics.contact()), add_element(root, "actuator", {})
@@ -235,7 +235,7 @@ def hand_scene(
     palm = add_element(hung, "body", {"name": PALM, **placed(at[:3, 3], at[:3, :3])})
     if free:
         add_element(palm, "inertial", weights[PALM])
-    touching = as_texts({"friction": (friction, physics.torsion_m, 0.0)} | physics.contact())
+    touching = as_texts({"friction": physics.rubbing(friction)} | physics.contact())
     tips = tuple(_tip(root, each, touching) for each in hand.fingers)
     chains = Chains(
         replace(hand, fingers=tuple(map(_without_cover, hand.fingers))), np.zeros(len(hand.joints)),

@@ -23,13 +23,13 @@ from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from grasp_core.records.grasps_json import RECORDED
-from grasp_core.settings import Settings
+from grasp_core.settings import Settings, extended
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.kit.about_object import AboutObject
+from sim_validate.settings.executions import ExecutionSettings
 
 DIGITS = 12
 MARK = '"grasps_file"'
@@ -155,7 +155,7 @@ class RecordedPart(Declared):
             found = polyhedron_from_mesh(
                 self.vertices_m,
                 self.triangles,
-                MeshChoices(faces="planar", limits=RECORDED),
+                extended(MeshChoices, RECORDED, faces="planar"),
                 name=name,
                 known=self.surface,
             )
@@ -182,7 +182,7 @@ class How(Settings):
 
     setup: Setup = field(default_factory=Setup)
     agenda: Annotated[Agenda, FLAT] = field(default_factory=Agenda)
-    execution: AskedExecution | None = None
+    execution: ExecutionSettings | None = None
     """How grasps are executed besides; None if they are not."""
 
 

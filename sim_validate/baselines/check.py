@@ -10,7 +10,7 @@ from typing import Any
 from grasp_core.errors import InputError
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import arithmetic, versions
-from scenes.mujoco.fingertips import FingerSettings
+from scenes.settings import FingerSettings
 from sim_validate.baselines.baseline import Baseline, Entry, How
 from sim_validate.baselines.compare import Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
@@ -53,7 +53,7 @@ def measured(
     jobs = [Job(saved.body, grasp, saved.friction, how.agenda, how.setup) for grasp in chosen]
     executing = list[ExecutionJob]()
     if how.execution is not None:
-        settings = how.execution.settings_for(saved.body)
+        settings = how.execution.for_body(saved.body)
         executing = [
             ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False)
             for grasp in chosen
@@ -120,9 +120,9 @@ def setup_for(saved: Plan, path: Path | None) -> Setup:
 def with_planned_fingers(how: How, before: Baseline, saved: Plan) -> How:
     """Replace the fingertips of the setup by those that the grasps are planned for now."""
     fingers = how.setup.fingers
-    if fingers.radius_m != before.planned_radius_m:
+    if fingers.fingertip_radius_m != before.planned_radius_m:
         return how
-    fingers = replace(fingers, radius_m=_planned_radius(saved))
+    fingers = replace(fingers, fingertip_radius_m=_planned_radius(saved))
     return replace(how, setup=replace(how.setup, fingers=fingers))
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from grasp_core.files.records import record_of
 from grasp_core.planning.result import Plan
+from grasp_core.settings import extended
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.baseline import How, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check, complete, measured, seen_from, setup_for
 from sim_validate.baselines.compare import Finding, Status, failing
-from sim_validate.baselines.part import IfChanged, Present, present, source_of, testable
-from sim_validate.closure.asked_trials import noise_of
+from sim_validate.baselines.part import Present, present, source_of, testable
+from sim_validate.closure.asked_trials import check_noise
 from sim_validate.closure.setup_toml import setup_from_file
 from sim_validate.engine.setup import Agenda
 from sim_validate.kit.console import TABLE_ROWS, Reporter
@@ -25,15 +26,11 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Simulate grasps and write the results as a baseline, to compare later results with."""
     check_writable(command.out)
     saved = read_grasps(command.grasps)
-    now = _present(saved, command.grasps, command.out, command.changed)
-    agenda = Agenda(
-        random_wrenches=command.random_wrenches,
-        wrenches=() if command.wrenches is None else wrenches_from_file(command.wrenches),
-        limits=command.limits,
-        trials=command.repeats.trials,
-        noise=noise_of(command.repeats),
-        seed=saved.seed if command.seed is None else command.seed,
-    )
+    now = _present(saved, command.grasps, command.out, command)
+    check_noise(command.more)
+    wrenches = () if command.wrenches is None else wrenches_from_file(command.wrenches)
+    seed = saved.seed if command.seed is None else command.seed
+    agenda = extended(Agenda, command.more, wrenches=wrenches, seed=seed)
     how = How(setup_for(saved, command.setup), agenda)
     about = seen_from(command.out, command.grasps)
     with reporter.progress("simulating") as steps:
@@ -53,7 +50,7 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = read_grasps(path)
-    now = _present(saved, path, command.baseline, command.changed, before.scale)
+    now = _present(saved, path, command.baseline, command, before.scale)
     now = now.against(before)
     how = before.settings
     if command.setup is not None:
@@ -75,18 +72,12 @@ def _present(
     saved: Plan,
     grasps: Path,
     baseline: Path,
-    given: baseline_flags.ChangedPart,
+    command: baseline_flags.Record | baseline_flags.Check,
     recorded_scale: float | None = None,
 ) -> Present:
     """Carry grasps over to their part as it is now, as the flags about changed parts ask for."""
-    asked = IfChanged(
-        refuse=given.refuse_changed_part,
-        unit=given.unit,
-        scale=given.scale,
-        distance_m=given.carrying.distance_m,
-        angle_deg=given.carrying.angle_deg,
-    ).with_scale(recorded_scale)
-    source = source_of(saved, grasps, [baseline.parent], given.object, asked.scale)
+    asked = command.changed_part.with_scale(recorded_scale)
+    source = source_of(saved, grasps, [baseline.parent], command.object, asked.scale)
     return present(saved, grasps, source, asked)
 
 

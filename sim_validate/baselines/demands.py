@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.errors import InputError
-from grasp_core.kinds import Range
+from grasp_core.kinds import Range, Share
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.settings import CHOSEN, Settings, for_users, named
@@ -19,12 +19,12 @@ from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.jobs import ExecutionJob, executed_grasp
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.planning.grasps_json import read_grasps
+from sim_validate.settings.executions import ExecutionSettings
 
 FRICTION = 0.5
-TRIALS = ("wrenches", "trials", "noise", "random_wrenches", "seed")
+TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")
 """Settings of an agenda that a test may give by their names."""
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 
@@ -129,16 +129,16 @@ class Demands(Settings):
 
     agenda: Annotated[Agenda, CHOSEN] = field(default_factory=Agenda)
     """Which trials the grasp goes through; a test gives those of `TRIALS` by their names."""
-    min_pass_rate: Annotated[float, Range(least=0.0, most=1.0)] = 0.0
+    min_pass_rate: Share = 0.0
     """Least share of the repeats with noise in which the grasp must hold."""
     min_margin: Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)] = 0.0
     """Least difference between the friction and the critical one, both predicted and simulated."""
     setup: Setup = field(default_factory=Setup)
 
     def _check_together(self) -> None:
-        if self.min_pass_rate > 0.0 and not self.agenda.trials:
+        if self.min_pass_rate > 0.0 and not self.agenda.repeats:
             raise InputError(
-                "min_pass_rate is a share of repeats with noise: give their number as `trials`, too"
+                "min_pass_rate is a share of repeats with noise: give their number as `repeats`"
             )
 
 
@@ -186,7 +186,7 @@ def survival(
     if not isinstance(settings, ExecutionSettings):
         raise InputError(
             f"assert_survives: expected ExecutionSettings as `settings`, got {settings!r}; give "
-            "sim_validate.ExecutionSettings(mass_kg=...)"
+            "sim_validate.ExecutionSettings(...)"
         )
     case = case_of(given, friction, "assert_survives")
     found = executed_grasp(ExecutionJob(case.body, case.grasp, case.friction, settings))

@@ -10,20 +10,15 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
 
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
-from grasp_core.kinds import NotNegative, Quantity, Range
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
-from grasp_core.settings import Settings
 from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
-    ANGLE_DEG,
-    WIDEST_DEG,
     FaceChange,
     added_faces,
     changes_in_words,
@@ -31,41 +26,11 @@ from grasp_core.transferring.face_changes import (
     face_changes,
     likeness,
 )
+from grasp_core.transferring.settings import IfChanged
 from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
 from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
 
-NOTE, FAIL = "note", "fail"
 TABLE = "changed_part"
-
-
-@dataclass(frozen=True, slots=True)
-class IfChanged(Settings):
-    """What to do if a part has changed since its grasps were planned.
-
-    Raises:
-        InputError: A field is out of range.
-    """
-
-    refuse: bool = False
-    """Whether a changed part is refused; otherwise grasps are carried over to it."""
-    missing: Literal["note", "fail"] = NOTE
-    """What a missing mesh file means: `note` tests the mesh in the file of grasps and says so,
-    `fail` refuses that."""
-    unit: Literal["m", "cm", "mm", "in"] | None = None
-    """Unit of length of the mesh file; None for the one in which the part is about as large as it
-    was."""
-    scale: Quantity | None = None
-    """Factor on the coordinates of the mesh file, besides its unit; None for that of the baseline,
-    or 1 without one."""
-    distance_m: NotNegative | None = None
-    """Largest distance by which a contact may move [m]; None for a twentieth of the part's radius.
-    """
-    angle_deg: Annotated[float, Range(least=0.0, most=WIDEST_DEG)] = ANGLE_DEG
-    """Largest angle between the normals of a face before and after [deg]."""
-
-    def with_scale(self, recorded: float | None) -> "IfChanged":
-        """Return these settings with the scale that a baseline holds, if none is given."""
-        return replace(self, scale=recorded) if self.scale is None else self
 
 
 CARRY = IfChanged()
@@ -307,10 +272,10 @@ class Present:
 
 def present(saved: Plan, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
     """Carry grasps over to their part as it is now; they stay as they are if it has not changed."""
-    if source.note and asked.missing == FAIL:
+    if source.note and asked.missing == "fail":
         raise ChangedPartError(
             f"{path}: the mesh file that its grasps were planned from, {saved.body.name!r} with "
-            f'some ending, is missing, and `missing = "{FAIL}"` refuses to test the mesh that '
+            f'some ending, is missing, and `missing = "fail"` refuses to test the mesh that '
             f"{path.name} holds; put the file back, or say with `object` where it is"
         )
     if not source.changed or source.file is None:

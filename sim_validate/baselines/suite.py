@@ -9,9 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
-from grasp_core.checked import MOST_RANDOM_WRENCHES, MOST_TRIALS
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import Range, Seed
+from grasp_core.kinds import RandomWrenches, Repeats, Seed
 from grasp_core.planning.result import Plan
 from grasp_core.settings import CHOSEN, Settings
 from sim_validate.baselines.baseline import (
@@ -40,15 +39,16 @@ from sim_validate.baselines.part import (
     source_of,
     testable,
 )
-from sim_validate.engine.setup import Agenda, LimitSearch, Noise
-from sim_validate.execution.settings import TABLE, AskedExecution
+from sim_validate.engine.setup import Agenda
 from sim_validate.kit.toml_tables import read_tables
 from sim_validate.planning.grasps_json import read_grasps
 from sim_validate.planning.wrenches_json import wrenches_from_file
+from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings.trials import LimitSearch, Noise
 
 ENDING = ".grasps.toml"
-DIRECT = ("limits", "random_wrenches", "trials", "seed")
-"""Settings of trials that the file gives by the same name as an agenda has."""
+GIVEN = ("limits", "random_wrenches", "repeats", "noise", "seed")
+"""Settings that replace those of the agenda of the baseline."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -65,13 +65,13 @@ class Suite(Settings):
     wrenches: Path | None = None
     limits: LimitSearch | None = None
     """How the largest multiple of each wrench is found in simulation."""
-    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] | None = None
-    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] | None = None
+    random_wrenches: RandomWrenches | None = None
+    repeats: Repeats | None = None
     """Number of repeats with noise."""
     noise: Noise | None = None
     seed: Seed | None = None
     survives: bool = False
-    execution: AskedExecution | None = None
+    execution: ExecutionSettings | None = None
     changed_part: IfChanged = CARRY
     path: Annotated[Path, CHOSEN] = Path(ENDING)
     """The file itself."""
@@ -166,10 +166,10 @@ class Suite(Settings):
         execution = how.execution if self.execution is None else self.execution
         if self.survives and execution is None:
             raise InputError(
-                f"{self.path}: survives: expected a table [{TABLE}] too, with mass_kg or "
-                "density_kg_m3, but the file has none"
+                f"{self.path}: survives: expected a table [execution] too, which says how grasps "
+                "are executed, but the file has none"
             )
-        given: dict[str, Any] = {name: getattr(self, name) for name in (*DIRECT, "noise")}
+        given: dict[str, Any] = {name: getattr(self, name) for name in GIVEN}
         if self.wrenches is not None:
             given["wrenches"] = wrenches_from_file(self.wrenches)
         asked = {name: value for name, value in given.items() if value is not None}

@@ -19,8 +19,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Wrench, cross, rounded, to_digits
 from grasp_core.closure.contacts import stacked
-from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.figures import Shown
@@ -70,26 +69,27 @@ class Control(Declared):
 
 
 def negative_controls(
-    body: Polyhedron, grasp: Grasp, friction: float, seed: int, torsion_m: float = 0.0
+    body: Polyhedron, grasp: Grasp, friction: float, seed: int, setup: Setup | None = None
 ) -> tuple[Control, ...]:
     """Make the negative controls that exist for a grasp, at most one of each kind.
 
     The kinds are friction below the critical one, fingers removed, a normal flipped, and contacts
-    moved on their faces, out of the grasp's region. With torsion (`torsion_m` [m]) all of them are
-    proved open as soft fingers.
+    moved on their faces, out of the grasp's region. All of them are proved
+    open by fingertips as soft as those of the setup.
     """
+    setup = setup or Setup()
     lower = FRICTION_SHARE * grasp.critical_friction
-    low_friction = _refuted("low_friction", grasp.contacts, lower, torsion_m)
+    low_friction = _refuted("low_friction", grasp.contacts, lower, setup)
     candidates = (
         low_friction if lower >= LEAST_FRICTION else iter(()),
-        _fingers_removed(grasp, friction, torsion_m),
-        _normal_flipped(grasp, friction, torsion_m),
-        _contacts_moved(body, grasp, friction, torsion_m, np.random.default_rng(seed)),
+        _fingers_removed(grasp, friction, setup),
+        _normal_flipped(grasp, friction, setup),
+        _contacts_moved(body, grasp, friction, setup, np.random.default_rng(seed)),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
 
 
-def _fingers_removed(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
+def _fingers_removed(grasp: Grasp, friction: float, setup: Setup) -> Iterator[Control]:
     """Yield a negative control with one finger fewer, at lower friction if needed, or two fewer.
 
     Without friction no three contacts are in closure, so any three are open below some friction.
@@ -98,27 +98,27 @@ def _fingers_removed(grasp: Grasp, friction: float, torsion_m: float) -> Iterato
     """
     threes = list(combinations(grasp.contacts, 3))
     for rest in threes:
-        yield from _refuted("fingers_removed", rest, friction, torsion_m)
+        yield from _refuted("fingers_removed", rest, friction, setup)
     for rest in threes:
         lower = math.inf
         with suppress(SolverError, UndecidedError):
-            lower = FRICTION_SHARE * critical_friction(*stacked(rest), torsion_m=torsion_m)
+            lower = FRICTION_SHARE * setup.critical_friction(rest)
         if LEAST_FRICTION <= lower <= friction:
-            yield from _refuted("fingers_removed", rest, lower, torsion_m)
+            yield from _refuted("fingers_removed", rest, lower, setup)
     for rest in combinations(grasp.contacts, 2):
-        yield from _refuted("fingers_removed", rest, friction, torsion_m)
+        yield from _refuted("fingers_removed", rest, friction, setup)
 
 
-def _normal_flipped(grasp: Grasp, friction: float, torsion_m: float) -> Iterator[Control]:
+def _normal_flipped(grasp: Grasp, friction: float, setup: Setup) -> Iterator[Control]:
     """Flip a normal, so that a finger pulls instead of pushing, as a wrong sign in a file would."""
     for finger, contact in enumerate(grasp.contacts):
         contacts = list(grasp.contacts)
         contacts[finger] = replace(contact, normal=-contact.normal)
-        yield from _refuted("normal_flipped", contacts, friction, torsion_m)
+        yield from _refuted("normal_flipped", contacts, friction, setup)
 
 
 def _contacts_moved(
-    body: Polyhedron, grasp: Grasp, friction: float, torsion_m: float, rng: np.random.Generator
+    body: Polyhedron, grasp: Grasp, friction: float, setup: Setup, rng: np.random.Generator
 ) -> Iterator[Control]:
     pieces = [body.faces[face].pieces for face in grasp.faces]
     for _ in range(SEARCH):
@@ -127,15 +127,15 @@ def _contacts_moved(
             piece = choice[int(rng.integers(len(choice)))]
             corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
             moved.append(Contact(middle + TOWARD_CORNER * (corner - middle), contact.normal))
-        yield from _refuted("contacts_moved", moved, friction, torsion_m)
+        yield from _refuted("contacts_moved", moved, friction, setup)
 
 
 def _refuted(
-    name: str, contacts: Sequence[Contact], friction: float, torsion_m: float
+    name: str, contacts: Sequence[Contact], friction: float, setup: Setup
 ) -> Iterator[Control]:
     """Yield the negative control if the analysis proves that it is not force-closed."""
     try:
-        certificate = force_closure(*stacked(contacts), friction, torsion_m=torsion_m)
+        certificate = setup.closure(contacts, friction)
     except UndecidedError:
         return
     if not certificate.closed:
@@ -208,7 +208,7 @@ def control_case(
 ) -> tuple[Rig, tuple[ControlLoad, ...]]:
     """Close fingers on a control, and find the loads that it must not hold."""
     # Other contacts than the grasp's may lack room for its fingertips or lie off the mesh.
-    fingers = replace(setup.fingers, radius_m=None)
+    fingers = replace(setup.fingers, fingertip_radius_m=None)
     on_pads = replace(setup, fingers=fingers, surface="pads")
     scene = on_pads.scene(body, control.contacts, control.friction)
     idle = _planned(body, control, setup, UNLOADED, np.zeros(6))

@@ -25,7 +25,6 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frames, stacked
-from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import UndecidedError
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
@@ -37,8 +36,9 @@ from sim_validate.closure.verdict import AGREEMENT, NoisyTrial, Robustness, Wren
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.loads import PlannedLoad, loads_as_they_are
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.setup import Agenda, Noise, Setup
+from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
+from sim_validate.settings.trials import Noise
 
 STREAM = 1
 """Number of the random stream that noise is drawn from, apart from other draws with the same
@@ -144,7 +144,7 @@ def robustness(
 ) -> Robustness:  # fmt: skip
     """Repeat the holds of a grasp with noise."""
     trials = list[NoisyTrial]()
-    for number in range(agenda.trials):
+    for number in range(agenda.repeats):
         case = disturbed(body, grasp, friction, agenda.noise, agenda.seed, number)
         trials.append(noisy_trial(body, case, loads, number, setup))
     return Robustness(agenda.noise, tuple(trials))
@@ -152,7 +152,7 @@ def robustness(
 
 def for_repeats(setup: Setup, scene: Scene) -> Setup:
     """The setup for repeats: the undisturbed grasp's fingertips, on pads that may lean."""
-    fingers = replace(setup.fingers, radius_m=scene.layout.drive.radius_m)
+    fingers = replace(setup.fingers, fingertip_radius_m=scene.layout.drive.radius_m)
     return replace(setup, fingers=fingers, surface="pads")
 
 
@@ -163,9 +163,8 @@ def noisy_trial(
     if case.missed:
         reason = f"finger {case.missed[0]} misses its face"
         return NoisyTrial(number, False, Outcome.LOST_CONTACT, "", reason, ())
-    positions, normals = stacked(case.contacts)
     try:
-        certificate = force_closure(positions, normals, case.friction, torsion_m=setup.torsion_m)
+        certificate = setup.closure(case.contacts, case.friction)
     except UndecidedError as error:
         return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
     if not certificate.closed:  # a negative control, which must let go
@@ -216,7 +215,7 @@ def noisy_case(
     planned = setup.scene(body, case.contacts, case.friction)
     layout = replace(
         planned.layout,
-        mass_kg=case.mass * planned.layout.mass_kg,
+        object_kg=case.mass * planned.layout.object_kg,
         inertia_kg_m2=case.mass * planned.layout.inertia_kg_m2,
     )
     text = to_text(layout, planned.physics, planned.surface)

@@ -12,7 +12,6 @@ from typing import Annotated, TypeAlias
 
 from grasp_core.arrays import Wrench
 from grasp_core.closure.contacts import contacts_sha256, stacked
-from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
@@ -167,7 +166,7 @@ def _in_trial(path: Path, found: Recorded, verdict: Verdict, trial: int) -> Reco
     repeats = () if verdict.robustness is None else verdict.robustness.trials
     if trial >= len(repeats):
         said = f"choose from 0 to {len(repeats) - 1}"
-        said = said if repeats else "it was recorded without --trials"
+        said = said if repeats else "it was recorded without --repeats"
         raise InputError(f"{path}: the file has no repeat with noise numbered {trial}; {said}")
     ended = repeats[trial]
     if ended.outcome is Outcome.HELD:
@@ -233,7 +232,7 @@ def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
             f"{recorded.name}: this repeat has no trial to simulate, because noise made finger "
             f"{case.missed[0]} miss its face"
         )
-    if not force_closure(*stacked(case.contacts), case.friction, torsion_m=setup.torsion_m).closed:
+    if not setup.closure(case.contacts, case.friction).closed:
         return _opened(body, OPEN, case.contacts, case.friction, setup)
     rig, heavy = noisy_case(body, case, [(each.name, each.load.wrench) for each in planned], setup)
     return rig, heavy, case.landed
@@ -243,7 +242,7 @@ def _opened(
     body: Polyhedron, name: str, contacts: tuple[Contact, ...], friction: float, setup: Setup
 ) -> tuple[Rig, Loads, tuple[Contact, ...]]:
     """Prepare contacts without force closure as a negative control."""
-    certificate = force_closure(*stacked(contacts), friction, torsion_m=setup.torsion_m)
+    certificate = setup.closure(contacts, friction)
     if certificate.closed:
         raise InputError(
             f"{name}: expected contacts without force closure, but these are force-closed at "

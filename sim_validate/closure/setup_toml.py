@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from grasp_core.errors import InputError, about
 from grasp_core.settings import Settings, for_users, named
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import Setup
 from sim_validate.kit.toml_tables import read_tables
 

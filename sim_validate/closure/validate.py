@@ -15,8 +15,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.checked import coefficient, function, instance, several, whole
-from grasp_core.closure.critical_friction import critical_friction
-from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
@@ -71,10 +69,9 @@ def validate(
     check_on_faces(body, grasp)
     coefficient(friction)
     agenda, setup = asked_for(agenda, setup)
-    torsion_m = setup.torsion_m
-    critical = critical_friction(grasp, torsion_m=torsion_m)
+    critical = setup.critical_friction(grasp)
     closed = friction > critical
-    if not (closed and force_closure(grasp, friction=friction, torsion_m=torsion_m).closed):
+    if not (closed and setup.closure(grasp, friction).closed):
         raise InputError(
             f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
         )
@@ -101,9 +98,9 @@ def tested(
             )
     controls, repeats = tuple[ControlVerdict, ...](), None
     if agenda.controls:
-        made = negative_controls(body, grasp, friction, agenda.seed, setup.torsion_m)
+        made = negative_controls(body, grasp, friction, agenda.seed, setup)
         controls = tuple(try_control(body, each, agenda, setup) for each in made)
-    if agenda.trials:  # the same fingertips hold the same wrenches
+    if agenda.repeats:  # the same fingertips hold the same wrenches
         named = [(planned.name, planned.load.wrench) for planned in loads]
         repeats = robustness(body, grasp, friction, named, agenda, for_repeats(setup, scene))
     return Verdict(
@@ -165,7 +162,7 @@ def simulated_critical_friction(
     """
     check_on_faces(body, grasp)
     _, setup = asked_for(None, setup)
-    predicted = critical_friction(grasp, torsion_m=setup.torsion_m)
+    predicted = setup.critical_friction(grasp)
     if not np.isfinite(predicted):
         raise InputError(f"grasp {grasp.id}: no friction gives force closure; choose another grasp")
     friction = max(predicted, setup.friction.least_friction)

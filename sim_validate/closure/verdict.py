@@ -29,9 +29,10 @@ from scenes.mujoco.layout import FingerDrive, Layout
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
-from sim_validate.engine.setup import WEAKEST, Agenda, Noise, Setup
+from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
 from sim_validate.kit.about_object import AboutObject
+from sim_validate.settings.trials import Noise
 
 AGREEMENT = 0.02
 """Largest relative error of simulated limits and critical frictions: five times the worst that was
@@ -150,7 +151,7 @@ class Scale(Declared):
     def of(cls, layout: Layout, radius_m: float) -> Self:
         """Return the sizes of a scene with an object of a radius [m]."""
         size = layout.grasp_size_m
-        return cls(size, radius_m, layout.mass_kg, layout.inertia_kg_m2, layout.drive)
+        return cls(size, radius_m, layout.object_kg, layout.inertia_kg_m2, layout.drive)
 
 
 def _not_held(_before: Outcome, after: Outcome) -> bool:

@@ -1,19 +1,24 @@
 """Runs the commands that build, import, verify and export datasets."""
 
 from contextlib import AbstractContextManager
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from grasp_core.errors import InputError
 from grasp_core.files.records import record_of
 from grasp_core.mesh_files.reading import FORMATS
-from grasp_core.planning.request import METHODS
 from grasp_core.processes import local_processes
+from grasp_core.settings import extended
 from sim_validate.datasets import flags as dataset_flags
 from sim_validate.datasets.build import build
 from sim_validate.datasets.card import CARD
-from sim_validate.datasets.config import CREDITS, DatasetConfig, Learning, config_from_toml
+from sim_validate.datasets.config import (
+    CREDITS,
+    DatasetConfig,
+    Learning,
+    PlannedContent,
+    config_from_toml,
+)
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.manifest import read_manifest
 from sim_validate.datasets.open_dataset import splits_in_words
@@ -23,9 +28,6 @@ from sim_validate.kit.clusters import dask_workers, ray_workers
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
 
-FRICTION = 0.5
-"""Friction coefficient for planning and simulation if no flag gives one."""
-
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
@@ -34,12 +36,10 @@ def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
     """Judge the grasps of another tool, and write the results as a dataset."""
-    config = DatasetConfig(
-        objects=(command.object,),
-        contacts=str(command.contacts),
+    config = extended(
+        DatasetConfig, command.content, objects=(command.object,), contacts=str(command.contacts),
         outward=command.outward,
-        **_settings(command.settings),
-    )
+    )  # fmt: skip
     return _build(config, command.out, command.work, reporter)
 
 
@@ -117,30 +117,17 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
 def _asked(command: dataset_flags.Build) -> DatasetConfig:
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix == ".toml":
-        unsaid = (dataset_flags.Planning(), dataset_flags.Content(), dataset_flags.Learned())
-        if len(command.objects) > 1 or (
-            (command.planning, command.settings, command.learned) != unsaid
-        ):
+        unsaid = (PlannedContent(), Learning())
+        if len(command.objects) > 1 or (command.content, command.learning) != unsaid:
             raise InputError(
                 f"{first} holds all settings of the dataset: give no other objects and no flags "
                 "but --out beside it"
             )
         config = config_from_toml(first)
         return replace(config, objects=_listed(config.objects))
-    return DatasetConfig(
-        objects=_listed(command.objects),
-        families=command.planning.family or METHODS,
-        limit=command.planning.limit,
-        cones=command.planning.cones,
-        learning=None if (asked := command.learned.asked()) is None else Learning(**asked),
-        **_settings(command.settings),
-    )
-
-
-def _settings(settings: dataset_flags.Content) -> dict[str, Any]:
-    given = {each.name: getattr(settings, each.name) for each in fields(settings)}
-    lengths = asdict(given.pop("lengths"))
-    return {"frictions": given.pop("friction") or (FRICTION,), **lengths, **given}
+    learning = None if command.learning == Learning() else command.learning
+    objects = _listed(command.objects)
+    return extended(DatasetConfig, command.content, objects=objects, learning=learning)
 
 
 def is_mesh(path: Path) -> bool:

@@ -4,37 +4,26 @@ Everything that decides a row is here. So the hash of the resolved text, togethe
 the meshes and the versions, identifies what a dataset can hold.
 """
 
-import hashlib
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, cast
 
-from grasp_core.checked import (
-    MOST_COUNT,
-    MOST_RANDOM_WRENCHES,
-    one_of,
-)
+from grasp_core.checked import MOST_COUNT, shown
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import shown
-from grasp_core.hands.named_hands import hand_names, load_hand
-from grasp_core.kinds import Count, Friction, Quantity, Range
-from grasp_core.objects.surface import FaceKind
-from grasp_core.planning.request import METHODS, ConeKind
-from grasp_core.settings import Settings
-from grasp_core.values import Method
+from grasp_core.kinds import METHODS, ConeKind, Count, Friction, Method, RandomWrenches, Range
+from grasp_core.mesh_files.limits import FaceKind, Lengths
+from grasp_core.settings import Settings, as_table
 from sim_validate.datasets.tables import EXECUTED
-from sim_validate.execution.settings import (
-    TABLE,
-    AskedExecution,
-    execution_table,
-)
-from sim_validate.kit.toml_tables import read_tables
+from sim_validate.settings.executions import ExecutionSettings
+from sim_validate.settings.trials import LimitSearch
 
+EXECUTION = "execution"
 LEARNING = "learning"
-"""Name of the table in a settings file."""
+"""Names of the tables in a settings file."""
+HandName: TypeAlias = Literal["", "allegro", "allegro-urdf", "leap"]
 Figure: TypeAlias = Literal["closure", "least_squeeze"]
 """A group of figures that each grasp has on request."""
 CONTROLS = 5
@@ -45,31 +34,30 @@ Varied = Annotated[int, Range(least=0, most=100)]
 """A number of rows of one kind that are made from a grasp."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Learning(Settings):
     """What is added to the tables, and how many rows of each kind are made from a grasp."""
 
     friction_below: Varied = 0
-    """Rows per grasp with its contacts at a friction clearly below its critical one."""
+    """Rows per grasp with its contacts clearly below their critical friction."""
     friction_near: Varied = 0
-    """Rows per grasp at a friction within some percent of its critical one, on either side."""
+    """Rows per grasp within some percent of the critical friction, on either side."""
     friction_above: Varied = 0
-    """Rows per grasp at a friction clearly above its critical one."""
+    """Rows per grasp clearly above the critical friction."""
     moved_out: Varied = 0
     """Rows per grasp with contacts moved on their faces, each out of its region."""
     mass_near: Varied = 0
     """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
     figures: tuple[Figure, ...] = ()
-    """Groups of figures of each grasp; what each takes is in docs/datasets.md."""
+    """Groups of figures that each grasp has; docs/datasets.md says what each costs."""
     seeds: tuple[Annotated[int, Range(least=0, most=MOST_COUNT)], ...] = ()
     """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
     synthetic: Annotated[int, Range(least=0, most=CONTROLS)] = CONTROLS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
-    hand: str = ""
+    hand: HandName = ""
     """Built-in hand whose pose is looked for in each grasp in force closure; empty for none."""
 
     def _check_together(self) -> None:
-        one_of(self.hand, ("", *hand_names()), "hand")
         for name in ("figures", "seeds"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
                 raise InputError(f"{name}: expected different items, got one of them twice")
@@ -78,7 +66,7 @@ class Learning(Settings):
         """Return the groups of columns that the tables have on request, with their sizes."""
         chosen = ["kinds", *self.figures]
         chosen += ["margins"] if executed else []
-        sized = {"hand": len(load_hand(self.hand).joints)} if self.hand else {}
+        sized = {"hand": _joints_of(self.hand)} if self.hand else {}
         return {**dict.fromkeys(chosen, 1), **sized}
 
     @property
@@ -89,49 +77,66 @@ class Learning(Settings):
         return next((name for name, value in used.items() if value), "")
 
 
-@dataclass(frozen=True, slots=True)
-class DatasetConfig(Settings):
+def _joints_of(hand: str) -> int:
+    from grasp_core.hands.named_hands import load_hand  # slow, and no flag needs it
+
+    return len(load_hand(hand).joints)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Content(Lengths):
+    """What a dataset is made of, whether its grasps are planned or given."""
+
+    frictions: tuple[Friction, ...] = (0.5,)
+    """Coulomb coefficients; grasps of each object are planned and simulated at each of them."""
+    faces: FaceKind = "auto"
+    """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface.
+    """
+    limits: LimitSearch = "none"
+    """Also find the largest multiple of each wrench in simulation."""
+    random_wrenches: RandomWrenches = 0
+    """Number of random wrenches that each grasp must hold as well."""
+    seed: Annotated[int, Range(least=0, most=2**63 - 1)] = 0
+    """Seed of all random choices."""
+    scenes: bool = False
+    """Also write each grasp as a MuJoCo scene."""
+    title: str = "four-finger grasps"
+    """Title of the dataset, for its README.md, as the settings below; no row depends on them."""
+    license: str = ""
+    """License of the dataset, such as CC-BY-4.0."""
+    creator: str = ""
+    """Who makes the dataset."""
+    url: str = ""
+    """Web address at which the dataset will be found."""
+    published: str = ""
+    """Date of publication, such as 2026-11-22, as a clock would make every build differ."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PlannedContent(Content):
+    """What a dataset of planned grasps is made of."""
+
+    families: tuple[Method, ...] = METHODS
+    """Families of grasps to construct."""
+    limit: Count = 20
+    """Largest number of grasps of each object, friction and family."""
+    cones: ConeKind = "tilted"
+    """Axes of the force cones that grasps are constructed with: only the face normals, or tilted
+    ones too."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class DatasetConfig(PlannedContent):
     """Settings of a dataset: objects, frictions, families, and how grasps are planned and tried."""
 
     objects: tuple[str, ...]
     """Mesh files, or names of built-in objects."""
-    frictions: tuple[Friction, ...] = (0.5,)
-    """Coulomb coefficients; grasps of each object are planned and simulated at each of them."""
-    families: tuple[Method, ...] = METHODS
-    limit: Count = 20
-    """Largest number of grasps for each object, friction and family."""
-    cones: ConeKind = "tilted"
-    unit: Literal["m", "cm", "mm", "in"] = "m"
-    """Unit of length in mesh files."""
-    scale: Quantity = 1.0
-    """Factor on the coordinates of mesh files, besides their unit."""
-    faces: FaceKind = "auto"
-    limits: Literal["none", "ramp", "bisection"] = "none"
-    """How the largest multiples of wrenches are found in simulation."""
-    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
-    """Number of random wrenches to hold besides the usual ones."""
-    seed: Annotated[int, Range(least=0, most=2**63 - 1)] = 0
-    """Seed of all random choices."""
     contacts: str = ""
     """Path of a file of contacts on the one object, which are judged instead of planned ones; empty
     to plan."""
     outward: bool = False
     """Whether normals in that file point out of the object."""
-    scenes: bool = False
-    """Whether each grasp is also written as a MuJoCo scene."""
-    title: str = "four-finger grasps"
-    """Title of the dataset. The title and the settings below only appear in the dataset's
-    README.md; no row depends on them."""
-    license: str = ""
-    """Licence of the dataset, such as `CC-BY-4.0`."""
-    creator: str = ""
-    """Who made the dataset."""
-    url: str = ""
-    """Web address at which the dataset will be found."""
-    published: str = ""
-    """Date of publication, such as `2026-11-22`. It is a setting, because a clock would make every
-    build differ."""
-    execution: AskedExecution | None = None
+    execution: ExecutionSettings | None = None
     """How grasps are executed besides: with true mass and springy fingers; None to leave it out."""
     learning: Learning | None = None
     """What the tables hold besides for learners; None for nothing."""
@@ -153,7 +158,7 @@ class DatasetConfig(Settings):
         if self.learning is not None and self.learning.executes and self.execution is None:
             raise InputError(
                 f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
-                f"squeeze; add a table [{TABLE}], or leave this setting out"
+                f"squeeze; add a table [{EXECUTION}], or leave this setting out"
             )
         if self.published and not _is_date(self.published):
             raise InputError(
@@ -170,11 +175,15 @@ class DatasetConfig(Settings):
     @property
     def sha256(self) -> str:
         """SHA-256 of the text with all settings."""
+        import hashlib  # slow, and no flag needs it
+
         return hashlib.sha256(config_to_toml(self).encode()).hexdigest()
 
 
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
+    from sim_validate.kit.toml_tables import read_tables  # slow, and no flag needs it
+
     given = read_tables(path)
     with about(path):
         return config_from_settings(given)
@@ -195,17 +204,9 @@ def _is_date(text: str) -> bool:
 
 def config_to_toml(config: DatasetConfig) -> str:
     """Write every setting in the order of the class; equal configurations give equal texts."""
-    tables = (TABLE, LEARNING)
-    own = {
-        each.name: getattr(config, each.name) for each in fields(config) if each.name not in tables
-    }
-    parts = [_lines(own)]
-    if config.execution is not None:
-        table = execution_table(config.execution)
-        hand = table.pop("hand")
-        parts += [f"[{TABLE}]\n{_lines(table)}", f"[{TABLE}.hand]\n{_lines(hand)}"]
-    if config.learning is not None:
-        parts += [f"[{LEARNING}]\n{_lines(asdict(config.learning))}"]
+    given = as_table(config)
+    tables = {name: given.pop(name) for name in (EXECUTION, LEARNING) if name in given}
+    parts = [_lines(given), *(f"[{name}]\n{_lines(each)}" for name, each in tables.items())]
     return "\n".join(parts)
 
 

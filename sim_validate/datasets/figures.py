@@ -25,8 +25,8 @@ from sim_validate.datasets.columns import figures_in
 from sim_validate.datasets.config import Learning
 from sim_validate.datasets.rows import ExecutionRow, GraspRow
 from sim_validate.execution.execute import tip_radius
-from sim_validate.execution.settings import AskedExecution, ExecutionSettings, TrialKind
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
+from sim_validate.settings.executions import ExecutionSettings, TrialKind
 
 Executed: TypeAlias = ExecutedGrasp | str | None
 """An execution, the reason why it was refused, or None where none is asked for."""
@@ -135,7 +135,7 @@ class Figures:
     """Which figures are asked for, and how strong fingers are."""
 
     asked: Learning
-    execution: AskedExecution | None
+    execution: ExecutionSettings | None
     seed: int = 0
     """Seed of the postures from which a hand looks for its pose."""
 
@@ -167,14 +167,14 @@ class Figures:
         """Return the figures that only executed contacts have."""
         if self.execution is None:
             return {}
-        settings = self.execution.settings_for(body)
+        settings = self.execution.for_body(body)
         cells: dict[str, Any] = {"tip_radius_m": tip_radius(body, contacts, settings)}
         if "least_squeeze" not in self.asked.figures:
             return cells
         try:
             least = best_squeeze(
                 body, contacts, friction, any_direction(mass_kg),
-                stiffness=settings.stiffness_n_per_m, tip_radius_m=cells["tip_radius_m"],
+                stiffness=settings.tip_stiffness_n_per_m, tip_radius_m=cells["tip_radius_m"],
             )  # fmt: skip
         except GraspError:  # no push carries the weight in every direction, or it is unstable
             return cells

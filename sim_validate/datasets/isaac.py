@@ -23,8 +23,9 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.fingertips import FingerSettings, fitting_radius
+from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.layout import arrange
+from scenes.settings import FingerSettings
 from sim_validate.datasets.config import quoted
 from sim_validate.datasets.meshes import mesh_path, stored_body
 from sim_validate.datasets.open_dataset import Selection, select
@@ -126,7 +127,8 @@ def _lines(
     yield "format: isaac_grasp\nformat_version: 1.0\n\n"
     yield f'object_frame: {source}\ngripper_frame: "four_fingertips"\n\ngrasps:\n'
     for row in rows:
-        layout = arrange(body, row.placed, friction, FingerSettings(radius_m=radius))
+        fingers = FingerSettings(fingertip_radius_m=radius)
+        layout = arrange(body, row.placed, friction, fingers)
         origin = row.points.mean(axis=0)
         touching = row.points - radius * row.normals - origin
         yield f"  {quoted(row.name)}:\n"

@@ -211,10 +211,8 @@ class MakingRows:
         asked = self.unit.config.execution
         if asked is not None:
             more = () if figures is None else figures.asked.seeds
-            seeds = (asked.settings.seed, *more)
-            self.executions += execution_rows(
-                row.grasp_id, executed, seeds, asked.settings.misplacements
-            )
+            seeds = (asked.seed, *more)
+            self.executions += execution_rows(row.grasp_id, executed, seeds, asked.misplacements)
         return row
 
     @property

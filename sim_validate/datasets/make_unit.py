@@ -108,7 +108,7 @@ class _Making:
         if asked is None:
             return None
         try:
-            settings, learning = asked.settings_for(body), self.unit.config.learning
+            settings, learning = asked.for_body(body), self.unit.config.learning
             job = ExecutionJob(body, grasp, self.unit.friction, settings, enough=False)
             return executed_by(
                 lambda each: executed_grasp(replace(job, settings=each)), settings,

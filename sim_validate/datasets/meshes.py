@@ -7,10 +7,11 @@ from pathlib import Path
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import from_record, record_of
+from grasp_core.mesh_files.limits import FaceKind, MeshChoices
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
-from grasp_core.objects.build import DEFAULT_LIMITS, MeshChoices, content_hash
+from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
-from grasp_core.objects.surface import FaceKind, Surface
+from grasp_core.objects.surface import Surface
 from sim_validate.kit.paths import path_inside
 
 FOLDER = "meshes"
@@ -55,6 +56,6 @@ def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Pol
             with about("first line"):
                 known = from_record(Surface, object_of(said.removeprefix(SURFACE), "surface"))
         return polyhedron_from_mesh(
-            mesh.vertices, mesh.triangles, MeshChoices(faces), name=name,
+            mesh.vertices, mesh.triangles, MeshChoices(faces=faces), name=name,
             source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,
         )  # fmt: skip

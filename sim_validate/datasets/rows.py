@@ -16,8 +16,8 @@ from grasp_core.arrays import Array, Indices, Shape, Wrench
 from grasp_core.declared import Declared, rules, types
 from grasp_core.errors import InputError
 from grasp_core.files.records import FLAT
-from grasp_core.kinds import Friction, Number, Range, Seed
-from grasp_core.values import FINGERS, Contact, Family
+from grasp_core.kinds import Family, Friction, Number, Range, Seed
+from grasp_core.values import FINGERS, Contact
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets.columns import (
     Asked,

@@ -8,7 +8,7 @@ of an earlier run count exactly if they would come out the same.
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
@@ -19,10 +19,10 @@ from grasp_core.errors import GraspError, InputError
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.provenance import versions
+from grasp_core.settings import as_table
 from scenes.example_objects import example_object
-from sim_validate.datasets.config import CREDITS, LEARNING, DatasetConfig
+from sim_validate.datasets.config import CREDITS, DatasetConfig
 from sim_validate.datasets.given_contacts import GivenGrasp, given_sha256, read_given
-from sim_validate.execution.settings import TABLE, execution_table
 
 CHUNK = 2**20
 PART = 25
@@ -84,15 +84,7 @@ def provenance() -> Mapping[str, str]:
 
 def shared_settings(config: DatasetConfig) -> dict[str, object]:
     """Return the settings that decide the rows of every unit, such as the seed, but no objects."""
-    settings = {
-        each.name: getattr(config, each.name) for each in fields(config) if each.name not in APART
-    }
-    executed, learning = settings.pop(TABLE), settings.pop(LEARNING)
-    if executed is not None:
-        settings[TABLE] = execution_table(executed)
-    if learning is not None:
-        settings[LEARNING] = asdict(learning)
-    return settings
+    return {name: value for name, value in as_table(config).items() if name not in APART}
 
 
 def units_of(config: DatasetConfig) -> list[WorkUnit]:

@@ -46,8 +46,8 @@ from sim_validate.datasets.figures import Executed, executed_by
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute
-from sim_validate.execution.settings import AskedExecution, ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
+from sim_validate.settings.executions import ExecutionSettings
 
 RATIOS = {
     "friction_below": (0.6, 0.9),
@@ -241,7 +241,7 @@ class Varying:
     asked: Learning
     friction: float
     agenda: Agenda
-    execution: AskedExecution | None
+    execution: ExecutionSettings | None
 
     def of(
         self, body: Polyhedron, grasp: Grasp, verdict: Verdict, executed: Executed
@@ -285,7 +285,7 @@ class Varying:
         if self.execution is None:
             return None
         try:
-            settings = self.execution.settings_for(variant.seated.body)
+            settings = self.execution.for_body(variant.seated.body)
             if variant.mass_kg is not None:
                 settings = replace(settings, mass_kg=variant.mass_kg)
             return executed_by(partial(_executed_with, variant), settings, self.asked.seeds)

@@ -40,8 +40,8 @@ from sim_validate.datasets.tables import KEYS, NAMES
 from sim_validate.datasets.varied import RATIOS, VARIED
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
-from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import ExecutionTrial
+from sim_validate.settings.executions import ExecutionSettings
 
 SAME_MARGIN = 1e-6
 """Largest difference between a closure margin in a row and that of the contacts, relative to the
@@ -264,7 +264,7 @@ def _trial_faults(
         yield from _disagreements(row, {"payload_kg": carried}, "load_multiple times the mass")
 
 
-def _squeeze_faults(row: GraspRow, body: Polyhedron, asked: AskedExecution) -> Iterator[str]:
+def _squeeze_faults(row: GraspRow, body: Polyhedron, asked: ExecutionSettings) -> Iterator[str]:
     """Check the mass, and prove again that the squeeze carries what the row says."""
     yield from _proved(row, body, asked, "load_multiple")
     if row.least_squeeze_n is not None:
@@ -274,30 +274,34 @@ def _squeeze_faults(row: GraspRow, body: Polyhedron, asked: AskedExecution) -> I
 
 
 def _proved(
-    row: GraspRow, body: Polyhedron, asked: AskedExecution, claim: str, push_n: float | None = None
+    row: GraspRow,
+    body: Polyhedron,
+    asked: ExecutionSettings,
+    claim: str,
+    push_n: float | None = None,
 ) -> Iterator[str]:
     """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
     if row.squeeze_n is None or row.load_multiple is None or row.mass_kg is None:
         yield "the row lacks its squeeze, its mass, or what the squeeze carries"
         return
     try:
-        settings = asked.settings_for(body)
+        settings = asked.for_body(body)
         if row.mass_ratio is not None:
             settings = replace(settings, mass_kg=row.mass_kg)
         if row.label in (GIVEN, VARIED):  # on curved surfaces they have faces of their own
             body = seat(body, row.points, row.normals).body
         held = grip(
             body, row.placed, row.friction, row.squeeze_n[: row.contacts],
-            stiffness=settings.stiffness_n_per_m,
+            stiffness=settings.tip_stiffness_n_per_m,
             tip_radius_m=tip_radius(body, row.placed, settings),
         )  # fmt: skip
     except GraspError as error:
         yield f"the contacts cannot be squeezed as the row says ({error})"
         return
-    if faults := list(_disagreements(row, {"mass_kg": settings.mass_kg}, CONFIG)):
+    if faults := list(_disagreements(row, {"mass_kg": settings.object_kg}, CONFIG)):
         yield from faults
         return
-    survival = Survival.of(held, any_direction(settings.mass_kg))
+    survival = Survival.of(held, any_direction(settings.object_kg))
     reactions = survival.reactions(held.local_squeeze)
     multiple = row.load_multiple * (1.0 - ROUNDING)
     pushes = reactions.start[:, 0] + multiple * reactions.swing

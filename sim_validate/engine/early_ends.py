@@ -193,16 +193,17 @@ class _Springs:
         self.spring, self.damper = drive.stiffness_n_per_m, drive.damping_n_s_per_m
         self.size, self.largest = layout.grasp_size_m, drive.max_normal_force_n
         self.share = math.sqrt(2.0 / count)
-        self.slowest = math.sqrt(count * self.spring / (layout.mass_kg + count * drive.mass_kg))
-        self.fastest = math.sqrt(self.spring / drive.mass_kg)
-        self.forces = 2.0 + 2.0 * self.damper / math.sqrt(self.spring * drive.mass_kg)
+        moving = layout.object_kg + count * drive.tip_mass_kg
+        self.slowest = math.sqrt(count * self.spring / moving)
+        self.fastest = math.sqrt(self.spring / drive.tip_mass_kg)
+        self.forces = 2.0 + 2.0 * self.damper / math.sqrt(self.spring * drive.tip_mass_kg)
         # angular velocity times this is how fast the simulated centre of mass moves with it
         arm = cross_matrix(layout.center)
         self.arms = np.block([[np.eye(3), np.zeros((3, 3))], [arm, self.size * np.eye(3)]])
         # speeds times these have the length |x'|_M
-        roots = np.eye(6 + 3 * count) * math.sqrt(drive.mass_kg)
-        roots[:3, :3] = np.eye(3) * math.sqrt(layout.mass_kg)
-        roots[3:6, :3] = math.sqrt(layout.mass_kg) * arm
+        roots = np.eye(6 + 3 * count) * math.sqrt(drive.tip_mass_kg)
+        roots[:3, :3] = np.eye(3) * math.sqrt(layout.object_kg)
+        roots[3:6, :3] = math.sqrt(layout.object_kg) * arm
         roots[3:6, 3:6] = np.linalg.cholesky(layout.inertia_kg_m2)
         self.roots = roots
 
@@ -241,7 +242,7 @@ class _Springs:
 def _springs(layout: Layout) -> _Springs | None:
     """Return the linear model of a layout; None where it would not bound the motion."""
     # contacts must be hard, and as far from their closest axis as the layout's grasp size
-    if not layout.has_springs or layout.torsion_m:
+    if not layout.has_springs or layout.softness.is_soft:
         return None
     if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
         return None

@@ -155,7 +155,7 @@ def remember_gate(gate: Gate, setup: Setup, friction: float, radius_m: float) ->
 
 def _case(setup: Setup, friction: float, radius_m: float) -> Case:
     # Two digits of the radius let objects of nearly the same size share one measurement.
-    fingers = replace(setup.fingers, radius_m=None, approach=None)
+    fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
     setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
     return Case(setup, friction, float(f"{radius_m:.1e}"))
 

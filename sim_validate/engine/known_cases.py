@@ -223,15 +223,15 @@ def _held_across(case: Case, body: Polyhedron, length: float, lever: float) -> R
 
 def _twisted_box(case: Case) -> list[Check]:
     """Twist a box that soft fingers hold on two opposite faces, and check when it turns."""
-    friction, torsion_m = case.friction, case.setup.torsion_m
-    if not torsion_m:
+    friction, soft = case.friction, case.setup.physics.torsion_m
+    if not soft:
         return []
     body = case.body("box")
     length, width, _ = np.ptp(body.vertices, axis=0)
     # where both parts resist alike, if that is on the faces and apart enough
-    lever = min(max(torsion_m / friction, LEAST_LEVER * width), width / 4.0)
+    lever = min(max(soft / friction, LEAST_LEVER * width), width / 4.0)
     rig = _held_across(case, body, length, lever)
-    each = math.hypot(friction * lever, torsion_m)
+    each = math.hypot(friction * lever, soft)
     # a point of the limit surface: sliding and turning as fast as one rigid body does
     slides = case.push * friction**2 * lever / each
     limit = Load(

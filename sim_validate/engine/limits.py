@@ -31,11 +31,13 @@ from grasp_core.errors import NoForcesError, SolverError, UndecidedError
 from grasp_core.forces.contact_forces import even_forces
 from grasp_core.kinds import OrInfinity
 from scenes.mujoco.layout import SQUEEZE
+from scenes.settings import HARD, Softness
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.schedules import FrictionProtocol, Load
+from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Trace, holds
+from sim_validate.settings.trials import FrictionProtocol
 
 LATER = 8.0
 """Displacement at the second reading of a ramp, relative to the first; 8 = 2 cubed."""
@@ -172,7 +174,7 @@ def released_friction(
     high = protocol.settling_friction * max(predicted, protocol.least_friction)
     # The excess is relative, so a prediction of zero needs a friction to be relative to.
     least = max(predicted, 0.5 * protocol.least_friction)
-    forces = forces_just_above(positions, normals, least, setup.torsion_m)
+    forces = forces_just_above(positions, normals, least, setup.physics)
     forces *= SQUEEZE * setup.fingers.max_normal_force_n
     rig = replace(squeezed(bench, setup, forces, predicted, high).at_rest(high), whole=whole)
 
@@ -209,7 +211,7 @@ def bisected(
 
 
 def forces_just_above(
-    positions: Array, normals: Array, critical: float, torsion_m: float = 0.0
+    positions: Array, normals: Array, critical: float, physics: Softness = HARD
 ) -> Array:
     """Find balanced forces that need almost the critical friction, (k, 3), largest push 1 N.
 
@@ -218,7 +220,9 @@ def forces_just_above(
     forces = None
     for above in ABOVE:
         try:
-            forces = even_forces(positions, normals, (1.0 + above) * critical, torsion_m=torsion_m)
+            forces = even_forces(
+                positions, normals, (1.0 + above) * critical, torsion_m=physics.torsion_m
+            )
         except (NoForcesError, SolverError):
             continue
         if np.einsum("ki,ki->k", forces, normals).min() >= LEAST_PUSH:

@@ -53,7 +53,7 @@ def planned_loads(
     """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
     resisted, share = resisted_by(body, contacts, friction, setup, motors), setup.hold.load_share
     relative = [
-        _load(name, found, share * found.limit, idle, body, contacts, setup.torsion_m)
+        _load(name, found, share * found.limit, idle, body, contacts, setup)
         for name, found in _relative(resisted, body.radius, agenda)
     ]
     named = [(each.name, each.wrench) for each in agenda.wrenches]
@@ -74,7 +74,7 @@ def loads_as_they_are(
     """Plan finger forces for wrenches that are applied as given, not at a share of a limit."""
     resisted = resisted_by(body, contacts, friction, setup, motors)
     return tuple(
-        _load(name, limit_of(resisted, wrench), 1.0, idle, body, contacts, setup.torsion_m)
+        _load(name, limit_of(resisted, wrench), 1.0, idle, body, contacts, setup)
         for name, wrench in wrenches
     )
 
@@ -88,7 +88,7 @@ def resisted_by(
     frictions = contact_frictions(friction, len(contacts))
     return WrenchBody(
         positions - body.center_of_mass, normals, frictions, setup.fingers.max_normal_force_n,
-        motors, torsions=contact_torsions(setup.torsion_m, frictions),
+        motors, torsions=contact_torsions(setup.physics.torsion_m, frictions),
     )  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def _relative(
 
 def _load(
     name: str, found: WrenchLimit, multiple: float, idle: Load, body: Polyhedron,
-    contacts: Sequence[Contact], torsion_m: float,
+    contacts: Sequence[Contact], setup: Setup,
 ) -> PlannedLoad:  # fmt: skip
     """Plan a multiple of a wrench, with forces between those at rest and those at the limit.
 
@@ -129,7 +129,7 @@ def _load(
         missing = idle.wrench[3:] + cross(positions - body.center_of_mass, idle.forces).sum(axis=0)
         resting = np.asarray(np.linalg.lstsq(normals.T, -missing, rcond=None)[0], dtype=np.float64)
         torques = (1.0 - share) * resting + share * found.torques
-        turning = np.abs(torques[pushing]) / torsion_m
+        turning = np.abs(torques[pushing]) / setup.physics.torsion_m
         along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
     required = rounded((across / along).max())
     return PlannedLoad(name, load, predicted, limit, required)

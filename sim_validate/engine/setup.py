@@ -4,12 +4,14 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated
 
 import numpy as np
 
 from grasp_core.arrays import Wrench, frozen_copy, to_digits
-from grasp_core.checked import LARGEST, MOST_RANDOM_WRENCHES, MOST_TRIALS, SMALLEST
+from grasp_core.checked import LARGEST, SMALLEST
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
@@ -17,12 +19,11 @@ from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from grasp_core.settings import CHOSEN, Settings
+from grasp_core.settings import CHOSEN
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.closure_scene import Scene, Surface, build_scene
-from scenes.mujoco.fingertips import FingerSettings
-from scenes.mujoco.physics import PhysicsSettings
-from sim_validate.engine.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
+from scenes.mujoco.closure_scene import Scene, build_scene
+from scenes.settings import FingerSettings, PhysicsSettings, ScaledScene
+from sim_validate.settings.trials import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
 
 AXIS_NAMES = tuple(
     f"{sign}{kind}_{axis}" for sign in "+-" for kind in ("force", "torque") for axis in "xyz"
@@ -33,13 +34,10 @@ RANDOM = "random_{}"
 MOST_THREADS = 1024
 HARD_FINGER = 3
 """MuJoCo's `condim` of a contact whose force has a normal and two tangential parts."""
-Share = Annotated[float, Range(least=0.0, most=1.0)]
-Tilt = Annotated[float, Range(least=0.0, most=45.0)]
-LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Setup(Settings):
+class Setup(ScaledScene):
     """How trials are simulated: physics, fingertips, surface, durations and thresholds.
 
     Raises:
@@ -49,9 +47,6 @@ class Setup(Settings):
 
     fingers: FingerSettings = field(default_factory=FingerSettings)
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)
-    surface: Annotated[Surface, CHOSEN] = "pads"
-    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
-    of a convex object."""
     hold: HoldProtocol = field(default_factory=HoldProtocol)
     limit: LimitProtocol = field(default_factory=LimitProtocol)
     friction: FrictionProtocol = field(default_factory=FrictionProtocol)
@@ -80,10 +75,13 @@ class Setup(Settings):
                 "physics.torsion_m"
             )
 
-    @property
-    def torsion_m(self) -> float:
-        """Return the torsional coefficient of every contact [m]; zero for hard fingertips."""
-        return self.physics.torsion_m
+    def closure(self, contacts: Grasp | Sequence[Contact], friction: float) -> ClosureCertificate:
+        """Decide force closure by fingertips as soft as these."""
+        return force_closure(contacts, friction=friction, torsion_m=self.physics.torsion_m)
+
+    def critical_friction(self, contacts: Grasp | Sequence[Contact]) -> float:
+        """Return the least friction of force closure by fingertips as soft as these."""
+        return critical_friction(contacts, torsion_m=self.physics.torsion_m)
 
     def scene(self, body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float) -> Scene:
         """Build the MuJoCo scene of a grasp with these settings."""
@@ -116,27 +114,7 @@ class NamedWrench(Declared):
 
 
 @dataclass(frozen=True, slots=True)
-class Noise(Settings):
-    """How uncertain the pose, surface, friction and mass are, as standard deviations.
-
-    Raises:
-        InputError: A number is negative or out of its range.
-    """
-
-    shift: Share = 0.01
-    """Deviation of the object's position along each axis, in object radii."""
-    turn_deg: Tilt = 1.0
-    """Deviation of the object's orientation about each axis through its centre of mass [deg]."""
-    normal_deg: Tilt = 1.0
-    """Deviation of the surface normal at each contact, about two axes in the surface [deg]."""
-    friction: Share = 0.05
-    """Deviation of the friction coefficient, relative to the coefficient."""
-    mass: Share = 0.05
-    """Deviation of the mass and of every load, relative to the planned values."""
-
-
-@dataclass(frozen=True, slots=True)
-class Agenda(Settings):
+class Agenda(ChosenTrials):
     """Which trials a grasp goes through.
 
     The twelve axis wrenches and the weakest one are always held, at a share of what the analysis
@@ -144,16 +122,10 @@ class Agenda(Settings):
     are.
     """
 
-    random_wrenches: Annotated[int, Range(least=0, most=MOST_RANDOM_WRENCHES)] = 0
     wrenches: tuple[NamedWrench, ...] = ()
     critical_friction: bool = True
     """Whether to find the critical friction in simulation."""
-    limits: LimitSearch = "none"
-    """How the largest multiple of each wrench is found in simulation, if at all."""
     controls: bool = True
-    trials: Annotated[int, Range(least=0, most=MOST_TRIALS)] = 0
-    """How many times all trials that hold a wrench are repeated with noise."""
-    noise: Noise = field(default_factory=Noise)
     keep_traces: Annotated[bool, UNRECORDED] = field(default=False, compare=False)
     seed: Seed = 0
     """Seed of the random wrenches, of noise, and of how contacts are moved to make a negative
@@ -176,6 +148,6 @@ def drawn_names(random_wrenches: int) -> set[str]:
 
 def with_planned_radius(fingers: FingerSettings, planned: Finger | None) -> FingerSettings:
     """Give fingertips the radius that grasps are planned for, unless they have their own."""
-    if planned is None or fingers.radius_m is not None:
+    if planned is None or fingers.fingertip_radius_m is not None:
         return fingers
-    return replace(fingers, radius_m=planned.radius_m)
+    return replace(fingers, fingertip_radius_m=planned.radius_m)

@@ -21,7 +21,7 @@ from grasp_core.kinds import Measured
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.layout import Layout
 from sim_validate.engine.bench import Health, Motion
-from sim_validate.engine.schedules import HoldProtocol
+from sim_validate.settings.trials import HoldProtocol
 
 MICRO = 1e6
 

@@ -1,86 +1,38 @@
 """Turns the flags of a command into the settings and trials of executions."""
 
-from dataclasses import fields, replace
-from typing import cast
+from dataclasses import replace
+from typing import TypeVar
 
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
-from scenes.mujoco.held import HeldSettings
-from sim_validate.execution.settings import ExecutionSettings, TrialKind
+from grasp_core.settings import extended
 from sim_validate.kit.command_flags import Run
 from sim_validate.kit.exit_codes import FlagsError
-from sim_validate.kit.flag_groups import (
-    DENSITY_KG_M3,
-    TRIALS,
-    UPRIGHT,
-    Executing,
-    Mass,
-    Tips,
-    trials_in,
-)
 from sim_validate.planning.asked_objects import asked_finger
+from sim_validate.settings.executions import ChosenExecution, ExecutionSettings, Holding
 
-Down = tuple[float, float, float]
-
-
-def check_mass(given: Mass) -> None:
-    """Refuse a mass beside a density, before any file is read."""
-    if given.mass_kg is not None and given.density_kg_m3 is not None:
-        raise FlagsError("--mass-kg and --density-kg-m3 exclude each other: leave one of them out")
+Held = TypeVar("Held", bound=Holding)
 
 
-def mass_of(body: Polyhedron, given: Mass) -> float:
-    """Return the mass of an object by the flags, or by its volume and the usual density [kg]."""
-    if given.mass_kg is not None:
-        return given.mass_kg
-    return body.mass_at(DENSITY_KG_M3 if given.density_kg_m3 is None else given.density_kg_m3)
-
-
-def holding(
-    body: Polyhedron, finger: Finger | None, mass: Mass, tips: Tips, down: Down
-) -> ExecutionSettings:
-    """Build the settings of what holds and is held; trials are the usual ones."""
+def holding(given: Held, body: Polyhedron, finger: Finger | None) -> Held:
+    """Complete what holds an object: its mass, and fingertips as planned if no flag gives them."""
     planned = None if finger is None else finger.radius_m
-    return ExecutionSettings(
-        mass_kg=mass_of(body, mass),
-        push_n=tips.push_n,
-        stiffness_n_per_m=tips.tip_stiffness_n_per_m,
-        tip_radius_m=planned if tips.tip_radius_m is None else tips.tip_radius_m,
-        hand=HeldSettings(
-            tip_mass_kg=tips.tip_mass_kg, damping_ratio=tips.damping_ratio, down=down
-        ),
-    )
+    radius = planned if given.tip_radius_m is None else given.tip_radius_m
+    return replace(given.for_body(body), tip_radius_m=radius)
 
 
 def execution_settings(
-    body: Polyhedron,
-    seed: int,
-    finger: Finger | None,
-    given: Executing,
-    trials: tuple[str, ...],
-    down: Down,
+    given: ChosenExecution, body: Polyhedron, seed: int, finger: Finger | None
 ) -> ExecutionSettings:
-    """Build the settings of executions; flags of the same names set them."""
-    named = {word for text in trials for word in trials_in(text)} or set(TRIALS)
-    known = {each.name for each in fields(ExecutionSettings)}
-    return replace(
-        holding(body, finger, given.mass, given.tips, down),
-        trials=cast("tuple[TrialKind, ...]", tuple(sorted(named))),
-        **{each.name: getattr(given, each.name) for each in fields(given) if each.name in known},
-        seed=seed,
-        most_mm=given.max_mm,
-        most_deg=given.max_deg,
-    )
+    """Build the settings of executions."""
+    return extended(ExecutionSettings, holding(given, body, finger), seed=seed)
 
 
 def check_executing(command: Run) -> None:
     """Refuse flags about executions where none are asked for, before any file is read."""
-    check_mass(command.executing.mass)
-    given = (command.executing, command.execute_trials, command.execute_down)
-    if not command.execute and given != (Executing(), (), UPRIGHT):
+    if not command.execute and command.executing != ChosenExecution():
         raise FlagsError(
-            "the flags from --mass-kg to --max-deg, --execute-trials and --execute-down say how "
-            "grasps are executed: add --execute too"
+            "the flags from --mass-kg to --max-deg say how grasps are executed: add --execute too"
         )
 
 
@@ -89,7 +41,4 @@ def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None
     if not command.execute:
         return None
     planning = command.planning
-    return execution_settings(
-        body, planning.seed, asked_finger(planning), command.executing, command.execute_trials,
-        command.execute_down,
-    )  # fmt: skip
+    return execution_settings(command.executing, body, planning.seed, asked_finger(planning))

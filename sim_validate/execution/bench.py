@@ -222,7 +222,7 @@ class HeldBench:
         for place, drive in enumerate(drives):
             n = len(drive)
             loads[:n, place] = drive.wrenches
-            loads[:n, place, :3] += layout.mass_kg * (drive.gravity - layout.gravity)
+            loads[:n, place, :3] += layout.object_kg * (drive.gravity - layout.gravity)
             motors[:n, place] = drive.accelerations * palm_armature(layout)
             commands[:n, place] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
         return loads, motors, commands

@@ -8,9 +8,8 @@ from pathlib import Path
 from grasp_core.figures import NONE, figures
 from grasp_core.planning.result import Plan
 from sim_validate.closure.setup_toml import physics_from_file
-from sim_validate.execution.asked_executions import check_mass, execution_settings
+from sim_validate.execution.asked_executions import execution_settings
 from sim_validate.execution.jobs import ExecutionJob, executed
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -26,6 +25,7 @@ from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
+from sim_validate.settings.executions import ExecutionSettings
 
 EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
 """Figures whose meaning is said below their table."""
@@ -42,16 +42,13 @@ SLIPS_MEAN = (
 
 def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
-    check_mass(command.executing.mass)
     chosen = asked_grasps(
         command.grasps, reporter, grasp=command.grasp, friction=command.friction,
         seed=command.seed, limit=command.limit,
     )  # fmt: skip
     if chosen is None:
         return Exit.NONE
-    settings = execution_settings(
-        chosen.body, chosen.seed, chosen.finger, command.executing, command.trials, command.down
-    )
+    settings = execution_settings(command.executing, chosen.body, chosen.seed, chosen.finger)
     physics = {} if command.setup is None else physics_from_file(command.setup)
     with alone_in(command.out):
         code, text = execute_grasps(
@@ -108,8 +105,8 @@ def _show(found: Executions, reporter: Reporter) -> None:
     if any(not trial.survived for each in found for trial in each.trials if trial.kind == "knock"):
         reporter.warn(
             f"a knock of {settings.impulse_n_s:g} N s would give a free object of "
-            f"{settings.mass_kg:g} kg {settings.impulse_n_s / settings.mass_kg:.3g} m/s; choose it "
-            "with --knock-n-s"
+            f"{settings.object_kg:g} kg {settings.impulse_n_s / settings.object_kg:.3g} m/s; "
+            "choose it with --knock-n-s"
         )
 
 

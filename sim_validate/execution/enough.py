@@ -21,13 +21,13 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
-from scenes.mujoco.held import HeldLayout
+from scenes.mujoco.held import HeldLayout, gravity_of
 from scenes.mujoco.held_mjcf import HeldScene
 from sim_validate.execution import paths
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import Enough
+from sim_validate.settings.executions import ExecutionSettings
 
 CLEAR = 1.1
 """Predicted loss of the trials that is asked for: predictions beyond a slip are not exact."""
@@ -61,8 +61,8 @@ def found_enough(
     """Find the least push, and stiffness, that is enough for the trials of an execution."""
     kinds = ("shake along" if kind == "shake" else kind for kind in settings.trials)
     multiple = 1.0 + max(accelerations_g(settings)[kind] for kind in kinds)
-    stiffness = settings.stiffness_n_per_m
-    firm = FIRM * multiple * settings.mass_kg * GRAVITY_M_PER_S2 / body.radius + stiffness
+    stiffness = settings.tip_stiffness_n_per_m
+    firm = FIRM * multiple * settings.object_kg * GRAVITY_M_PER_S2 / body.radius + stiffness
     try:  # what no push on firm fingertips survives, no push survives
         _least(settings, firm, multiple, choose)
     except NoForcesError as error:
@@ -76,10 +76,10 @@ def found_enough(
             break
         best = choose(own, None)
         slip, loss = _predicted(body, own, best, scene_of(own, best).layout)
-        found = Enough(best.scale, own.push_n, own.stiffness_n_per_m, loss)
+        found = Enough(best.scale, own.push_n, own.tip_stiffness_n_per_m, loss)
         if loss >= CLEAR:
             break
-        more, stiffness = NEAR * CLEAR / max(loss, 0.5), own.stiffness_n_per_m
+        more, stiffness = NEAR * CLEAR / max(loss, 0.5), own.tip_stiffness_n_per_m
         if slip > loss:
             stiffness *= more
         else:
@@ -94,7 +94,7 @@ def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
     for, which samples of the sinusoid miss by up to some per cent. For a knock it is that of the
     object if nothing held it.
     """
-    gravity, way = settings.hand.gravity, np.array([1.0, 0.0, 0.0])
+    gravity, way = gravity_of(settings), np.array([1.0, 0.0, 0.0])
     stop = paths.stop(gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
     lift, _ = paths.lift(way, settings.lift_m, settings.lift_s)
     knock = paths.knock(gravity, settings.impulse_n_s * way, np.zeros(3))
@@ -103,7 +103,7 @@ def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
         **dict.fromkeys(("shake along", "shake about"), settings.shake_g),
         "lift": _largest(lift.accelerations),
         "stop": _largest(stop.accelerations),
-        "knock": _largest(knock.wrenches) / settings.mass_kg,
+        "knock": _largest(knock.wrenches) / settings.object_kg,
     }
 
 
@@ -115,9 +115,9 @@ def _least(
     settings: ExecutionSettings, stiffness: float, multiple: float, choose: Choose
 ) -> tuple[ExecutionSettings, BestSqueeze]:
     """Find the squeeze of least push for a multiple of the weight, and settings with that push."""
-    given = stiffness == settings.stiffness_n_per_m
-    own = replace(settings, stiffness_n_per_m=stiffness if given else _rounded_up(stiffness))
-    best = choose(own, any_direction(own.mass_kg, (multiple - 1.0) * GRAVITY_M_PER_S2))
+    given = stiffness == settings.tip_stiffness_n_per_m
+    own = replace(settings, tip_stiffness_n_per_m=stiffness if given else _rounded_up(stiffness))
+    best = choose(own, any_direction(own.object_kg, (multiple - 1.0) * GRAVITY_M_PER_S2))
     return replace(own, push_n=_rounded_up(best.max_push_n)), best
 
 

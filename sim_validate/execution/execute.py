@@ -32,7 +32,7 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held import hinged, rotations
 from scenes.mujoco.held_mjcf import HeldScene, build_held_scene, held_physics
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
 from sim_validate.execution.bench import (
@@ -47,10 +47,10 @@ from sim_validate.execution.enough import Choose, NoSqueezeError, SceneOf, found
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive, parted
 from sim_validate.execution.predictions import held_dynamics, predicted_losses
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
 from sim_validate.execution.trials import Trial, trials_of
 from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.settings.executions import ExecutionSettings
 
 FINE_S = 1.25e-4
 """Length of steps that confirm a loss, at most [s]."""
@@ -161,7 +161,7 @@ def execute(
         NoForcesError: No squeeze carries the weight, or the grip is unstable under the best one.
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
-    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings)
+    settings = asked_settings("execute", settings, mass_kg, ExecutionSettings).for_body(body)
     contacts = given_contacts(body, grasp)
     return executed(
         body, settings,
@@ -178,7 +178,9 @@ def asked_settings(
     """Return settings with a mass, if one is given, or the usual ones for the mass."""
     if settings is not None:
         instance(settings, ExecutionSettings, "settings")
-        return settings if mass_kg is None else replace(settings, mass_kg=mass_kg)
+        if mass_kg is None:
+            return settings
+        return replace(settings, mass_kg=mass_kg, density_kg_m3=None)
     if mass_kg is None:
         raise InputError(f"{by}: expected mass_kg or settings, got neither; give mass_kg=0.3")
     return usual(mass_kg)
@@ -208,7 +210,7 @@ def simulated(
     body: Polyhedron, best: BestSqueeze, scene: HeldScene, settings: ExecutionSettings, threads: int
 ) -> Execution:
     """Simulate the trials of a scene with the squeeze that was chosen for it, and judge each."""
-    require_faithful_execution(scene.layout, scene.physics, settings.hand, settings.push_n)
+    require_faithful_execution(scene.layout, scene.physics, settings, settings.push_n)
     lost_m = max(LOST * body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
     dynamics = held_dynamics(best.grip, scene.layout)
@@ -219,7 +221,7 @@ def simulated(
     )  # fmt: skip
     predicted = [(float(slip), float(loss)) for slip, loss in zip(slips, losses, strict=True)]
     return Execution(
-        mass_kg=settings.mass_kg,
+        mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
         trials=tuple(_judged_trials(bench, trials, predicted, settings)),
@@ -240,9 +242,9 @@ def chosen_squeeze(
     """
     contacts = grasp.contacts if isinstance(grasp, Grasp) else grasp
     best = best_squeeze(
-        body, contacts, friction, loads or any_direction(settings.mass_kg),
+        body, contacts, friction, loads or any_direction(settings.object_kg),
         max_push_n=settings.push_n if loads is None else None,
-        stiffness=settings.stiffness_n_per_m, tip_radius_m=tip_radius(body, contacts, settings),
+        stiffness=settings.tip_stiffness_n_per_m, tip_radius_m=tip_radius(body, contacts, settings),
     )  # fmt: skip
     if best.scale == 0.0:
         raise NoForcesError(
@@ -274,8 +276,7 @@ def held_scene(
 ) -> HeldScene:  # fmt: skip
     """Build the scene in which a grip is executed."""
     return build_held_scene(
-        body, grip, settings.mass_kg, settings=settings.hand, physics=physics,
-        reach_m=surface_reach(body, grip, settings),
+        body, grip, settings, physics=physics, reach_m=surface_reach(body, grip, settings)
     )  # fmt: skip
 
 

@@ -48,9 +48,9 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held import TOUCH, HeldLayout, HeldSettings
+from scenes.mujoco.held import TOUCH, HeldLayout
 from scenes.mujoco.held_mjcf import AWAY, SAMPLE_S, held_physics
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import HeldSettings, PhysicsSettings
 from sim_validate.engine.gate import DEPTH, Gate, angles, touch_checks
 from sim_validate.engine.known_cases import Check, sized
 from sim_validate.execution import paths
@@ -84,7 +84,7 @@ def cases_of(
     # gravity points down the box's free axis, whatever its direction in the scene
     upright = replace(physics, gravity=tuple(WEIGHT.tolist()))
     numbers = {
-        "mass_kg": layout.mass_kg, "stiffness_n_per_m": layout.stiffest, "push_n": push_n,
+        "object_kg": layout.object_kg, "stiffness_n_per_m": layout.stiffest, "push_n": push_n,
         "radius_m": layout.radius_m, "tip_radius_m": float(layout.tip_radius_m.max()),
         "tip_mass_kg": hand.tip_mass_kg, "damping_ratio": hand.damping_ratio,
     }  # fmt: skip
@@ -192,7 +192,7 @@ def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
     """Return the drive in which a weight grows past slip, a part of it as the palm's rise."""
     low = (1.0 - WINDOW) / (1.0 + WINDOW)
     share = np.concatenate([low * case.rise(), low + (1.0 - low) * case.rise(0.5 * SLOW)])
-    whole = (1.0 + WINDOW) * case.slip_n / case.mass_kg * share[:, None] * way
+    whole = (1.0 + WINDOW) * case.slip_n / case.object_kg * share[:, None] * way
     drive = replace(idle(len(share)), gravity=(1.0 - rising) * whole, shares=share)
     accelerations = np.hstack([-rising * whole, np.zeros((len(share), 3))])
     return replace(drive, accelerations=accelerations)
@@ -216,7 +216,7 @@ def _jumps(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
     jump in a step.
     """
     load, w, zeta = JUMP_SHARE * case.light_n, case.frequency, case.damping_ratio
-    share = case.mass_kg / case.moving_kg
+    share = case.object_kg / case.moving_kg
     linalg: Any = importlib.import_module("scipy.linalg")
     # x'' follows the same equation as x, from F / M and -2 zeta w F / M on
     step = linalg.expm(SAMPLE_S * np.array([[0.0, 1.0], [-w * w, -2.0 * zeta * w]]))
@@ -313,7 +313,7 @@ def free_box(case: HeldCase) -> tuple[Check, ...]:
     steps, flight = round(FALL_S / SAMPLE_S), round(FLIGHT_S / SAMPLE_S)
     speed_m_per_s = case.radius_m / FLIGHT_S  # takes the box by one radius, not to the fingers
     wrenches = np.zeros((flight, 6))
-    wrenches[0, 0] = case.mass_kg * speed_m_per_s / SAMPLE_S
+    wrenches[0, 0] = case.object_kg * speed_m_per_s / SAMPLE_S
     wrenches[0, 5] = bench.scene.layout.inertia_kg_m2[2, 2] * KNOCK_RAD_PER_S / SAMPLE_S
     fall, knock = bench.run(
         [
@@ -345,10 +345,10 @@ def _apart(case: HeldCase, bench: HeldBench, drive: Drive) -> Drive:
 
 def _lifted(case: HeldCase, bench: HeldBench) -> tuple[Check, Check]:
     """Lift the box off a table, with a weight that its springs carry lightly."""
-    weight = min(case.mass_kg * GRAVITY_M_PER_S2, case.light_n)
+    weight = min(case.object_kg * GRAVITY_M_PER_S2, case.light_n)
     height = RAISED * weight / (FINGERS * case.stiffness_n_per_m)
     drive, begun = paths.lift(-DOWN, height, SAMPLE_S * len(case.rise()))
-    share = weight / (case.mass_kg * GRAVITY_M_PER_S2)
+    share = weight / (case.object_kg * GRAVITY_M_PER_S2)
     table = Table(case.halves[2] * DOWN, -DOWN)
     (motion,) = bench.run([replace(drive, gravity=share * drive.gravity, table=table)])
     still = paths.samples(0.5 * paths.REST_S)

@@ -16,9 +16,8 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from scenes.mujoco.held import UPRIGHT, HeldSettings
 from scenes.mujoco.held_mjcf import HeldScene, build_held_scene
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
 from sim_validate.engine.known_cases import Check, near, sized
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import samples, smoother
@@ -46,7 +45,7 @@ SHORTEST_S = 0.15
 class HeldCase:
     """The settings with which executions are checked on known cases."""
 
-    mass_kg: float
+    object_kg: float
     stiffness_n_per_m: float
     push_n: float
     """Largest push of a finger; the cases take less where the springs are too soft for it."""
@@ -86,7 +85,7 @@ class HeldCase:
     @property
     def moving_kg(self) -> float:
         """What moves with the box: its own mass and that of the fingertips [kg]."""
-        return self.mass_kg + FINGERS * self.tip_mass_kg
+        return self.object_kg + FINGERS * self.tip_mass_kg
 
     @property
     def frequency(self) -> float:
@@ -123,8 +122,10 @@ class HeldCase:
             body, contacts, contact_frictions(self.friction, len(contacts)), squeeze,
             stiffness=self.stiffness_n_per_m, tip_radius_m=tip_radius_m,
         )  # fmt: skip
-        settings = HeldSettings(self.tip_mass_kg, self.damping_ratio)
-        return build_held_scene(body, held, self.mass_kg, settings=settings, physics=self.physics)
+        settings = HeldSettings(
+            mass_kg=self.object_kg, tip_mass_kg=self.tip_mass_kg, damping_ratio=self.damping_ratio
+        )
+        return build_held_scene(body, held, settings, physics=self.physics)
 
 
 def met(name: str, motion: HeldMotion, ratio: float) -> Check:

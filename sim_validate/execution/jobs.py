@@ -14,14 +14,14 @@ from grasp_core.values import Grasp
 from scenes.drawing.clips import RATE, write_held_clip
 from scenes.mujoco.held_mjcf import SAMPLE_S
 from scenes.mujoco.mjcf_text import quaternion
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.execution.bench import HeldBench, facing
 from sim_validate.execution.execute import chosen_squeeze, execute, held_scene, run_trials
 from sim_validate.execution.predictions import held_dynamics
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
+from sim_validate.settings.executions import ExecutionSettings
 
 
 @dataclass(frozen=True, slots=True)

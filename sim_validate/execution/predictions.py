@@ -84,7 +84,7 @@ def held_dynamics(grip: Grip, layout: HeldLayout) -> HeldDynamics:
     """Build (1) for a grip and the masses and dampers of its scene."""
     maps = grasp_map(grip.arms).reshape(POSE, -1, 3).transpose(1, 0, 2)
     own = np.zeros((POSE, POSE))
-    own[:3, :3] = layout.mass_kg * np.eye(3)
+    own[:3, :3] = layout.object_kg * np.eye(3)
     own[3:, 3:] = layout.inertia_kg_m2
     dampers = np.einsum("kij,kj,klj->kil", layout.axes, layout.damping, layout.axes)
     tips = np.einsum("kij,kj,klj->kil", layout.axes, layout.tip_masses, layout.axes)
@@ -159,7 +159,7 @@ def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
     angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(turning, axis=0), axis=0)
     share = drive.shares if drive.table is not None else np.ones(len(drive))
     load = drive.wrenches.copy()
-    load[:, :3] += _turned_back(layout.mass_kg * share[:, None] * drive.gravity, angles)
+    load[:, :3] += _turned_back(layout.object_kg * share[:, None] * drive.gravity, angles)
     # the palm's rate of turning in the middle of each sample
     rates = SAMPLE_S * (np.cumsum(turning, axis=0) - 0.5 * turning)
     inwards = cross(rates[:, None], cross(rates[:, None], layout.tip_centers))

@@ -12,20 +12,19 @@ from grasp_core.errors import InputError, NoForcesError
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
+from grasp_core.settings import extended
 from grasp_core.values import Grasp
 from scenes import exports
-from scenes.mujoco.closure_scene import build_scene
-from scenes.mujoco.physics import PhysicsSettings
-from sim_validate.closure.asked_trials import finger_settings
-from sim_validate.engine.setup import with_planned_radius
-from sim_validate.execution.asked_executions import check_mass, holding
+from scenes.settings import ScaledScene
+from sim_validate.engine.setup import Setup, with_planned_radius
+from sim_validate.execution.asked_executions import holding
 from sim_validate.execution.execute import chosen_squeeze, held_scene
-from sim_validate.kit import command_flags, flag_groups
+from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.flag_groups import UPRIGHT, Mass, Tips
 from sim_validate.kit.result_folders import alone_in
 from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
+from sim_validate.settings.executions import ExecutionSettings, Holding
 
 TextOf = Callable[[Grasp], str]
 
@@ -43,7 +42,7 @@ def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
             "--grasp ID"
         )
     friction = saved.friction if command.friction is None else command.friction
-    if command.mass != Mass():
+    if command.holding.weighed:
         text_of = _held(command, saved, friction, reporter)
     else:
         text_of = _scaled(command, saved, friction)
@@ -75,33 +74,29 @@ def _written(grasp: Grasp, text_of: TextOf, folder: Path | None, reporter: Repor
 
 def _check(command: command_flags.Scene) -> None:
     """Refuse flags that the scene asked for does not use, before any file is read."""
-    check_mass(command.mass)
-    if command.mass != Mass():
-        if (command.fingers, command.surface) != (flag_groups.Fingers(), "pads"):
+    if command.holding.weighed:
+        if command.scaled != ScaledScene():
             raise FlagsError(
-                "the flags from --max-normal-force to --surface are for scenes with scaled "
-                "masses: leave out --mass-kg and --density-kg-m3, or use the flags from --push-n "
-                "to --damping-ratio"
+                "the flags from --max-normal-force-n to --surface are for scenes with scaled "
+                "masses: leave out --mass-kg and --density-kg-m3, or use the flags from "
+                "--tip-mass-kg to --tip-radius-m"
             )
-    elif (command.tips, command.down) != (Tips(), UPRIGHT):
+    elif command.holding != Holding():
         raise FlagsError(
-            "the flags from --push-n to --down are for objects of true mass: give --mass-kg or "
-            "--density-kg-m3 too"
+            "the flags from --tip-mass-kg to --tip-radius-m are for objects of true mass: give "
+            "--mass-kg or --density-kg-m3 too"
         )
 
 
 def _scaled(command: command_flags.Scene, saved: Plan, friction: float) -> TextOf:
-    fingers = with_planned_radius(finger_settings(command.fingers), saved.finger)
-    physics = PhysicsSettings(torsion_m=command.fingers.torsion_m)
-    return lambda grasp: (
-        build_scene(
-            saved.body, grasp, friction, fingers=fingers, physics=physics, surface=command.surface
-        ).xml
-    )
+    setup = extended(Setup, command.scaled)
+    setup = replace(setup, fingers=with_planned_radius(setup.fingers, saved.finger))
+    return lambda grasp: setup.scene(saved.body, grasp, friction).xml
 
 
 def _held(command: command_flags.Scene, saved: Plan, friction: float, reporter: Reporter) -> TextOf:
-    settings = holding(saved.body, saved.finger, command.mass, command.tips, command.down)
+    own = holding(command.holding, saved.body, saved.finger)
+    settings = extended(ExecutionSettings, own)
 
     def text_of(grasp: Grasp) -> str:
         best = chosen_squeeze(saved.body, grasp, friction, settings)

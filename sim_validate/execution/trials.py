@@ -29,8 +29,8 @@ from scenes.mujoco.held import TOUCH, HeldLayout, rotations
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Pose, Table, joined
-from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.execution.verdict import Skipped
+from sim_validate.settings.executions import ExecutionSettings, TrialKind
 
 MET = 1e-7
 """Distance from the surface at which a fingertip has met it, in object radii."""
@@ -217,7 +217,7 @@ def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> 
         return Skipped(
             "lift", "a fingertip is in the way of the table on every face that the object rests on"
         )
-    give_m = layout.mass_kg * GRAVITY_M_PER_S2 / layout.stiffness_along(rest.down)
+    give_m = layout.object_kg * GRAVITY_M_PER_S2 / layout.stiffness_along(rest.down)
     drive, begun = paths.lift(-rest.down, settings.lift_m, settings.lift_s, give_m)
     table = Table(rest.height * rest.down, -rest.down)
     return Trial("lift", "lift", replace(drive, table=table), begun - 1, apart=True)

@@ -20,8 +20,8 @@ from grasp_core.kinds import Friction, OrInfinity, Quantity
 from grasp_core.provenance import versions
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.physics import PhysicsSettings
-from sim_validate.execution.settings import ExecutionSettings, TrialKind
 from sim_validate.kit.about_object import AboutObject
+from sim_validate.settings.executions import ExecutionSettings, TrialKind
 
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]
 """What became of the object: no contact slipped, one did and it was kept, it was lost, or the

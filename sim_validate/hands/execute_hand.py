@@ -20,9 +20,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
 from scenes.mujoco.held_mjcf import HeldScene
 from sim_validate.execution.execute import asked_settings, executed, surface_reach
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.hands.validate_hand import MOST_PUSH_N
+from sim_validate.settings.executions import ExecutionSettings
 
 
 def execute_hand(
@@ -60,10 +60,11 @@ def execute_hand(
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
     settings = asked_settings("execute_hand", settings, mass_kg, hand_execution_settings)
+    settings = settings.for_body(body)
 
     def scene_of(own: ExecutionSettings, best: BestSqueeze) -> HeldScene:
         near = surface_reach(body, best.grip, own)
-        return held_hand_scene(hand, body, reach, best.grip, own.mass_kg, own.hand, near)
+        return held_hand_scene(hand, body, reach, best.grip, own, near)
 
     return executed(
         body, settings,
@@ -91,11 +92,11 @@ def hand_squeeze(
     motors = strong_motors(hand, reach)
     loose = unsqueezed(
         body, stance.contacts, friction, tip_radius_m=stance.tip_radii,
-        stiffness=finger_springs(motors, settings.stiffness_n_per_m),
+        stiffness=finger_springs(motors, settings.tip_stiffness_n_per_m),
     )  # fmt: skip
-    start = hand_grip(hand, stance, loose, servo_stiffness(motors, settings.stiffness_n_per_m))
+    start = hand_grip(hand, stance, loose, servo_stiffness(motors, settings.tip_stiffness_n_per_m))
     most = settings.push_n if loads is None else None
-    best = searched(start, loads or any_direction(settings.mass_kg), most, motors)
+    best = searched(start, loads or any_direction(settings.object_kg), most, motors)
     if best.scale == 0.0:
         raise NoForcesError(
             "no squeeze within the motors' torques carries any part of the weight in every "

@@ -9,18 +9,17 @@ from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from grasp_core.checked import BOUNDS
-from grasp_core.kinds import Range
-from sim_validate.kit.flag_groups import (
+from grasp_core.kinds import (
     Count,
     Direction,
     Friction,
-    Jobs,
-    ProtocolName,
+    HandClearance,
     Quantity,
     Seed,
-    Spoken,
+    Starts,
+    TorqueLimit,
 )
+from sim_validate.kit.flag_groups import Jobs, ProtocolName, Spoken
 from sim_validate.kit.processes import available_cores
 
 HandName = Annotated[
@@ -32,7 +31,7 @@ Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
 ))]  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Hand(Spoken):
     """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
 
@@ -40,7 +39,7 @@ class Hand(Spoken):
     fingertips: Fingertips = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Reach(Spoken):
     """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
 
@@ -55,11 +54,11 @@ class Reach(Spoken):
     stays above the table."""
     contacts_only: bool = False
     """Touch the planned contacts themselves, not anywhere in the grasps' regions."""
-    clearance_m: Annotated[float, Range(**BOUNDS["hand_clearance_m"])] = 5e-4
+    clearance_m: HandClearance = 5e-4
     """Least distance between all that must not touch [m]."""
-    starts: Annotated[int, Range(**BOUNDS["starts"])] = 100
+    starts: Starts = 100
     """Largest number of starts for each grasp."""
-    torque_limit_n_m: Annotated[float, Range(**BOUNDS["torque_limit_n_m"])] | None = None
+    torque_limit_n_m: TorqueLimit | None = None
     """Torque limit of every joint [N m], instead of those of the hand."""
     simulate: bool = False
     """Hold test wrenches in simulation with the hand's links and motors, and try negative controls;

@@ -23,7 +23,6 @@ from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from sim_validate.engine.setup import Agenda
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
@@ -39,6 +38,7 @@ from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.planning.grasps_json import GRASPS
+from sim_validate.settings.executions import ExecutionSettings
 
 HELD = Agenda(critical_friction=False)
 """What hands hold: the usual wrenches, with controls."""

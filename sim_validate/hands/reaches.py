@@ -12,7 +12,6 @@ from typing import Annotated
 import numpy as np
 
 from grasp_core.arrays import UnitVector
-from grasp_core.checked import BOUNDS
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import HandPayload
@@ -22,13 +21,13 @@ from grasp_core.grasp_tables import ById
 from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import Direction, Friction, NotNegative, Range, Seed
+from grasp_core.kinds import Direction, Friction, HandClearance, NotNegative, Seed, Starts
 from grasp_core.provenance import versions
 from grasp_core.settings import Settings
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.validate_hand import HandVerdict
 from sim_validate.kit.about_object import AboutObject
+from sim_validate.settings.executions import ExecutionSettings
 
 TOUCHING_M = 1e-4
 """How far a fingertip of the file may be from its contact [m]: ten times what `reach_with` allows.
@@ -43,9 +42,9 @@ class ReachSettings(Settings):
     """Whether contacts may be anywhere in the grasp's regions, or must be the planned ones."""
     table_down: Direction | None = None
     """Downward direction in the object's frame, if the object lies on a table."""
-    clearance_m: Annotated[float, Range(**BOUNDS["hand_clearance_m"])] = 5e-4
+    clearance_m: HandClearance = 5e-4
     """Least distance between all that must not touch [m]."""
-    starts: Annotated[int, Range(**BOUNDS["starts"])] = 100
+    starts: Starts = 100
     """Largest number of starts for each choice of contacts."""
     seed: Seed = 0
     """Seed of the postures from which the search starts."""

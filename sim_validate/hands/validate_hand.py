@@ -22,8 +22,8 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.kinds import Friction, Quantity
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.fingertips import FingerSettings
 from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, limited
+from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import WrenchVerdict
 from sim_validate.engine.bench import Bench
@@ -159,11 +159,9 @@ def validate_hand(
     """
     agenda = Agenda() if agenda is None else instance(agenda, Agenda, "agenda")
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
-    if setup.torsion_m:
-        raise InputError(
-            "setup.physics.torsion_m must be zero for a hand: levers of motors have no column for "
-            "the torque of a contact"
-        )
+    setup.physics.require_hard(
+        "for a hand", "levers of motors have no column for the torque of a contact"
+    )
     scene = build_hand_scene(hand, body, reach, friction, down=down, physics=setup.physics)
     contacts = stance_of(hand, reach).contacts
     if not force_closure(contacts, friction=friction).closed:

@@ -7,50 +7,52 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from grasp_core.checked import BOUNDS, MOST_COUNT
-from grasp_core.kinds import Ending, Range
-from sim_validate.kit.flag_groups import (
-    UPRIGHT,
-    Carrying,
+from grasp_core.checked import MOST_COUNT
+from grasp_core.kinds import (
     Count,
-    Direction,
     Edges,
-    Executing,
-    Fingers,
+    Ending,
     Friction,
+    FrictionOrZero,
     Gap,
+    MaxCones,
+    Quantity,
+    Range,
+    Reserve,
+    Seed,
+    TimeLimit,
+    Vector,
+)
+from grasp_core.mesh_files.limits import Lengths, MeshLimits
+from grasp_core.transferring.settings import Carrying
+from scenes.settings import ScaledScene
+from sim_validate.kit.flag_groups import (
+    PLAIN,
     Jobs,
-    Lengths,
-    Mass,
     Mesh,
-    MeshLimits,
     NotNegative,
     ObjectName,
     Planning,
-    Point,
     ProtocolName,
-    Quantity,
-    Seed,
     Spoken,
     Testing,
-    Tips,
-    Trials,
     Wrench,
 )
 from sim_validate.kit.processes import available_cores
+from sim_validate.settings.executions import ChosenExecution, Holding
 
 PICTURES, CLIPS, PAGES = (".svg", ".png"), (".gif", ".webp"), (".html", ".htm")
 RUN_LIMIT = 100
 """Number of grasps that `run` simulates by default, which takes some ten seconds."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Run(Spoken):
     """Plan grasps, simulate them and negative controls (contacts that must fail); write all."""
 
     object: Positional[ObjectName]
-    planning: OmitArgPrefixes[Planning] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
-    testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
+    planning: Annotated[Planning, PLAIN] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
+    testing: Annotated[Testing, PLAIN] = field(default_factory=Testing)
     out: Path | None = None
     """Folder for the results; if not given, graspproof-out/OBJECT."""
     no_report: bool = False
@@ -58,21 +60,15 @@ class Run(Spoken):
     execute: bool = False
     """Also simulate the grasps as a robot executes them, with the object's true mass, springy
     fingers and one fixed squeeze, and write executions.json."""
-    executing: OmitArgPrefixes[Executing] = field(default_factory=Executing)
-    execute_trials: Annotated[Trials, arg(metavar="NAME,NAME,...")] = ()
-    """With --execute: names of the trials, separated by commas (weight, lift, shake, stop, knock,
-    misplaced); all if not given."""
-    execute_down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
-    """With --execute: direction of gravity in the object's frame, in the trials that do not choose
-    their own."""
+    executing: Annotated[ChosenExecution, PLAIN] = field(default_factory=ChosenExecution)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Plan(Spoken):
     """Find force-closure grasps of an object, each with a checked certificate of force closure."""
 
     object: Positional[ObjectName]
-    planning: OmitArgPrefixes[Planning] = field(default_factory=Planning)
+    planning: Annotated[Planning, PLAIN] = field(default_factory=Planning)
     best: bool = False
     """Also search for the grasp of the largest --measure on any faces, and prove how much better
     any other can be. It comes first; best.json and best-proof.npz hold the proof. Its
@@ -80,7 +76,7 @@ class Plan(Spoken):
     where that is less; a twentieth of the object's radius if not given."""
     gap: Gap = 0.05
     """With --best: share of the proved bound that the quality may be below it."""
-    time_limit_s: Annotated[float, Range(**BOUNDS["time_limit_s"])] | None = None
+    time_limit_s: TimeLimit | None = None
     """With --best: time after which the search ends with the gap reached [s]."""
     measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
     """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
@@ -92,7 +88,7 @@ class Plan(Spoken):
     """Folder for grasps.json; if not given, no file is written."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Validate(Spoken):
     """Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must fail."""
 
@@ -107,13 +103,13 @@ class Validate(Spoken):
     protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
     """Judge the grasps by the published test of another tool, beside our verdict under its loads
     and the predicted margin, instead of by our usual trials; may be repeated."""
-    testing: OmitArgPrefixes[Testing] = field(default_factory=Testing)
+    testing: Annotated[Testing, PLAIN] = field(default_factory=Testing)
     out: Path | None = None
     """Folder for verdicts.json, or for judgements.json with --protocol; if not given, no file is
     written."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Execute(Spoken):
     """Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze."""
 
@@ -125,14 +121,9 @@ class Execute(Spoken):
     """Coulomb coefficient to simulate with; if not given, the one planned for."""
     limit: Count | None = None
     """Execute only this many grasps, from the first."""
-    trials: Annotated[Trials, arg(metavar="NAME,NAME,...")] = ()
-    """Names of the trials: weight, lift, shake, stop, knock, misplaced, separated by commas; all if
-    not given."""
-    down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
-    """Direction of gravity in the object's frame, in the trials that do not choose their own."""
     seed: Seed | None = None
     """Seed of the directions of misplaced objects; if not given, the seed of the plan."""
-    executing: OmitArgPrefixes[Executing] = field(default_factory=Executing)
+    executing: Annotated[ChosenExecution, PLAIN] = field(default_factory=ChosenExecution)
     setup: Path | None = None
     """A TOML file whose table `physics` has settings of the simulator (see docs/files.md)."""
     jobs: Jobs = field(default_factory=available_cores)
@@ -140,7 +131,7 @@ class Execute(Spoken):
     """Folder for executions.json; if not given, no file is written."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Scene(Spoken):
     """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.
 
@@ -155,19 +146,13 @@ class Scene(Spoken):
     """Id of the grasp to write; if not given, all grasps are written."""
     friction: Friction | None = None
     """Coulomb coefficient in the scene; if not given, the one planned for."""
-    fingers: OmitArgPrefixes[Fingers] = field(default_factory=Fingers)
-    surface: Literal["pads", "mesh"] = "pads"
-    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
-    of a convex object."""
-    mass: OmitArgPrefixes[Mass] = field(default_factory=Mass)
-    tips: OmitArgPrefixes[Tips] = field(default_factory=Tips)
-    down: Annotated[Direction, arg(metavar="X Y Z")] = UPRIGHT
-    """With a mass or a density: direction of gravity in the object's frame."""
+    scaled: OmitArgPrefixes[ScaledScene] = field(default_factory=ScaledScene)
+    holding: Annotated[Holding, PLAIN] = field(default_factory=Holding)
     out: Path | None = None
     """Folder for the scenes; if not given, a single scene is printed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Export(Spoken):
     """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
 
@@ -187,7 +172,7 @@ class Export(Spoken):
     radius, or less if that does not fit."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class View(Spoken):
     """Look at a grasp: in MuJoCo's viewer if there is a display, or in a file."""
 
@@ -209,7 +194,7 @@ class View(Spoken):
     picture and on the page."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Report(Spoken):
     """Write the results of a run as pages that open in a browser, without any network."""
 
@@ -226,7 +211,7 @@ class Report(Spoken):
     """Folder for the pages; if not given, `report` in the run's folder."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Regions(Spoken):
     """Prove regions in which each finger may stand anywhere, whatever the others do."""
 
@@ -238,14 +223,14 @@ class Regions(Spoken):
     """Compute regions for only this many grasps, from the first."""
     friction: Friction | None = None
     """Coulomb coefficient of the proof; if not given, the one planned for."""
-    reserve: Annotated[float, Range(**BOUNDS["reserve"])] = 0.0
+    reserve: Reserve = 0.0
     """Share of the friction that the proof does not count on."""
     recenter: bool = False
     """Move the regions to where discs inside the faces can be largest; contacts may then lie
     outside their regions."""
     edge_clearance_m: NotNegative = 0.0
     """How far regions stay from the edges of their faces [m]."""
-    max_cones: Annotated[int, Range(**BOUNDS["max_cones"])] = 10_000
+    max_cones: MaxCones = 10_000
     """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
     by some hundredths, or not at all where they are as large as possible."""
     jobs: Jobs = field(default_factory=available_cores)
@@ -253,7 +238,7 @@ class Regions(Spoken):
     """Folder for regions.json and the proofs; if not given, no file is written."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Replay(Spoken):
     """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
 
@@ -275,19 +260,19 @@ class Replay(Spoken):
     """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Analyze(Spoken):
     """Judge contacts of any origin: force closure with a certificate, quality, wrench limits."""
 
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
-    friction: Annotated[float, Range(**BOUNDS["friction_or_zero"])] | None = None
+    friction: FrictionOrZero | None = None
     """Coulomb coefficient of contacts that have none of their own; if not given, the one in the
     file."""
     torque_scale_m: Quantity | None = None
     """Length by which torques are divided to compare them with forces [m]; if not given, the one in
     the file."""
-    max_normal_force: Quantity = 10.0
+    max_normal_force_n: Quantity = 10.0
     """Largest normal force of each contact [N]."""
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
     """An external wrench whose largest resisted multiple is wanted [N, N m], torque about the
@@ -300,7 +285,7 @@ class Analyze(Spoken):
     jobs: Jobs = field(default_factory=available_cores)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Transfer(Spoken):
     """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
 
@@ -309,35 +294,35 @@ class Transfer(Spoken):
     part: Positional[str]
     """The changed part, in the same frame: a mesh file (obj, stl, ply, off, glb) or the name of a
     built-in object."""
-    carrying: OmitArgPrefixes[Carrying] = field(default_factory=Carrying)
+    carrying: Annotated[Carrying, PLAIN] = field(default_factory=Carrying)
     friction: Friction | None = None
     """Coulomb coefficient to judge with, before and after; if not given, the one planned for."""
-    lengths: OmitArgPrefixes[Lengths] = field(default_factory=Lengths)
-    center_of_mass_m: Annotated[Point | None, arg(metavar="X Y Z")] = None
+    lengths: Annotated[Lengths, PLAIN] = field(default_factory=Lengths)
+    center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
     uniform density, or the old part's if that was given."""
-    limits: OmitArgPrefixes[MeshLimits] = field(default_factory=MeshLimits)
+    limits: Annotated[MeshLimits, PLAIN] = field(default_factory=MeshLimits)
     out: Path | None = None
     """Folder for transfer.json and the grasps.json of the changed part; if not given, no file is
     written."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Inspect(Spoken):
     """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
 
     object: Positional[ObjectName]
     picture: Annotated[Path, Ending(PICTURES)] | None = None
     """Write the object as a picture (svg, png)."""
-    mesh: OmitArgPrefixes[Mesh] = field(default_factory=Mesh)
+    mesh: Annotated[Mesh, PLAIN] = field(default_factory=Mesh)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Objects(Spoken):
     """List the names of the built-in objects."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Doctor(Spoken):
     """Check this installation: versions, solvers and simulator."""
 

@@ -16,11 +16,11 @@ import numpy as np
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import is_kept
+from grasp_core.kinds import Family
 from grasp_core.planning.planner import plan
 from grasp_core.processes import local_processes
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.qp import least_distance
-from grasp_core.values import Family
 from scenes.example_objects import example_object
 
 OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])

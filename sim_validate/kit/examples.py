@@ -15,7 +15,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "validate": (
         "validate plan/grasps.json --out plan",
         "validate plan/grasps.json --protocol dexgraspbench --protocol dexonomy --out plan",
-        "validate plan/grasps.json --weight-n 3 --down 0 0 -1 --limits ramp --trials 20",
+        "validate plan/grasps.json --weight-n 3 --weight-down 0 0 -1 --limits ramp --repeats 20",
     ),
     "execute": (
         "execute plan/grasps.json --mass-kg 0.3 --out plan",
@@ -71,7 +71,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "report graspproof-out --out all-objects",
     ),
     "dataset build": (
-        "dataset build meshes/ wedge --friction 0.3 --friction 0.5 --limit 20 --out ds",
+        "dataset build meshes/ wedge --frictions 0.3,0.5 --limit 20 --out ds",
         "dataset build ds/config.toml --out again",
     ),
     "dataset import": ("dataset import contacts.json mug.obj --out judged",),

@@ -10,8 +10,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from grasp_core.processes import local_processes
-
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
 Value = TypeVar("Value")
@@ -50,6 +48,9 @@ def each(
     This process works with the others, which start where there is work for them for longer than a
     start takes.
     """
+    # commands' flags count cores, and need not wait for this
+    from grasp_core.processes import local_processes
+
     others = min(jobs, len(units)) - 1
     if others < 1:
         yield from map(function, units)

@@ -35,7 +35,7 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
     with about(command.contacts):
         sets = contact_sets_from_json(text, overrides)
     check_edges(sets, command.edges)
-    question = Question(command.max_normal_force, command.wrench, command.edges)
+    question = Question(command.max_normal_force_n, command.wrench, command.edges)
     found = each(partial(analyze, question=question), sets, jobs=command.jobs)
     results = reporter.counted(
         "analysing", found, len(sets), "closed", lambda one: one.outcome is Outcome.CLOSED

@@ -1,13 +1,12 @@
 """Loads the object or the grasps that a command's flags name, and the fingers to plan for."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
-from grasp_core.objects.surface import PatchLimits
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from scenes.example_objects import example_object
@@ -26,33 +25,22 @@ def load_object(name: str, mesh: flag_groups.Mesh) -> Polyhedron:
             "report` shows the folder of a run"
         )
     if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
-        given = mesh.limits
+        lengths, choices = mesh.lengths, mesh.choices
         return load_polyhedron(
-            path,
-            unit=mesh.lengths.unit,
-            scale=mesh.lengths.scale,
-            faces=mesh.faces,
-            patches=PatchLimits(mesh.patch_spread_deg, mesh.patch_depth, mesh.patches),
-            flatness_m=mesh.flatness_m,
-            largest_part=mesh.largest_part,
-            center_of_mass=mesh.center_of_mass_m,
-            limits=MeshLimits(
-                max_bytes=given.max_mesh_bytes,
-                max_triangles=given.max_triangles,
-                max_faces=given.max_faces,
-                max_parts=given.max_parts,
-            ),
-        )
+            path, unit=lengths.unit, scale=lengths.scale, center_of_mass=mesh.center_of_mass_m,
+            faces=choices.faces, patches=choices.patches, flatness_m=choices.flatness_m,
+            largest_part=choices.largest_part, limits=choices,
+        )  # fmt: skip
     if path.suffix or len(path.parts) > 1:
         raise InputError(
             f"{name}: expected a mesh file ({', '.join(FORMATS)}) or a built-in object; no such "
             "file exists"
         )
-    if replace(mesh, limits=flag_groups.MeshLimits()) != flag_groups.Mesh():
+    unlimited = replace(mesh.choices, **asdict(MeshLimits()))
+    if replace(mesh, choices=unlimited) != flag_groups.Mesh():
         raise InputError(
-            f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches, "
-            "--patch-spread-deg, --patch-depth, --flatness-m, --largest-part and "
-            "--center-of-mass-m, which say how mesh files are read"
+            f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches..., "
+            "--flatness-m, --largest-part and --center-of-mass-m, which say how mesh files are read"
         )
     return example_object(name)
 

@@ -11,12 +11,12 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import RecordFile, recorded
-from grasp_core.kinds import Friction, Number, Quantity, Range
+from grasp_core.kinds import Family, Friction, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt
 from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
-from grasp_core.values import FINGERS, FaceQuadruple, Family, Grasp
+from grasp_core.values import FINGERS, FaceQuadruple, Grasp
 from sim_validate.kit.about_object import AboutObject
 
 PROOF = "best-proof.npz"

@@ -10,18 +10,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.files.text_files import write_text
+from grasp_core.kinds import METHODS
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.planning.request import methods_for
 from grasp_core.planning.result import Moved, Plan
 from grasp_core.planning.selection import carried
+from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
+from grasp_core.settings import types
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags, flag_groups
 from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
@@ -47,20 +50,13 @@ def plan_object(
         reporter.say("compiling inner loops once, which takes a minute of one core")
         compile_loops(PLANNING)
     with reporter.progress("planning") as steps:
+        asked: dict[str, Any] = {name: getattr(planning, name) for name in types(PlanSettings)}
+        if planning.families == METHODS:
+            asked["families"] = methods_for(body)
         found = plan(
             body,
-            planning.friction,
-            families=planning.family or methods_for(body),
-            cones=planning.cones,
-            theta_deg=planning.theta_deg,
-            limit=planning.limit,
-            rank_by=planning.rank_by,
-            seed=planning.seed,
-            max_face_parts=planning.max_face_parts,
-            complete=planning.complete,
+            **asked,
             finger=asked_finger(planning),
-            clearance=planning.edge_clearance_m,
-            share_faces=planning.share_faces_m,
             progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
             jobs=jobs,
         )

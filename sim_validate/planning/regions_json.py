@@ -10,21 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Shape, frozen, frozen_indices, frozen_units
-from grasp_core.checked import BOUNDS, path_of
+from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError, about
 from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS
-from grasp_core.kinds import Count, Friction, NotNegative, Range
+from grasp_core.grasp_tables import ById
+from grasp_core.kinds import Count, Family, Friction, MaxCones, NotNegative, Reserve
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.proof import TwistCover
 from grasp_core.settings import Settings
-from grasp_core.values import FINGERS, ContactRegion, Family, Grasp, four
+from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.kit.about_object import AboutObject
 from sim_validate.kit.npz import read_arrays
 from sim_validate.kit.writing import write_arrays
@@ -57,13 +58,13 @@ SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 class Certifying(Settings):
     """How regions are certified."""
 
-    reserve: Annotated[float, Range(**BOUNDS["reserve"])]
+    reserve: Reserve
     """Share of the friction that proofs do not count on."""
     recenter: bool
     """Whether discs are around face middles rather than around contacts."""
     edge_clearance_m: NotNegative
     """Distance of regions from the edges of their faces [m]."""
-    max_cones: Annotated[int, Range(**BOUNDS["max_cones"])]
+    max_cones: MaxCones
     """Largest number of cones of a proof."""
 
 
@@ -156,7 +157,7 @@ class GraspRegions(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Regions(RecordFile):
+class Regions(RecordFile, ById[GraspRegions]):
     """The certified regions of an object's grasps, as `regions.json` holds them."""
 
     FILE = "regions.json"

@@ -10,11 +10,13 @@ from grasp_core.declared import counted
 from grasp_core.errors import InputError
 from grasp_core.files.records import FLAT, RecordFile
 from grasp_core.files.text_files import write_text
+from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import plan_to_json
+from grasp_core.settings import extended
 from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
 from grasp_core.transferring.face_changes import check_planar
 from grasp_core.transferring.transfer import (
@@ -120,13 +122,16 @@ def carried_to_json(found: Transfer, saved: Plan) -> str:
 
 def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedron:
     center, part = command.center_of_mass_m, Path(command.part)
-    asked = flag_groups.Mesh(command.lengths, center_of_mass_m=center, limits=command.limits)
+    asked = flag_groups.Mesh(
+        command.lengths, extended(MeshChoices, command.limits), center_of_mass_m=center
+    )
     if part.suffix or part.is_file():  # a built-in object is as it is
         if center is None and (kept := given_center(old)) is not None:
             x, y, z = kept.tolist()
             center = x, y, z
         largest = old.surface.dropped > SMALL
-        asked = replace(asked, faces="planar", center_of_mass_m=center, largest_part=largest)
+        choices = replace(asked.choices, faces="planar", largest_part=largest)
+        asked = replace(asked, choices=choices, center_of_mass_m=center)
     return load_object(command.part, asked)
 
 

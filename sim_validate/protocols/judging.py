@@ -15,7 +15,6 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.checked import coefficient, instance, one_of
-from grasp_core.closure.force_closure import force_closure
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body
@@ -182,7 +181,7 @@ def our_verdict(
     motors: Motors | None = None,
 ) -> OurVerdict:
     """Predict the least multiple of forces [N] that contacts resist, and hold the forces."""
-    if not force_closure(contacts, friction=friction, torsion_m=setup.torsion_m).closed:
+    if not setup.closure(contacts, friction).closed:
         told = f"the contacts are proved not to be in force closure at friction {friction:g}"
         return OurVerdict(False, False, 0.0, told)
     bench = Bench(scene(), threads=setup.threads, timeout_s=setup.timeout_s)

@@ -17,8 +17,8 @@ from grasp_core.checked import one_of
 from grasp_core.declared import Declared, summary
 from grasp_core.kinds import Number, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.physics import PhysicsSettings
 from scenes.mujoco.tested import Weld
+from scenes.settings import PhysicsSettings
 
 Triple: TypeAlias = tuple[float, float, float]
 NOWHERE: Triple = (0.0, 0.0, 0.0)

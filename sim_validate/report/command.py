@@ -16,16 +16,16 @@ from scenes.drawing.clips import GraphicsError, has_display, write_clip
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.turntable import turntable_page
 from scenes.mujoco.closure_scene import Scene, build_scene
-from scenes.mujoco.fingertips import FingerSettings
+from scenes.settings import FingerSettings
 from sim_validate.engine.setup import with_planned_radius
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.result_folders import alone_in
-from sim_validate.planning.grasps_json import GRASPS, grasp_with_id, read_grasps
+from sim_validate.planning.grasps_json import grasp_with_id, read_grasps
 from sim_validate.report.reached_grasps import held_in, why_not_held
 from sim_validate.report.report import Report, write_report
-from sim_validate.report.run_folder import folder_of, reaches_beside
+from sim_validate.report.run_folder import GRASPS, folder_of, reaches_beside
 
 COMING, RESTING = 60, 20
 """Number of clip frames in which fingers come in, and in which they then stay."""

@@ -18,7 +18,7 @@ from scenes.drawing.hands import PosedHand
 from scenes.drawing.pictures import grasp_sheet
 from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import best_view
-from scenes.mujoco.fingertips import FingerSettings
+from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Wanted, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.jobs import ExecutionJob, film, worth_seeing

@@ -10,7 +10,6 @@ import numpy as np
 
 from grasp_core.figures import NONE, Figure, figures
 from sim_validate.closure.verdict import Verdict
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     ExecutionControl,
@@ -21,12 +20,9 @@ from sim_validate.execution.verdict import (
 )
 from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of
 from sim_validate.report.pages import records_table
+from sim_validate.settings.executions import ExecutionSettings
 
 MILLI = 1e3
-OTHER_FLAGS = {
-    "stiffness_n_per_m": "tip-stiffness-n-per-m", "most_mm": "max-mm", "most_deg": "max-deg",
-}  # fmt: skip
-"""Flags of `graspproof execute` that are not named as their settings."""
 ALWAYS = ("mass_kg", "seed")
 """Settings whose usual value depends on the object or on the plan."""
 FAILED, LOST = "failed", "lost"
@@ -89,15 +85,6 @@ def described_executions(executions: Executions) -> str:
     return " ".join(f"{line[0].upper()}{line[1:]}." for line in totals_in_words(executions) + ended)
 
 
-def _flat(settings: ExecutionSettings) -> dict[str, object]:
-    """Return the settings by name, those of the hand in their place."""
-    found = dict[str, object]()
-    for name, value in asdict(settings).items():
-        inside = {f"hand.{each}": own for each, own in value.items()} if name == "hand" else {}
-        found |= inside or {name: value}
-    return found
-
-
 def execution_section(executions: Executions | None, found: ExecutedGrasp | None) -> Record | None:
     """Build the section about the execution of a grasp; None where no grasp was executed."""
     if executions is None:
@@ -120,11 +107,10 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     """Write the shell command that executes a grasp again, with the same settings."""
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
-    usual = _flat(ExecutionSettings(executions.settings.mass_kg).used)
-    for name, value in _flat(executions.settings).items():
+    usual = asdict(ExecutionSettings(executions.settings.object_kg).used)
+    for name, value in asdict(executions.settings).items():
         if name in ALWAYS or value != usual[name]:
-            own = name.removeprefix("hand.")
-            words += [f"--{OTHER_FLAGS.get(own, own.replace('_', '-'))}", *_words(value)]
+            words += [f"--{name.replace('_', '-')}", *_words(value)]
     return shlex.join(words)
 
 
@@ -140,13 +126,13 @@ def _words(value: object) -> list[str]:
 
 def _facts(executions: Executions, found: ExecutedGrasp | None) -> Iterable[tuple[str, str, str]]:
     settings, execution = executions.settings, None if found is None else found.execution
-    yield "Mass", f"{settings.mass_kg:.4g} kg", f"at friction {executions.friction:g}"
-    tips = f"fingertips of {MILLI * settings.hand.tip_mass_kg:.4g} g"
+    yield "Mass", f"{settings.object_kg:.4g} kg", f"at friction {executions.friction:g}"
+    tips = f"fingertips of {MILLI * settings.tip_mass_kg:.4g} g"
     if execution is not None and execution.tip_radius_m is not None:
         tips += f" and {MILLI * float(execution.tip_radius_m.max()):.4g} mm radius"
     yield "Push of a finger", f"at most {settings.push_n:.4g} N", ""
-    yield "Springs", f"{settings.stiffness_n_per_m:.5g} N/m", tips
-    yield "Counts as held", f"up to {settings.most_mm:g} mm and {settings.most_deg:g} deg", ""
+    yield "Springs", f"{settings.tip_stiffness_n_per_m:.5g} N/m", tips
+    yield "Counts as held", f"up to {settings.max_mm:g} mm and {settings.max_deg:g} deg", ""
     if found is None or execution is None:
         return
     sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))

@@ -1,9 +1,9 @@
 """Reads the folder of a run: its grasps, verdicts, executions, regions, and a hand's poses."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
@@ -156,7 +156,7 @@ def _check_about(path: Path, found: Any, saved: Plan) -> None:
             "or remove it"
         )
     contacts = {grasp.id: contacts_sha256(grasp.contacts) for grasp in saved.grasps}
-    listed: list[Any] = list(found) if hasattr(found, "ITEMS") else []
+    listed: list[Any] = [*cast("Iterable[Any]", found)] if isinstance(found, Iterable) else []
     for each in listed:
         if contacts.get(each.id) != each.contacts_sha256:
             raise InputError(

@@ -24,7 +24,7 @@ READERS = {
     "replay": ("grasps.json", "replay FILE --out made"),
     "baseline": ("baseline.json", "baseline check FILE"),
     "dataset": ("dataset.toml", "dataset build FILE --out made"),
-    "import": ("contacts.json", "dataset import FILE tetrahedron --friction 0.5 --out made"),
+    "import": ("contacts.json", "dataset import FILE tetrahedron --frictions 0.5 --out made"),
 }
 """Commands by what they read, each with a file of the right ending."""
 
@@ -100,7 +100,16 @@ ALL_LEFT_OUT = {(file, "without a byte") for file in ("config", "setup")}
 
 def _yaml(folder: Path) -> list[str]:
     (folder / "grasps.yaml").write_text("a: !!python/object/apply:os.system ['touch owned']\n")
-    return ["dataset", "import", "grasps.yaml", "tetrahedron", "--friction", "0.5", "--out", "made"]
+    return [
+        "dataset",
+        "import",
+        "grasps.yaml",
+        "tetrahedron",
+        "--frictions",
+        "0.5",
+        "--out",
+        "made",
+    ]
 
 
 def cases() -> list[Case]:

@@ -32,7 +32,7 @@ ON_GRASPS = {
     "dataset verify nowhere": "nowhere",
     "dataset export full --out made": "full",
     "dataset build tetrahedron --out full": "full",
-    "dataset build nobody.stl --friction 0.5 --out made": "nobody.stl",
+    "dataset build nobody.stl --frictions 0.5 --out made": "nobody.stl",
     "baseline check nowhere.json": "nowhere.json",
     "baseline record grasps.json -o taken": "taken",
     "regions grasps.json --grasp nobody": "nobody",

@@ -21,7 +21,7 @@ import scenes
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.closure.soft_contacts import contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.limits import bisected_limits, part, ramped_limits, released_friction
@@ -88,7 +88,7 @@ def limiting_loads(case, setup, count, seed):
     body, grasp, mu = case.body, case.grasp, contact_frictions(case.friction, 4)
     resisted = WrenchBody(
         grasp.positions - body.center_of_mass, grasp.normals, mu,
-        setup.fingers.max_normal_force_n, torsions=contact_torsions(setup.torsion_m, mu),
+        setup.fingers.max_normal_force_n, torsions=contact_torsions(setup.physics.torsion_m, mu),
     )  # fmt: skip
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
@@ -107,13 +107,11 @@ def examine(case):
     near = limits[:HELD_DIRECTIONS]
     tried = [part(rig.idle, limit, share) for share in (INSIDE, OUTSIDE) for limit in near]
     ends = [judge(trace, layout, setup.hold).outcome for trace in rig.hold(tried)]
-    critical = gc.critical_friction(case.grasp, torsion_m=setup.torsion_m)
+    critical = gc.critical_friction(case.grasp, torsion_m=setup.physics.torsion_m)
     known = replace(case.grasp, critical_friction=critical)
     verdicts = [
         try_control(case.body, control, Agenda(), setup)
-        for control in negative_controls(
-            case.body, known, case.friction, case.place, setup.torsion_m
-        )
+        for control in negative_controls(case.body, known, case.friction, case.place, setup)
     ]
     measured = bisected_limits(rig, near) if case.torsion else ramped_limits(rig, limits)
     return Found(

@@ -12,7 +12,7 @@ from sim_validate.kit.result_folders import alone_in
 from sim_validate.main import main
 from tests.faults.conftest import contents
 
-PLAN = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
+PLAN = ["plan", "tetrahedron", "--families", "concurrent", "-q"]
 
 
 @pytest.mark.parametrize("below", ["", "out"])

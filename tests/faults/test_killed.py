@@ -16,7 +16,7 @@ from sim_validate.main import main
 from tests.faults.conftest import CLI, ROOT, contents
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
-PLAN = ["plan", "tetrahedron", "--family", "concurrent", "--jobs", "1", "-q"]
+PLAN = ["plan", "tetrahedron", "--families", "concurrent", "--jobs", "1", "-q"]
 
 
 @pytest.fixture(scope="module")

@@ -88,7 +88,7 @@ def test_letters_that_a_terminal_does_not_have_are_spelled_out(graspproof, tmp_p
     ["| true", *(pytest.param(end, marks=pytest.mark.slow) for end in (">&-", "2>&-", "<&-"))],
 )
 def test_a_stream_that_is_closed_does_not_stop_the_work(redirected, tmp_path):
-    words = ["plan", "tetrahedron", "--family", "concurrent", "--json", "--out", "out"]
+    words = ["plan", "tetrahedron", "--families", "concurrent", "--json", "--out", "out"]
     quoted = " ".join(f"'{word}'" for word in [*CLI, *words])
     done = subprocess.run(
         ["/bin/bash", "-c", f"set -o pipefail; {quoted} {redirected}"], cwd=tmp_path, check=False,
@@ -102,7 +102,7 @@ def test_a_stream_that_is_closed_does_not_stop_the_work(redirected, tmp_path):
 
 def test_a_working_folder_that_is_gone_matters_only_to_paths_in_it(tmp_path, monkeypatch, capsys):
     """Also where processes are started; numba cannot compile there, so all is kept before."""
-    plan = ["plan", "tetrahedron", "--family", "concurrent", "-q"]
+    plan = ["plan", "tetrahedron", "--families", "concurrent", "-q"]
     assert main([*plan, "--regions", "--out", str(tmp_path / "kept")]) == 0
     monkeypatch.setattr(compiling, "is_kept", lambda _: False)
     monkeypatch.setattr(engines, "START_S", 0.0, raising=False)

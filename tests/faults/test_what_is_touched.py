@@ -83,7 +83,7 @@ def witness(tmp_path_factory):
     found = Witness(tmp_path_factory.mktemp("touched"))
     found.run("run part.obj --limit 1 --random-wrenches 0 --out out -q --jobs 2")
     found.run("report out --out pages -q --jobs 2")
-    found.run("dataset build part.obj --friction 0.5 --limit 1 --out ds -q --jobs 2")
+    found.run("dataset build part.obj --frictions 0.5 --limit 1 --out ds -q --jobs 2")
     return found
 
 

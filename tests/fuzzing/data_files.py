@@ -30,7 +30,9 @@ from sim_validate.datasets.staging import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
+from sim_validate.kit.command_flags import Run
 from sim_validate.kit.config_file import flags_from
+from sim_validate.kit.flag_values import flags_of
 from sim_validate.kit.toml_tables import tables_of_toml
 from sim_validate.planning.regions_json import Regions
 from sim_validate.planning.wrenches_json import wrenches_from_json
@@ -230,7 +232,7 @@ gravity = [0.0, 0.0, 0.0]
 cone = "elliptic"
 autoreset = true
 [fingers]
-radius_m = 0.004
+fingertip_radius_m = 0.004
 approach = [0, 0, 1.0]
 [hold]
 hold_s = 0.5
@@ -245,7 +247,7 @@ baseline = "sub/box.baseline.json"
 strict = true
 limits = "ramp"
 random_wrenches = 3
-trials = 2
+repeats = 2
 seed = 7
 [noise]
 shift = 0.02
@@ -280,14 +282,17 @@ FLAGS = b"""friction = 0.4
 families = ["pencil", "regulus"]
 json = true
 quiet = false
-weights = [[0, 0, 1.5], [1, 0, 0]]
-mesh_unit = "mm"
+weight-down = [[0, 0, 1.5], [1, 0, 0]]
+unit = "mm"
+[noise]
+shift = 0.02
 """
+KNOWN = {flag.name: flag for flag in flags_of(Run)}
 
 
 def _same_flags(data: bytes, found: list[str]) -> None:
     stated = tomllib.loads(data.decode())
-    on = [name for name, value in stated.items() if value is not False]
+    on = [name for name, value in stated.items() if value is not False and name != "noise"]
     assert all("--" + name.replace("_", "-") in found for name in on if stated[name] != [])
 
 
@@ -329,6 +334,6 @@ TARGETS = (
            lambda data: config_from_settings(tables_of_toml(text_of(data))),
            lambda: [config_to_toml(DatasetConfig(objects=("wedge",))).encode()], _same_config,
            "toml"),
-    Target("flags", lambda data: flags_from(tables_of_toml(text_of(data))), lambda: [FLAGS],
+    Target("flags", lambda data: flags_from(tables_of_toml(text_of(data)), KNOWN), lambda: [FLAGS],
            _same_flags, "toml"),
 )  # fmt: skip

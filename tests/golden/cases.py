@@ -132,7 +132,7 @@ CASES = (
         "noise",
         (
             "plan wedge --limit 1 --jobs 1 --out .",
-            "validate grasps.json --trials 5 --noise-shift 0.02 --noise-friction 0.1 --limits ramp"
+            "validate grasps.json --repeats 5 --noise.shift 0.02 --noise.friction 0.1 --limits ramp"
             " --random-wrenches 2 --weight-n 2 --torsion-m 0.002 --surface mesh --traces --jobs 1"
             " --out .",
             "baseline record grasps.json -o wedge.baseline.json --limit 1 --jobs 1",

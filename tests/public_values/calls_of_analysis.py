@@ -33,8 +33,8 @@ PLANNED = {
     "families": SEVERAL | {"unknown": "nonsense", "numbers": (1, 2), "empty": ()},
     "theta_deg": optional(POSITIVE) | {"wider than friction": 80.0},
     "finger": optional(VALUE) | {"radius": 0.006},
-    "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
-    "share_faces": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
+    "edge_clearance_m": NOT_NEGATIVE | {"larger than the object": 1.0},
+    "share_faces_m": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
 }
 
 

@@ -38,7 +38,7 @@ def gripped():
 
 @cache
 def held_scene():
-    return scenes.build_held_scene(body(), gripped(), 0.1)
+    return scenes.build_held_scene(body(), gripped(), scenes.HeldSettings(mass_kg=0.1))
 
 
 def tilted():
@@ -58,6 +58,13 @@ ARGUMENTS = {
 MOTORS = optional(VALUE) | {"of three contacts": gc.Motors.of(np.eye(2, 9), 1.0)}
 CARRYING = gc.Motors.of(np.eye(2, 12), 1.0, 0.5)
 ONE_TRIAL = sv.ExecutionSettings(0.1, trials=("weight",))
+HELD = {
+    "mass_kg": optional(POSITIVE),
+    "density_kg_m3": optional(POSITIVE),
+    "tip_mass_kg": POSITIVE,
+    "damping_ratio": POSITIVE | {"a hundred": 100.0},
+    "down": array(GRAVITY) | {"zero": (0.0, 0.0, 0.0), "minute": (1e-300, 0.0, 0.0)},
+}
 
 CALLS = [
     Call("gc.grip", lambda: held(squeeze=squeeze())(), ARGUMENTS | {
@@ -86,19 +93,17 @@ CALLS = [
         "offset": array(WRENCH),
         "axes": array(np.eye(6)) | {"zero": np.zeros((6, 6)), "seven": np.ones((6, 7))},
     }),
-    Call("scenes.HeldSettings", dict, {
-        "tip_mass_kg": POSITIVE,
-        "damping_ratio": POSITIVE | {"a hundred": 100.0},
-        "down": array(GRAVITY) | {"zero": (0.0, 0.0, 0.0), "minute": (1e-300, 0.0, 0.0)},
-    }),
-    Call("scenes.build_held_scene", lambda: {"body": body(), "grip": gripped(), "mass_kg": 0.1}, {
-        "settings": optional(VALUE),
+    Call("scenes.HeldSettings", dict, HELD),
+    Call("scenes.build_held_scene", lambda: {"body": body(), "grip": gripped(),
+        "settings": scenes.HeldSettings(mass_kg=0.1),
+    }, {
+        "settings": VALUE,
         "physics": optional(VALUE) | {"other gravity": tilted()},
         "reach_m": optional(POSITIVE),
     }),
-    Call("sv.ExecutionSettings", lambda: fields_of(sv.ExecutionSettings, ONE_TRIAL), {
+    Call("sv.ExecutionSettings", lambda: fields_of(sv.ExecutionSettings, ONE_TRIAL), HELD | {
         "push_n": POSITIVE,
-        "stiffness_n_per_m": POSITIVE,
+        "tip_stiffness_n_per_m": POSITIVE,
         "tip_radius_m": optional(POSITIVE),
         "trials": SEVERAL | {"none of them": (), "unknown": ("lift", "throw"), "one": "lift"},
         "lift_m": POSITIVE,
@@ -111,8 +116,8 @@ CALLS = [
         "off_mm": NOT_NEGATIVE,
         "off_deg": NOT_NEGATIVE | {"a whole turn": 360.0},
         "misplacements": AT_LEAST_ONE,
-        "most_mm": POSITIVE,
-        "most_deg": POSITIVE,
+        "max_mm": POSITIVE,
+        "max_deg": POSITIVE,
     }),
     Call("sv.execute", lambda: {
         "body": body(), "grasp": grasp(), "friction": 0.5, "settings": ONE_TRIAL,

@@ -27,7 +27,7 @@ IN_HAND = {"hand": optional(VALUE), "reach": optional(VALUE)}
 CALLS = [
     Call("scenes.build_scene", of_grasp(), {
         "grasp": VALUE | {"contacts of objects": [object()] * 4, "empty": (), "one": "grasp"},
-        "fingers": optional(VALUE) | {"too large": scenes.FingerSettings(radius_m=1.0)},
+        "fingers": optional(VALUE) | {"too large": scenes.FingerSettings(fingertip_radius_m=1.0)},
         "surface": WORD,
     }),
     Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"},
@@ -51,8 +51,8 @@ CALLS = [
         **IN_HAND,
     }, succeeds_in="tests/scenes/drawing/test_pictures.py"),
     Call("scenes.FingerSettings", dict, {
-        "radius_m": optional(POSITIVE),
-        "mass_kg": optional(POSITIVE) | {"a picogram": 1e-12, "a mountain": 1e12},
+        "fingertip_radius_m": optional(POSITIVE),
+        "fingertip_mass_kg": optional(POSITIVE) | {"a picogram": 1e-12, "a mountain": 1e12},
         "stiffness_n_per_m": optional(POSITIVE),
         "approach": optional(array([0.0, 0.0, 1.0])) | {"zero": (0.0, 0.0, 0.0)},
         "drive": WORD,
@@ -113,7 +113,7 @@ CALLS = [
         "wrenches": SEVERAL,
         **dict.fromkeys(("critical_friction", "controls", "keep_traces"), SWITCH),
         "limits": WORD,
-        "trials": COUNT,
+        "repeats": COUNT,
         "noise": VALUE,
     }),
     Call("sv.HoldProtocol", dict, {

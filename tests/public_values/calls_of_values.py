@@ -40,7 +40,7 @@ CALLS = [
         "limits": VALUE,
     }),
     Call("gc.MeshLimits", dict, {
-        "max_bytes": AT_LEAST_ONE,
+        "max_mesh_bytes": AT_LEAST_ONE,
         "max_triangles": AT_LEAST_ONE,
         "max_faces": AT_LEAST_ONE,
         "max_parts": AT_LEAST_ONE,

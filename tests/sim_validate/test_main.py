@@ -32,7 +32,7 @@ def here(tmp_path, monkeypatch):
 
 
 def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
-    assert main(["run", "tetrahedron", "--family", "concurrent", "--out", "results"]) == Exit.GOOD
+    assert main(["run", "tetrahedron", "--families", "concurrent", "--out", "results"]) == Exit.GOOD
     assert sorted(p.name for p in here.iterdir()) == ["results"]
     names = sorted(p.name for p in (here / "results").iterdir())
     assert names == ["grasps.json", "report", "scenes", "verdicts.json"]
@@ -52,7 +52,7 @@ def test_a_second_run_leaves_nothing_of_the_first_behind(here):
     assert main(["run", "box", "--limit", "1", "--out", "results", "-q"]) == Exit.GOOD
     kept = here / "results" / "scenes" / "mine.xml"
     kept.write_text("<mujoco/>")
-    nothing = ["--cones", "normal", "--family", "concurrent", "--out", "results", "-q"]
+    nothing = ["--cones", "normal", "--families", "concurrent", "--out", "results", "-q"]
     assert main(["run", "box", *nothing]) == Exit.NONE
     names = sorted(p.name for p in (here / "results").rglob("*") if p.is_file())
     assert names == ["grasps.json", "mine.xml"]
@@ -115,8 +115,8 @@ def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
         "plan wedge --limit 1 --out p": 0, "inspect box": 0, "objects": 0,
         "run tetrahedron --limit 1 --no-report": 0, "doctor": 0,
         "report graspproof-out/tetrahedron": 0,
-        "run box --family pencil --cones normal": 5,
-        "plan box --family pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
+        "run box --families pencil --cones normal": 5,
+        "plan box --families pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
         "scene p/grasps.json --out s": 0,
         "scene p/grasps.json --grasp c-0-1-2-7": 0,
     }  # fmt: skip
@@ -128,7 +128,7 @@ def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
 @pytest.mark.parametrize(("command", "name"), [("run", "box"), ("plan", "prism")])
 @pytest.mark.usefixtures("here")
 def test_an_object_without_grasps_says_so_in_one_sentence(capsys, command, name):
-    paper = [part for family in FAMILIES for part in ("--family", family)]
+    paper = ["--families", ",".join(FAMILIES)]
     assert main([command, name, "--cones", "normal", *paper]) == Exit.NONE
     sentences = [
         line for line in capsys.readouterr().out.splitlines() if "positively spanning" in line
@@ -176,7 +176,7 @@ def test_errors_have_their_exit_code_and_name_the_cause(here, capsys, arguments,
 
 def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
     (here / "c.toml").write_text(
-        'friction = 0.3\nlimit = 2\nfamily = ["concurrent"]\njson = true\n'
+        'friction = 0.3\nlimit = 2\nfamilies = ["concurrent"]\njson = true\n'
     )
     assert main(["plan", "wedge", "--config", "c.toml"]) == Exit.GOOD
     plan = json.loads(capsys.readouterr().out)
@@ -185,6 +185,15 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, capsys):
     assert len(json.loads(capsys.readouterr().out)["grasps"]) == 1
     (here / "bad.toml").write_text("frction = 0.3\n")
     assert main(["plan", "wedge", "--config", "bad.toml"]) == Exit.USAGE
+    (here / "bad.toml").write_text("[friction]\nlimit = 1\n")
+    assert main(["plan", "wedge", "--config", "bad.toml"]) == Exit.USAGE
+    assert "'friction.limit': unknown flag" in capsys.readouterr().err
+
+
+def test_a_table_of_a_config_file_sets_a_group_of_flags(here, capsys):
+    (here / "c.toml").write_text("[patches]\nmost = 3\n")
+    assert main(["inspect", "wedge.stl", "--config", "c.toml"]) == Exit.USAGE
+    assert "--patches.most must be a whole number from 4 up to 200" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("here")
@@ -240,7 +249,7 @@ def test_an_interrupted_run_keeps_what_is_done(here):
         "from sim_validate.main import run_and_exit; run_and_exit()"
     )
     command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "150"]
-    command += ["--cones", "normal", "--family", "concurrent", "--jobs", "1"]
+    command += ["--cones", "normal", "--families", "concurrent", "--jobs", "1"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     folder = here / "graspproof-out" / "icosahedron"
@@ -269,7 +278,7 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
 
     vertices, triangles = bumpy_ellipsoid(noise=0.001, subdivisions=3)
     trimesh.Trimesh(1e3 * vertices, triangles[5:], process=False).export(here / "scan.ply")
-    flags = ["--unit", "mm", "--patches", "10", "--limit", "2", "--out", "r"]
+    flags = ["--unit", "mm", "--patches.most", "10", "--limit", "2", "--out", "r"]
     fingers = ["--finger-radius-m", "0.004", "--approach-m", "0.03"]
     assert main(["run", "scan.ply", *flags, *fingers]) == Exit.GOOD
     shown = capsys.readouterr()
@@ -353,7 +362,7 @@ def test_plans_ordered_by_what_grasps_carry_show_it(capsys):
     [
         (["--ceiling", "10"], "--ceiling needs --optimize"),
         (["--approach-m", "0.1"], "--approach-m also needs --finger-radius-m"),
-        (["--complete", "--family", "pencil"], "needs the free method"),
+        (["--complete", "--families", "pencil"], "needs the free method"),
         (["--optimize", "--share-faces-m", "0.01"], "leave out --optimize or these"),
         (["--scale", "2"], "leave out --unit, --scale"),
     ],

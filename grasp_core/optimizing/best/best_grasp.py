@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.checked import BOUNDS, coefficient, function, number, seed_of, whole
+from grasp_core.checked import coefficient, function, number, seed_of, whole
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
+from grasp_core.kinds import Gap, TimeLimit
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, exact_maps, first_nodes, grounds_of
@@ -34,6 +35,7 @@ from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Sla
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
 from grasp_core.planning.certify import named
 from grasp_core.quality.measures import Measure, MeasureName
+from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits, first_best, on_grid, surpassing
 from grasp_core.values import Grasp
 
@@ -257,13 +259,13 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
     """
     check_planar(body, "best_grasp")
     friction, seed = coefficient(friction), seed_of(seed)
-    number(gap, "gap", **BOUNDS["gap"])
+    value_of(Gap, gap, "gap")
     loads = Measure.of(measure, wrenches, body.radius)
     jobs = min(whole(jobs, "jobs", least=1), MOST_JOBS)
     if progress is not None:
         function(progress, "progress")
     if time_limit_s is not None:
-        number(time_limit_s, "time_limit_s", **BOUNDS["time_limit_s"])
+        value_of(TimeLimit, time_limit_s, "time_limit_s")
     if clearance is None:
         clearance = FINGER_RADIUS * body.radius
     number(clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m")

@@ -29,7 +29,7 @@ from scenes.drawing.sheets import (
     ink_line,
     outlined,
 )
-from scenes.mujoco.fingertips import FingerSettings
+from scenes.settings import FingerSettings
 
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""

@@ -309,11 +309,11 @@ def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
     path = tmp_path / f"part.{kind}"
     data = FILES.get(kind) or glb(tree())
     path.write_bytes(data)
-    just = MeshLimits(max_bytes=len(data), max_triangles=4)
+    just = MeshLimits(max_mesh_bytes=len(data), max_triangles=4)
     mesh = read_triangles(path, just)
     assert (len(mesh.triangles), mesh.data) == (4, data)
     assert np.isfinite(mesh.vertices).all()
-    for limits in (MeshLimits(max_bytes=len(data) - 1), MeshLimits(max_triangles=3)):
+    for limits in (MeshLimits(max_mesh_bytes=len(data) - 1), MeshLimits(max_triangles=3)):
         with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*limit") as caught:
             read_triangles(path, limits)
         assert caught.value.reason is MeshRefusal.TOO_MANY

@@ -190,7 +190,7 @@ def test_quadruples_have_both_halves_of_a_face_or_of_two_and_no_face_beside_its_
 def test_fingers_on_one_face_hold_and_keep_their_distance():
     body = example_object("box")
     apart = 0.02
-    plan = gc.plan(body, 0.5, share_faces=apart)
+    plan = gc.plan(body, 0.5, share_faces_m=apart)
     shared = [grasp for grasp in plan.grasps if len(set(grasp.faces)) < 4]
     assert len(shared) >= 20
     assert len({grasp.id for grasp in plan.grasps}) == len(plan.grasps)
@@ -207,7 +207,7 @@ def test_fingers_on_one_face_hold_and_keep_their_distance():
 @pytest.mark.parametrize("name", ["prism", "box"])
 def test_grasps_with_both_halves_have_ids_of_their_own_and_survive_a_file(name):
     body = example_object(name)
-    plan = gc.plan(body, 0.5, families="pencil", share_faces=0.005)
+    plan = gc.plan(body, 0.5, families="pencil", share_faces_m=0.005)
     assert len({grasp.id for grasp in plan.grasps}) == len(plan.grasps) >= 20
     saved = grasps_from_json(plan_to_json(body, plan))
     assert [grasp.id for grasp in saved.grasps] == [grasp.id for grasp in plan.grasps]
@@ -217,7 +217,7 @@ def test_shared_faces_are_tried_after_blocks_that_are_too_small():
     """A box with many narrow faces: the first grasps of two fingers on a wide one are larger."""
     body = bevelled(example_object("box"))
     assert len(body.faces) > FIRST_FACES  # a second block comes before the shared faces
-    plan = gc.plan(body, 0.5, families="concurrent", limit=25, share_faces=0.004)
+    plan = gc.plan(body, 0.5, families="concurrent", limit=25, share_faces_m=0.004)
     assert any(len(set(grasp.faces)) < 4 for grasp in plan.grasps)
 
 
@@ -233,7 +233,7 @@ def bevelled(body, radius=0.004):
 def test_absence_is_proved_for_whole_faces_not_for_their_halves():
     """Random contacts on the whole faces of quadruples that are called absent never close."""
     body, rng, tested = example_object("wedge"), np.random.default_rng(0), 0
-    plan = gc.plan(body, 0.2, share_faces=0.0)
+    plan = gc.plan(body, 0.2, share_faces_m=0.0)
     for faces, proofs in plan.absences.items():
         assert all(proof.verify() for proof in proofs)
         if len(set(faces)) == 4:
@@ -280,7 +280,7 @@ def test_pieces_keep_the_margin_from_every_border_and_lose_little_else(name):
 def test_planned_contacts_and_regions_keep_the_margin():
     body = example_object("l-bracket")
     margin, tested = 0.05 * body.radius, 0
-    plan = gc.plan(body, 0.5, clearance=margin)
+    plan = gc.plan(body, 0.5, edge_clearance_m=margin)
     for grasp in plan.grasps:
         for face, contact, region in zip(grasp.faces, grasp.contacts, grasp.regions, strict=True):
             for point in (contact.position, *region.polygon):
@@ -292,12 +292,12 @@ def test_planned_contacts_and_regions_keep_the_margin():
 
 def test_a_margin_wider_than_all_faces_leaves_nothing():
     body = example_object("wedge")
-    plan = gc.plan(body, 0.5, clearance=0.9 * body.radius)
+    plan = gc.plan(body, 0.5, edge_clearance_m=0.9 * body.radius)
     assert not plan.grasps
     assert plan.outcomes.absent == plan.counts.quadruples
     assert "m from their edges" in plan.absence
     structured = gc.plan(
-        body, 0.5, clearance=0.9 * body.radius, families="concurrent", cones="normal"
+        body, 0.5, edge_clearance_m=0.9 * body.radius, families="concurrent", cones="normal"
     )
     assert structured.counts.spanning == 15
     assert "15 face quadruples span" in structured.absence

@@ -104,7 +104,8 @@ def test_without_pillow_the_extra_is_named(scene, tmp_path, monkeypatch):
 def held_scene():
     body, (grasp,) = grasps("wedge", 0.5, 1)
     squeeze = 3.0 * even_forces(grasp.positions, grasp.normals, 0.4)
-    return scenes.build_held_scene(body, gc.grip(body, grasp, 0.5, squeeze), 0.2)
+    grip = gc.grip(body, grasp, 0.5, squeeze)
+    return scenes.build_held_scene(body, grip, scenes.HeldSettings(mass_kg=0.2))
 
 
 def held_joints(count, shift):

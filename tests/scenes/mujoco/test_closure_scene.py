@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from scenes.mujoco.layout import SQUEEZE, TOUCH, arrange, grasp_size
-from scenes.mujoco.physics import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
+from scenes.settings import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 
 OBJECTS = ("wedge", "icosahedron", "screwdriver")
 
@@ -203,7 +203,7 @@ def test_similar_grasps_are_driven_alike():
     drives = []
     for body in (base, large):
         layout = arrange(body, gc.plan(body, limit=1).grasps[0], 0.5)
-        drives.append((layout.grasp_size_m, layout.mass_kg, asdict(layout.drive)))
+        drives.append((layout.grasp_size_m, layout.object_kg, asdict(layout.drive)))
     (size, mass, drive), (size3, mass3, drive3) = drives
     assert size3 == pytest.approx(3 * size, rel=1e-6)
     assert mass3 == pytest.approx(mass / 3, rel=1e-6)

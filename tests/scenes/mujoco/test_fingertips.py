@@ -101,12 +101,12 @@ def test_settings_of_a_user_are_kept():
     body = scenes.example_object("wedge")
     grasp = gc.plan(body, limit=1).grasps[0]
     fingers = scenes.FingerSettings(
-        max_normal_force_n=3.0, radius_m=0.002, mass_kg=0.4, stiffness_n_per_m=500.0,
-        approach=(0.0, 0.0, -2.0),
+        max_normal_force_n=3.0, fingertip_radius_m=0.002, fingertip_mass_kg=0.4,
+        stiffness_n_per_m=500.0, approach=(0.0, 0.0, -2.0),
     )  # fmt: skip
     layout = arrange(body, grasp, 0.5, fingers)
     drive = layout.drive
-    assert (drive.max_normal_force_n, drive.radius_m, drive.mass_kg) == (3.0, 0.002, 0.4)
+    assert (drive.max_normal_force_n, drive.radius_m, drive.tip_mass_kg) == (3.0, 0.002, 0.4)
     assert drive.stiffness_n_per_m == 500.0
     assert drive.damping_n_s_per_m == pytest.approx(2.0 * math.sqrt(500.0 * 0.4))
     directions = layout.approach / np.linalg.norm(layout.approach, axis=1, keepdims=True)

@@ -10,10 +10,12 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.forces.contact_forces import even_forces
+from scenes.mujoco.held import gravity_of
 from scenes.mujoco.held_mjcf import FINGERTIPS, PALM, TABLE, held_physics, palm_armature
 
 OBJECTS = ("dodecahedron", "l-bracket")
 MASS = 0.4
+HELD = scenes.HeldSettings(mass_kg=MASS)
 FRICTION = (0.3, 0.5, 0.7, 0.9)
 
 
@@ -25,7 +27,7 @@ def held(name):
     stiffness = np.array([np.diag([1000.0, 2000.0, 4000.0])] * 3 + [3000.0 * np.eye(3)])
     grip = gc.grip(body, grasp, FRICTION, squeeze, stiffness=stiffness, tip_radius_m=0.004)
     scene = scenes.build_held_scene(
-        body, grip, MASS, settings=scenes.HeldSettings(tip_mass_kg=0.02, damping_ratio=0.7)
+        body, grip, scenes.HeldSettings(mass_kg=MASS, tip_mass_kg=0.02, damping_ratio=0.7)
     )
     return body, grip, scene, mujoco.MjModel.from_xml_string(scene.xml)
 
@@ -140,15 +142,15 @@ def test_gravity_pulls_the_object_alone(built):
 
 
 def test_gravity_has_its_size_in_any_direction():
-    hand = scenes.HeldSettings(down=(3.0, 0.0, 4.0))
-    assert hand.gravity == pytest.approx([0.6 * 9.80665, 0.0, 0.8 * 9.80665])
+    hand = scenes.HeldSettings(mass_kg=MASS, down=(3.0, 0.0, 4.0))
+    assert gravity_of(hand) == pytest.approx([0.6 * 9.80665, 0.0, 0.8 * 9.80665])
     body, grip, _, _ = held("dodecahedron")
-    tilted = scenes.build_held_scene(body, grip, MASS, settings=hand)
-    assert tilted.physics.gravity == tuple(hand.gravity)
+    tilted = scenes.build_held_scene(body, grip, hand)
+    assert tilted.physics.gravity == tuple(gravity_of(hand))
     with pytest.raises(gc.InputError, match=r"physics\.gravity"):
-        scenes.build_held_scene(body, grip, MASS, physics=tilted.physics)
+        scenes.build_held_scene(body, grip, HELD, physics=tilted.physics)
     own = replace(held_physics(tilted.layout), timestep=0.001)
-    assert scenes.build_held_scene(body, grip, MASS, settings=hand, physics=own).physics is own
+    assert scenes.build_held_scene(body, grip, hand, physics=own).physics is own
 
 
 def test_a_scene_is_written_as_it_is(tmp_path):
@@ -160,9 +162,9 @@ def test_a_scene_is_written_as_it_is(tmp_path):
 
 def test_the_surface_is_there_as_far_as_asked():
     body, grip, whole, _ = held("mug")
-    near = scenes.build_held_scene(body, grip, MASS, reach_m=0.1 * body.radius)
+    near = scenes.build_held_scene(body, grip, HELD, reach_m=0.1 * body.radius)
     assert 0 < len(near.layout.solids) < len(whole.layout.solids)
     kept = {corners.tobytes() for corners in whole.layout.solids}
     assert kept > {corners.tobytes() for corners in near.layout.solids}
     with pytest.raises(gc.InputError, match="reach_m"):
-        scenes.build_held_scene(body, grip, MASS, reach_m=0.0)
+        scenes.build_held_scene(body, grip, HELD, reach_m=0.0)

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.mujoco.fingertips import FingerSettings
-from scenes.mujoco.physics import PhysicsSettings
 from scenes.mujoco.tested import (
     HandServos,
     Postures,
@@ -17,6 +15,7 @@ from scenes.mujoco.tested import (
     hand_scene,
     planned_postures,
 )
+from scenes.settings import FingerSettings, PhysicsSettings
 from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, plain_hand, reaches, scaled

@@ -117,11 +117,11 @@ def test_other_fingertips_planned_for_are_not_comparable_until_blessed(copy, cap
     for status, why in statuses(capsys).values():
         assert status == "not comparable"
         assert "planned for: radius_m None -> 0.003" in why
-        assert "setup.fingers.radius_m: None -> 0.003" in why
+        assert "setup.fingers.fingertip_radius_m: None -> 0.003" in why
     assert check(copy, "--bless", "-q") == Exit.GOOD
     assert check(copy, "-q") == Exit.GOOD
     blessed = json.loads((copy / "base.json").read_text())
-    assert blessed["settings"]["setup"]["fingers"]["radius_m"] == 0.003
+    assert blessed["settings"]["setup"]["fingers"]["fingertip_radius_m"] == 0.003
 
 
 def test_the_first_grasps_of_a_file_are_a_baseline_too(tmp_path):

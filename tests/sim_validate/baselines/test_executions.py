@@ -12,13 +12,13 @@ from sim_validate.baselines.baseline import Baseline, ExecutedFigures, How
 from sim_validate.baselines.check import Checked, Measured, demanded
 from sim_validate.baselines.compare import Status, compare
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
     ExecutionControl,
     ExecutionTrial,
 )
+from sim_validate.settings.executions import ExecutionSettings
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 
 TRIAL = ExecutionTrial(
@@ -70,7 +70,7 @@ def test_a_baseline_with_executions_is_the_same_when_it_is_read_again():
 
 
 def test_settings_of_executions_are_kept():
-    asked = AskedExecution.of_table({"density_kg_m3": 500.0, "trials": ["stop"]})
+    asked = ExecutionSettings(density_kg_m3=500.0, trials=("stop",))
     baseline = dataclasses.replace(BEFORE, settings=How(execution=asked))
     assert Baseline.of_text(baseline.text()) == baseline
     record = json.loads(baseline.text())["settings"]["execution"]

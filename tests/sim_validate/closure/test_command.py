@@ -37,7 +37,9 @@ def by_name(verdict):
 
 
 def test_a_task_and_weights_are_held_as_they_are(verdict):
-    held = by_name(verdict("--wrenches", "task.json", "--weight-n", "2", "--down", "0", "3", "0"))
+    held = by_name(
+        verdict("--wrenches", "task.json", "--weight-n", "2", "--weight-down", "0", "3", "0")
+    )
     assert held["lift"]["wrench"] == [0, 0, -3, 0, 0.01, 0]
     assert held["weight_0"]["wrench"] == [0, 2, 0, 0, 0, 0]
     assert len(held) == 15
@@ -45,7 +47,7 @@ def test_a_task_and_weights_are_held_as_they_are(verdict):
 
 
 def test_a_task_too_heavy_for_the_grasp_makes_it_fail(verdict):
-    found = verdict("--weight-n", "60", "--down", "0", "0", "-1", code=Exit.NEGATIVE)
+    found = verdict("--weight-n", "60", "--weight-down", "0", "0", "-1", code=Exit.NEGATIVE)
     trial = by_name(found)["weight_0"]
     assert found["held"] is False
     assert trial["predicted_limit"] < 1.0
@@ -79,18 +81,19 @@ def test_a_simulator_that_is_unfaithful_is_refused_with_its_figures(planned, cap
 
 
 def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
-    (planned / "setup.toml").write_text("[hold]\nload_share = 0.5\n[fingers]\nradius_m = 0.004\n")
+    text = "[hold]\nload_share = 0.5\n[fingers]\nfingertip_radius_m = 0.004\n"
+    (planned / "setup.toml").write_text(text)
     settings = verdict("--setup", "setup.toml")["setup"]
     assert settings["hold"]["load_share"] == 0.5
-    assert settings["fingers"]["radius_m"] == 0.004
+    assert settings["fingers"]["fingertip_radius_m"] == 0.004
 
 
 @pytest.mark.parametrize(
     ("flags", "code", "words"),
     [
-        (["--down", "0", "0", "-1"], Exit.USAGE, "give the weight with --weight-n too"),
+        (["--weight-down", "0", "0", "-1"], Exit.USAGE, "give the weight with --weight-n too"),
         (["--traces"], Exit.USAGE, "with --out DIR too"),
-        (["--weight-n", "1", "--down", "0", "0", "0"], Exit.USAGE, "zero"),
+        (["--weight-n", "1", "--weight-down", "0", "0", "0"], Exit.USAGE, "zero"),
     ],
 )
 @pytest.mark.usefixtures("planned")
@@ -99,7 +102,7 @@ def test_flags_that_make_no_sense_are_refused_before_anything_runs(capsys, flags
     assert words in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("flags", [["--down", "0", "0", "-1"], ["--setup", "pyramids.toml"]])
+@pytest.mark.parametrize("flags", [["--weight-down", "0", "0", "-1"], ["--setup", "pyramids.toml"]])
 def test_a_run_that_is_refused_leaves_earlier_results(planned, flags):
     (planned / "pyramids.toml").write_text('[physics]\ncone = "pyramidal"\n')
     assert main(["run", "tetrahedron", "--out", "r", "-q", "--no-report"]) == Exit.GOOD
@@ -113,7 +116,7 @@ def test_a_run_that_is_refused_leaves_earlier_results(planned, flags):
 
 def test_the_scenes_of_a_run_are_those_that_were_simulated(planned):
     (planned / "setup.toml").write_text(
-        "[physics]\ntimestep = 0.001\n[fingers]\nradius_m = 0.004\n"
+        "[physics]\ntimestep = 0.001\n[fingers]\nfingertip_radius_m = 0.004\n"
     )
     command = ["run", "tetrahedron", "--out", "r", "-q", "--no-report", "--setup", "setup.toml"]
     assert main(command) == Exit.GOOD

@@ -13,8 +13,8 @@ import scenes
 from grasp_core.families.regulus import LEAST_DEPTH
 from sim_validate.closure.controls import Control, negative_controls, try_control
 from sim_validate.engine import schedules
-from sim_validate.engine.schedules import HoldProtocol
 from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.settings.trials import HoldProtocol
 from tests.grasp_core.families.printed_paper import printed_regulus
 from tests.grasp_core.quadruples import paired_quadruples
 from tests.marks import more

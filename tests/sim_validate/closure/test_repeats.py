@@ -9,13 +9,14 @@ import sim_validate as sv
 from sim_validate.closure.noise import disturbed, noisy_case, noisy_trial
 from sim_validate.closure.verdict import interval
 from sim_validate.engine.rig import squeezed
-from sim_validate.engine.setup import Agenda, NamedWrench, Noise, Setup
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
+from sim_validate.settings.trials import Noise
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
-ONLY_NOISE = Agenda(trials=12, controls=False, critical_friction=False)
+ONLY_NOISE = Agenda(repeats=12, controls=False, critical_friction=False)
 
 
 def repeated(body, grasp, friction, **changed):
@@ -46,7 +47,7 @@ def test_analysis_and_simulation_agree_on_every_repeat(each):
 
 def test_without_noise_every_repeat_holds():
     body, (grasp,) = grasps("wedge", 0.5, 1)
-    found = repeated(body, grasp, 0.5, noise=STILL, trials=2).robustness
+    found = repeated(body, grasp, 0.5, noise=STILL, repeats=2).robustness
     assert (found.held, found.predicted) == (2, 2)
     assert found.interval[1] == 1.0
 
@@ -56,7 +57,7 @@ def test_a_load_beyond_the_limit_is_not_held_however_it_came_about():
     body, (grasp,) = grasps("wedge", 0.5, 1)
     noise = dataclasses.replace(STILL, mass=0.3)
     cases = [disturbed(body, grasp, 0.5, noise, 0, number) for number in range(24)]
-    found = repeated(body, grasp, 0.5, noise=noise, trials=24).robustness
+    found = repeated(body, grasp, 0.5, noise=noise, repeats=24).robustness
     assert {case.mass > 1.25 for case in cases} == {True, False}
     for case, trial in zip(cases, found.trials, strict=True):
         if abs(case.mass - 1.25) > 0.01:
@@ -106,11 +107,11 @@ def test_fingers_that_miss_are_not_held():
 
 def test_the_same_seed_gives_the_same_repeats():
     body, (grasp,) = grasps("screwdriver", 0.5, 1)
-    one, same = (repeated(body, grasp, 0.5, trials=6).robustness for _ in range(2))
+    one, same = (repeated(body, grasp, 0.5, repeats=6).robustness for _ in range(2))
     assert one == same
-    other = repeated(body, grasp, 0.5, trials=6, seed=1).robustness
+    other = repeated(body, grasp, 0.5, repeats=6, seed=1).robustness
     assert other.trials != one.trials
-    more = repeated(body, grasp, 0.5, trials=7).robustness
+    more = repeated(body, grasp, 0.5, repeats=7).robustness
     assert more.trials[:6] == one.trials
 
 
@@ -121,7 +122,7 @@ def test_a_heavier_object_is_the_same_scene_with_more_mass():
         noisy_case(body, dataclasses.replace(case, mass=mass), [], Setup())[0].bench.scene
         for mass in (1.0, 1.5)
     )
-    assert heavy.layout.mass_kg == 1.5 * scene.layout.mass_kg
+    assert heavy.layout.object_kg == 1.5 * scene.layout.object_kg
     changed = [
         pair
         for pair in zip(scene.xml.split(), heavy.xml.split(), strict=True)

@@ -7,13 +7,14 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from sim_validate.closure.replaying import Recorded, replayed
-from sim_validate.engine.setup import Agenda, NamedWrench, Noise, Setup
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
+from sim_validate.settings.trials import Noise
 from tests.sim_validate.rigs import grasps
 
 AGENDA = Agenda(
     random_wrenches=2, wrenches=(NamedWrench("too much", [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]),),
-    critical_friction=False, trials=25, noise=Noise(0.04, 3.0, 3.0, 0.3, 0.3), seed=3,
+    critical_friction=False, repeats=25, noise=Noise(0.04, 3.0, 3.0, 0.3, 0.3), seed=3,
 )  # fmt: skip
 
 
@@ -78,7 +79,7 @@ def test_so_do_repeats_with_noise(tried):
 def test_so_do_repeats_that_lost_force_closure(tried):
     known, _ = tried
     noise = Noise(0.0, 0.0, 0.0, 0.1, 0.0)
-    agenda = Agenda(controls=False, critical_friction=False, trials=8, noise=noise)
+    agenda = Agenda(controls=False, critical_friction=False, repeats=8, noise=noise)
     friction = 1.02 * known.grasp.critical_friction
     verdict = sv.validate(known.body, known.grasp, friction, agenda=agenda)
     opened = [trial for trial in verdict.robustness.trials if trial.wrench == "separating"]

@@ -13,13 +13,13 @@ def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
     path = tmp_path / "setup.toml"
     path.write_text(
         "[physics]\ntimestep = 0.001\nsolref = [0.002, 1.0]\n[hold]\nload_share = 0.5\n"
-        "[fingers]\nradius_m = 0.003\n[limit]\nspans = [0.05]\n"
+        "[fingers]\nfingertip_radius_m = 0.003\n[limit]\nspans = [0.05]\n"
     )
     setup = setup_from_file(path, Setup(threads=2))
     assert setup.physics.timestep == 0.001
     assert setup.physics.solref == (0.002, 1.0)
     assert setup.hold.load_share == 0.5
-    assert setup.fingers.radius_m == 0.003
+    assert setup.fingers.fingertip_radius_m == 0.003
     assert setup.limit.spans == (0.05,)
     assert setup.friction == Setup().friction
     assert setup.physics.cone == "elliptic"

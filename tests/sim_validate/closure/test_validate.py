@@ -8,7 +8,8 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.mujoco.fingertips import FingerSettings, clashes
+from scenes.mujoco.fingertips import clashes
+from scenes.settings import FingerSettings
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
@@ -151,7 +152,7 @@ def test_overlapping_fingertips_make_a_grasp_invalid():
     body, found = grasps("l-bracket", 0.5, 8, ("free",))
     radius = 0.5 * body.radius
     grasp = next(g for g in found if clashes(body, g.positions, g.normals, radius))
-    setup = Setup(fingers=FingerSettings(radius_m=radius))
+    setup = Setup(fingers=FingerSettings(fingertip_radius_m=radius))
     verdict = sv.validate(body, grasp, 0.5, agenda=WITHOUT_CONTROLS, setup=setup)
     assert verdict.outcome is Outcome.INVALID_START
     assert "of radius" in verdict.wrenches[0].hold.reason
@@ -161,7 +162,7 @@ def test_overlapping_fingertips_make_a_grasp_invalid():
 @pytest.mark.parametrize(
     "fingers",
     [
-        FingerSettings(radius_m=0.002),
+        FingerSettings(fingertip_radius_m=0.002),
         FingerSettings(max_normal_force_n=1.0),
         FingerSettings(max_normal_force_n=80.0, approach=(0.0, 0.0, -1.0)),
         FingerSettings(stiffness_n_per_m=600.0),

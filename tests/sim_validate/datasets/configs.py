@@ -6,7 +6,6 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.parquet import read_table
-from sim_validate.execution.settings import AskedExecution
 from tests.sim_validate.datasets.engines import Here, silent
 
 CONFIG = DatasetConfig(
@@ -21,8 +20,8 @@ SMALL = DatasetConfig(
 """Three objects, each of which is in another split with this seed."""
 LEARNED = DatasetConfig(
     objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
-    execution=AskedExecution(
-        sv.ExecutionSettings(mass_kg=1.0, trials=("weight", "misplaced"), misplacements=2)
+    execution=sv.ExecutionSettings(
+        mass_kg=1.0, trials=("weight", "misplaced"), misplacements=2
     ),
     learning=Learning(
         friction_below=1, friction_near=2, friction_above=1, moved_out=2, mass_near=1, synthetic=1,

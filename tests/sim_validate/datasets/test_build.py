@@ -58,7 +58,7 @@ def test_mesh_files_have_the_scale_that_is_asked_for(tmp_path):
     body = example_object("tetrahedron")
     mesh, out = tmp_path / "mesh.obj", tmp_path / "ds"
     trimesh.Trimesh(2e3 * body.vertices, body.triangles).export(mesh)
-    line = ["dataset", "build", str(mesh), "wedge", "--limit", "1", "--family", "concurrent"]
+    line = ["dataset", "build", str(mesh), "wedge", "--limit", "1", "--families", "concurrent"]
     lengths = ["--unit", "mm", "--scale", "0.5"]
     assert main([*line, *lengths, "--jobs", "1", "--out", str(out), "-q"]) == Exit.GOOD
     rows = {row["source_name"]: row for row in rows_of(out, "objects")}

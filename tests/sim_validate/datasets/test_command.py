@@ -13,7 +13,7 @@ from sim_validate.main import main
 from tests.sim_validate.datasets.engines import contents
 
 pytest.importorskip("pyarrow")
-LIGHT = ("--friction", "0.5", "--family", "concurrent", "--limit", "1")
+LIGHT = ("--frictions", "0.5", "--families", "concurrent", "--limit", "1")
 OBJECTS = ("tetrahedron", "wedge")
 
 
@@ -69,7 +69,7 @@ def test_a_toml_file_says_the_same_as_flags(dataset, tmp_path):
 def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "bad.stl").write_text("solid nothing")
-    names = ["tetrahedron", str(tmp_path / "meshes"), "--friction", "0.4", *LIGHT]
+    names = ["tetrahedron", str(tmp_path / "meshes"), *LIGHT, "--frictions", "0.4,0.5"]
     code = main(["dataset", "build", *names, "--out", str(tmp_path / "ds")])
     assert code == Exit.PARTIAL
     assert "quarantine.jsonl" in capsys.readouterr().err

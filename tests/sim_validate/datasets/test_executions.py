@@ -19,7 +19,6 @@ from sim_validate.datasets.figures import execution_cells, execution_rows
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import TABLES, GraspRow
 from sim_validate.datasets.verify import Sample, loose_differences, verify
-from sim_validate.execution.settings import AskedExecution
 from sim_validate.execution.verdict import CLEAR_OF_SLIP, ExecutedGrasp
 from tests.sim_validate.datasets.configs import rows_of
 from tests.sim_validate.datasets.engines import Here, silent
@@ -29,7 +28,7 @@ pytest.importorskip("pyarrow")
 SETTINGS = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
 CONFIG = DatasetConfig(
     objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
-    execution=AskedExecution(SETTINGS),
+    execution=SETTINGS,
 )  # fmt: skip
 
 

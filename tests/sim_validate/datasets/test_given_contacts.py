@@ -116,7 +116,7 @@ def test_what_is_open_lets_go_and_what_is_off_the_object_is_not_tried(planned, t
 @pytest.mark.usefixtures("built_here")
 def test_the_command_judges_a_file(planned, tmp_path):
     path = written(tmp_path / "g.json", planned[:1])
-    flags = ["--friction", "0.5", "--out", str(tmp_path / "ds"), "-q"]
+    flags = ["--frictions", "0.5", "--out", str(tmp_path / "ds"), "-q"]
     assert main(["dataset", "import", str(path), "wedge", *flags]) == Exit.GOOD
     assert main(["dataset", "verify", str(tmp_path / "ds"), "--share", "1"]) == Exit.GOOD
 

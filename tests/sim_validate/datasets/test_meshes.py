@@ -58,7 +58,7 @@ def test_a_stored_surface_whose_first_line_is_no_record_is_refused_by_field(tmp_
     with pytest.raises(gc.InputError, match="obj: caps must be numbers of triangles below 192"):
         stored_body(tmp_path, body.content_sha256, "capped", "auto")
     path.write_text(text.replace('"holes": 2', '"holes": "two"'))
-    with pytest.raises(gc.InputError, match=r"obj: first line: holes: expected a whole"):
+    with pytest.raises(gc.InputError, match=r"obj: first line: holes must be a whole"):
         stored_body(tmp_path, body.content_sha256, "capped", "auto")
 
 

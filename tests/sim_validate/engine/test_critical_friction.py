@@ -11,8 +11,8 @@ from scenes.mujoco.closure_scene import build_scene
 from sim_validate.engine import schedules
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.limits import bisected, forces_just_above, released_friction
-from sim_validate.engine.schedules import FrictionProtocol
 from sim_validate.engine.setup import Setup
+from sim_validate.settings.trials import FrictionProtocol
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 

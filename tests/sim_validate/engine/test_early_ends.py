@@ -9,15 +9,10 @@ import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
 from sim_validate.engine.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds
 from sim_validate.engine.limits import part
-from sim_validate.engine.schedules import (
-    FrictionProtocol,
-    HoldProtocol,
-    Load,
-    hold,
-    release,
-)
+from sim_validate.engine.schedules import Load, hold, release
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
+from sim_validate.settings.trials import FrictionProtocol, HoldProtocol
 from tests.marks import more
 from tests.sim_validate.engine.test_traces import pose
 from tests.sim_validate.engine.whole_and_early import compared

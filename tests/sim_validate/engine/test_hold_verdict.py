@@ -5,8 +5,8 @@ import pytest
 
 import scenes
 from sim_validate.engine.bench import Health
-from sim_validate.engine.schedules import HoldProtocol
 from sim_validate.engine.traces import Outcome, Trace, judge
+from sim_validate.settings.trials import HoldProtocol
 from tests.sim_validate.rigs import grasps
 
 

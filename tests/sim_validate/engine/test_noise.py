@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 from grasp_core.closure.contacts import contact_frames
 from grasp_core.objects.on_faces import face_under
 from sim_validate.closure.noise import disturbed
-from sim_validate.engine.setup import Noise
-from sim_validate.kit import flag_groups
+from sim_validate.settings.trials import Noise
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
@@ -112,9 +111,3 @@ def test_a_draw_depends_on_seed_and_number_only():
     twice = disturbed(body, grasp, 0.5, dataclasses.replace(Noise(), friction=0.1), 0, 1)
     assert math.log(twice.friction / 0.5) == pytest.approx(2.0 * math.log(one.friction / 0.5))
     assert twice.mass == one.mass
-
-
-def test_the_flags_are_the_same_noise():
-    given = flag_groups.Repeats()
-    for name, value in dataclasses.asdict(Noise()).items():
-        assert getattr(given, f"noise_{name}") == value

@@ -3,12 +3,8 @@ import pytest
 
 from sim_validate.engine import schedules
 from sim_validate.engine.limits import OVERLOAD, part
-from sim_validate.engine.schedules import (
-    FrictionProtocol,
-    HoldProtocol,
-    LimitProtocol,
-    Load,
-)
+from sim_validate.engine.schedules import Load
+from sim_validate.settings.trials import FrictionProtocol, HoldProtocol, LimitProtocol
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
 SAMPLE_S, STILL = 0.01, Load(np.zeros(6), np.full((4, 3), 5.0))

@@ -11,9 +11,10 @@ from sim_validate.engine import schedules
 from sim_validate.engine.bench import CHUNK, Bench
 from sim_validate.engine.limits import part
 from sim_validate.engine.rig import squeezed
-from sim_validate.engine.schedules import HoldProtocol, Load
+from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
+from sim_validate.settings.trials import HoldProtocol
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 
 BLOW_UP = np.full(6, 1e14)

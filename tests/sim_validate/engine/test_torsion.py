@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.closure.setup_toml import setup_from_tables, tables_of
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import measured_gate, require_faithful
@@ -131,7 +131,7 @@ def agree_on(body, found):
         assert verdict.controls
         assert verdict.controls_let_go
         critical = verdict.critical_friction
-        expected = gc.critical_friction(grasp, torsion_m=setup.torsion_m)
+        expected = gc.critical_friction(grasp, torsion_m=setup.physics.torsion_m)
         assert critical.predicted == expected <= grasp.critical_friction * (1.0 + ROUNDED)
         if expected > RESISTED:
             assert critical.simulated == pytest.approx(expected, rel=AGREED)
@@ -150,13 +150,15 @@ def test_hard_predictions_miss_what_soft_fingertips_hold():
     given = {"max_normal_force": setup.fingers.max_normal_force_n, "center": body.center_of_mass}
     loads = np.vstack([np.eye(6)[3:], -np.eye(6)[3:]])
     hard = gc.wrench_limits(grasp, None, FRICTION, loads, **given)
-    held = gc.wrench_limits(grasp, None, FRICTION, loads, torsion_m=setup.torsion_m, **given)
+    held = gc.wrench_limits(
+        grasp, None, FRICTION, loads, torsion_m=setup.physics.torsion_m, **given
+    )
     assert max(s.limit / h.limit for h, s in zip(hard, held, strict=True)) > 1.0 + 10 * AGREED
 
 
 def test_a_setup_file_and_its_tables_hold_torsion():
     setup = setup_from_tables({"physics": {"torsion_m": 0.002}}, Setup(), "setup.toml")
-    assert setup.torsion_m == 0.002
+    assert setup.physics.torsion_m == 0.002
     again = setup_from_tables(tables_of(setup), Setup(), "setup.toml")
     assert again.physics == setup.physics
 

@@ -5,9 +5,10 @@ import pytest
 
 from sim_validate.engine.bench import Health
 from sim_validate.engine.limits import _onset, bisected_limits, ramped_limits
-from sim_validate.engine.schedules import LimitProtocol, Load
+from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Trace
+from sim_validate.settings.trials import LimitProtocol
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")

@@ -19,7 +19,7 @@ from sim_validate.kit.about_object import AboutObject
 
 SETTINGS = sv.ExecutionSettings(
     mass_kg=0.3, trials=("shake", "lift"), seed=7, shake_g=0.0, knock_n_s=0.02,
-    hand=scenes.HeldSettings(tip_mass_kg=0.02, damping_ratio=0.7, down=(1.0, 0.0, -1.0)),
+    tip_mass_kg=0.02, damping_ratio=0.7, down=(1.0, 0.0, -1.0),
 )  # fmt: skip
 LOST = ExecutionTrial(
     "lift", "lift", False, "dropped", 0.01, 0.2, 1.0 / 3.0, 0.4, 0.45, 0.41, 0.00125

@@ -37,7 +37,8 @@ def opposed(aside=0.02):
 
 @cache
 def box_scene(push=5.0, friction=0.5, stiffness=2000.0, mass=MASS):
-    return scenes.build_held_scene(box(), box_grip(push, friction, stiffness), mass)
+    held = scenes.HeldSettings(mass_kg=mass)
+    return scenes.build_held_scene(box(), box_grip(push, friction, stiffness), held)
 
 
 @cache

@@ -88,8 +88,8 @@ def test_an_object_that_is_let_go_falls():
 def test_a_held_object_swings_at_its_natural_frequency():
     """Struck across the pushes, it crosses its place after half of the damped period of
     M = m + 4 m_t on four springs. The integrator adds omega h / 2 = 0.08 to the damping ratio."""
-    light = scenes.HeldSettings(damping_ratio=0.05)
-    scene = scenes.build_held_scene(box(), box_grip(), MASS, settings=light)
+    light = scenes.HeldSettings(mass_kg=MASS, damping_ratio=0.05)
+    scene = scenes.build_held_scene(box(), box_grip(), light)
     strike = np.zeros((100, 6))
     strike[0, 2] = 2.0
     bench = HeldBench(scene)
@@ -202,7 +202,9 @@ def test_a_finger_that_meets_nothing_pushes_nothing():
 
 def test_a_sample_must_be_a_number_of_steps():
     physics = replace(box_scene().physics, timestep=0.002)
-    scene = scenes.build_held_scene(box(), box_grip(), MASS, physics=physics)
+    scene = scenes.build_held_scene(
+        box(), box_grip(), scenes.HeldSettings(mass_kg=MASS), physics=physics
+    )
     with pytest.raises(gc.InputError, match=r"timestep must divide .* 0\.00125"):
         HeldBench(scene)
 

@@ -2,8 +2,7 @@
 
 import json
 import re
-from dataclasses import MISSING, fields, replace
-from typing import get_args
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -13,15 +12,12 @@ import scenes
 import sim_validate as sv
 from grasp_core.errors import UnfaithfulError
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held import HeldSettings
 from sim_validate import run
 from sim_validate.execution import jobs
 from sim_validate.execution.execute import execute
-from sim_validate.execution.settings import ExecutionSettings, TrialKind
-from sim_validate.kit import command_flags
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.flag_groups import DENSITY_KG_M3, TRIALS, UPRIGHT, Executing, Tips
 from sim_validate.main import main
+from sim_validate.settings.executions import ExecutionSettings
 
 QUICK = ["--trials", "knock"]
 IDS = ("c-0-1-2-7", "p-0-7-1-5")
@@ -156,32 +152,15 @@ def test_every_flag_reaches_the_settings(here):
     words = [word for name, value in flags.items() for word in (f"--{name}", str(value))]
     found = settings_of(here, *words, "--trials", "shake", "--down", "1", "0", "0")
     assert found == ExecutionSettings(
-        mass_kg=0.2, push_n=12.0, stiffness_n_per_m=3000.0, tip_radius_m=0.003,
-        hand=HeldSettings(tip_mass_kg=0.04, damping_ratio=0.6, down=(1.0, 0.0, 0.0)),
+        mass_kg=0.2, push_n=12.0, tip_stiffness_n_per_m=3000.0, tip_radius_m=0.003,
+        tip_mass_kg=0.04, damping_ratio=0.6, down=(1.0, 0.0, 0.0),
         trials=("shake",), lift_m=0.1, lift_s=0.5, shake_g=0.5, shake_hz=6.0, stop_m_per_s2=9.0,
         stop_from_m_per_s=0.4, knock_n_s=0.01, off_mm=1.0, off_deg=1.5, misplacements=2, seed=5,
-        most_mm=6.0, most_deg=7.0,
+        max_mm=6.0, max_deg=7.0,
     )  # fmt: skip
     plain = ExecutionSettings(mass_kg=0.3)
-    assert all(getattr(found, each.name) != getattr(plain, each.name) for each in fields(found))
-
-
-def test_the_defaults_of_flags_are_those_of_the_settings():
-    plain, hand = ExecutionSettings(mass_kg=1.0), HeldSettings()
-    other = {"max_mm": "most_mm", "max_deg": "most_deg",
-             "tip_stiffness_n_per_m": "stiffness_n_per_m"}  # fmt: skip
-    for group in (Executing(), Tips()):
-        for each in fields(group):
-            if each.name not in {"mass", "tips"}:
-                holder = hand if hasattr(hand, each.name) else plain
-                wanted = getattr(holder, other.get(each.name, each.name))
-                assert getattr(group, each.name) == wanted, each.name
-    assert hand.down == UPRIGHT
-    assert get_args(TrialKind) == TRIALS
-    assert DENSITY_KG_M3 == 1000.0
-    shared = {each.name: each.default for each in fields(command_flags.Execute)}
-    assert shared["trials"] == ()
-    assert shared["grasps"] is MISSING
+    names = {each.name for each in fields(found)} - {"density_kg_m3"}
+    assert all(getattr(found, name) != getattr(plain, name) for name in names)
 
 
 def test_a_file_of_flags_and_a_file_of_physics(here):
@@ -208,7 +187,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("flags", REFUSED)
 def test_flags_that_make_no_sense_are_refused_before_anything_runs(here, capsys, flags):
-    (here / "fingers.toml").write_text("[fingers]\nradius_m = 0.01\n")
+    (here / "fingers.toml").write_text("[fingers]\nfingertip_radius_m = 0.01\n")
     (here / "gravity.toml").write_text("[physics]\ngravity = [0, 0, 0]\n")
     (here / "unknown.toml").write_text("[physics]\nspeed = 1\n")
     code, said = REFUSED[flags]
@@ -221,7 +200,7 @@ RUN = ["run", "tetrahedron", "--limit", "1", "--no-report", "--out", "r"]
 
 
 def test_run_executes_grasps_too_and_a_run_without_removes_the_file(here, capsys):
-    flags = ["--execute", "--mass-kg", "0.1", "--execute-trials", "stop", "--seed", "3"]
+    flags = ["--execute", "--mass-kg", "0.1", "--trials", "stop", "--seed", "3"]
     assert main([*RUN, *flags, "--json"]) == Exit.GOOD
     document = json.loads(capsys.readouterr().out)
     written = json.loads((here / "r" / "executions.json").read_text())
@@ -248,6 +227,6 @@ def test_a_run_has_a_report_where_executions_are_refused(here, capsys, monkeypat
 
 
 def test_run_refuses_flags_of_executions_without_any(here):
-    for flags in (["--mass-kg", "1"], ["--execute-trials", "lift"]):
+    for flags in (["--mass-kg", "1"], ["--trials", "lift"]):
         assert main([*RUN, *flags]) == Exit.USAGE
     assert not (here / "r").exists()

@@ -71,7 +71,7 @@ def test_a_run_of_short_steps_alone_agrees(bar):
 def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
     """Motions are joined where they were parted, with the speed that a stop begins with."""
     body, grasp = planned("box")
-    settings = sv.ExecutionSettings(MASSES[kind], trials=(kind,), most_mm=5e3, most_deg=180.0)
+    settings = sv.ExecutionSettings(MASSES[kind], trials=(kind,), max_mm=5e3, max_deg=180.0)
     best = chosen_squeeze(body, grasp, 0.5, settings)
     scene = held_scene(body, best.grip, settings)
     bench = HeldBench(scene)

@@ -20,7 +20,7 @@ MOVING = ("weight", "shake", "stop")
 LOST = {
     "heavy": ("wedge", {"mass_kg": 8.0}),
     "weak": ("box", {"mass_kg": 2.0, "push_n": 2.0}),
-    "soft": ("dodecahedron", {"mass_kg": 1.0, "push_n": 40.0, "stiffness_n_per_m": 700.0}),
+    "soft": ("dodecahedron", {"mass_kg": 1.0, "push_n": 40.0, "tip_stiffness_n_per_m": 700.0}),
     "knocked": ("l-bracket", {"mass_kg": 0.6, "push_n": 3.0, "trials": (*MOVING, "knock")}),
     "unstable": ("wedge", {"mass_kg": 0.3, "push_n": 300.0}),
 }
@@ -44,13 +44,13 @@ def lost(name):
 @pytest.mark.parametrize("name", LOST)
 def test_a_grasp_survives_with_what_is_said_to_be_enough(name):
     body, grasp, settings, enough = lost(name)
-    chosen = replace(settings, push_n=enough.push_n, stiffness_n_per_m=enough.stiffness_n_per_m)
+    chosen = replace(settings, push_n=enough.push_n, tip_stiffness_n_per_m=enough.stiffness_n_per_m)
     again = sv.execute(body, grasp, 0.5, chosen)
     assert again.survived, losses_in_words(again)
     assert again.enough is None
     assert again.load_multiple == enough.load_multiple
     assert again.least_predicted_loss == enough.predicted_loss >= CLEAR
-    assert enough.stiffness_n_per_m >= settings.stiffness_n_per_m
+    assert enough.stiffness_n_per_m >= settings.tip_stiffness_n_per_m
     assert (enough.push_n < settings.push_n) == (name in {"soft", "unstable"})
 
 
@@ -60,7 +60,7 @@ def test_the_push_is_the_least_for_loads_that_are_a_formula():
         0.5, push_n=3.0, trials=("shake",), shake_g=0.6, shake_hz=1.0, tip_radius_m=0.005
     )
     enough = sv.execute(box(), opposed(), 0.5, settings).enough
-    assert enough.stiffness_n_per_m == settings.stiffness_n_per_m
+    assert enough.stiffness_n_per_m == settings.tip_stiffness_n_per_m
     loads = gc.any_direction(0.5, 0.6 * G)
     least = gc.best_squeeze(box(), opposed(), 0.5, loads, stiffness=2000.0, tip_radius_m=0.005)
     assert least.verify()
@@ -73,9 +73,9 @@ def test_the_push_is_the_least_for_loads_that_are_a_formula():
 def test_the_stiffness_is_the_least_that_keeps_the_object_in_its_place():
     """A heavy object bends soft springs farther than it may go, whatever the push."""
     body, grasp, settings, enough = lost("heavy")
-    assert enough.stiffness_n_per_m > 1.5 * settings.stiffness_n_per_m
+    assert enough.stiffness_n_per_m > 1.5 * settings.tip_stiffness_n_per_m
     softer = enough.stiffness_n_per_m / 1.2
-    less = replace(settings, push_n=enough.push_n, stiffness_n_per_m=softer)
+    less = replace(settings, push_n=enough.push_n, tip_stiffness_n_per_m=softer)
     assert sv.execute(body, grasp, 0.5, less).least_predicted_loss < CLEAR
 
 
@@ -102,7 +102,7 @@ def test_a_hand_says_what_is_enough_within_its_torques():
     found = sv.execute_hand(hand, body, reach, FRICTION, weak)
     assert not found.survived
     enough = found.enough
-    again = replace(weak, push_n=enough.push_n, stiffness_n_per_m=enough.stiffness_n_per_m)
+    again = replace(weak, push_n=enough.push_n, tip_stiffness_n_per_m=enough.stiffness_n_per_m)
     assert sv.execute_hand(hand, body, reach, FRICTION, again).survived
 
 

@@ -9,7 +9,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from sim_validate.execution.execute import chosen_squeeze, held_scene
-from sim_validate.execution.settings import KINDS
+from sim_validate.settings.executions import KINDS
 from tests.grasp_core.execution.held import box
 from tests.scenes.meshes import dented_ball
 from tests.sim_validate.execution.held_rigs import G, opposed, planned
@@ -110,13 +110,13 @@ def test_thresholds_decide_what_counts_as_held():
     body, grasp = planned("box")
     near = replace(LIGHT, trials=("shake",))
     far = sv.execute(body, grasp, 0.5, near)
-    most_mm = 1000.0 * max(trial.displacement_m for trial in far.trials)
+    max_mm = 1000.0 * max(trial.displacement_m for trial in far.trials)
     most_deg = np.degrees(max(trial.turn_rad for trial in far.trials))
     assert most_deg > 0.0
     for limits, survived in [
-        ({"most_mm": 1.01 * most_mm, "most_deg": 1.01 * most_deg}, True),
-        ({"most_mm": 0.99 * most_mm}, False),
-        ({"most_deg": 0.99 * most_deg}, False),
+        ({"max_mm": 1.01 * max_mm, "max_deg": 1.01 * most_deg}, True),
+        ({"max_mm": 0.99 * max_mm}, False),
+        ({"max_deg": 0.99 * most_deg}, False),
     ]:
         found = sv.execute(body, grasp, 0.5, replace(near, **limits))
         assert found.survived is survived
@@ -171,7 +171,7 @@ def test_a_grasp_of_every_family_is_executed(family):
 def test_gravity_points_where_the_settings_say():
     """The shake under a weight across the pushes differs from one along them."""
     settings = replace(LIGHT, mass_kg=0.5, trials=("stop",), tip_radius_m=0.005)
-    along = replace(settings, hand=scenes.HeldSettings(down=(2.0, 0.0, 0.0)))
+    along = replace(settings, down=(2.0, 0.0, 0.0))
     across, pushed = (sv.execute(box(), opposed(), 0.5, each) for each in (settings, along))
     assert across.load_multiple == pushed.load_multiple
     gaps = [
@@ -188,7 +188,7 @@ def test_a_curved_surface_is_there_as_far_as_fingertips_come_and_no_farther():
     settings = sv.ExecutionSettings(mass_kg=0.1, trials=("weight", "misplaced"), off_mm=1.0)
     best = chosen_squeeze(body, grasp, 0.5, settings)
     near = held_scene(body, best.grip, settings).layout
-    all_of_it = replace(settings, most_deg=80.0)
+    all_of_it = replace(settings, max_deg=80.0)
     whole = held_scene(body, best.grip, all_of_it).layout
     assert 0 < len(near.solids) < 0.8 * len(whole.solids)
     away = settings.most_m + (settings.most_rad + 0.01) * body.radius

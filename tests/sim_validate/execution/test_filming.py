@@ -9,8 +9,8 @@ import grasp_core as gc
 from scenes.drawing.clips import GraphicsError
 from sim_validate.execution import jobs
 from sim_validate.execution.jobs import FRAMES, ExecutionJob, film, worth_seeing
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.settings.executions import ExecutionSettings
 from tests.scenes.drawing.whole import frames_of
 from tests.sim_validate.rigs import grasps
 

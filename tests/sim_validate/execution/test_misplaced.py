@@ -7,6 +7,7 @@ import trimesh
 from grasp_core.execution.grips import unsqueezed
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held import TOUCH, held_layout
+from scenes.settings import HeldSettings
 from sim_validate.execution import trials
 from sim_validate.execution.trials import ROOM, met, misplacements
 from tests.sim_validate.execution.held_rigs import planned
@@ -18,7 +19,7 @@ def layout_of(name):
     body, grasp = planned(name)
     radius = fitting_radius(body, grasp.positions, grasp.normals)
     grip = unsqueezed(body, grasp, 0.5, stiffness=2000.0, tip_radius_m=radius)
-    return held_layout(body, grip, 0.3)
+    return held_layout(body, grip, HeldSettings(mass_kg=0.3))
 
 
 def turn_of(quaternion):

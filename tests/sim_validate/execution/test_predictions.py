@@ -32,7 +32,8 @@ def predicted_slips(dynamics, drives):
 
 def dynamics_of(name, push=8.0):
     (grip,) = planned_grips((name,), limit=1, push=push, tip_radius_m=0.005)
-    scene = scenes.build_held_scene(scenes.example_object(name), grip, MASS)
+    held = scenes.HeldSettings(mass_kg=MASS)
+    scene = scenes.build_held_scene(scenes.example_object(name), grip, held)
     return held_dynamics(grip, scene.layout)
 
 
@@ -64,7 +65,7 @@ def integrated(dynamics, drive):
     jacobians = [np.hstack([np.eye(3), -cross_matrix(arm)]) for arm in grip.arms]
     m_t = layout.tip_mass_kg
     inertia = np.zeros((6, 6))
-    inertia[:3, :3], inertia[3:, 3:] = layout.mass_kg * np.eye(3), layout.inertia_kg_m2
+    inertia[:3, :3], inertia[3:, 3:] = layout.object_kg * np.eye(3), layout.inertia_kg_m2
     dampers = [
         axes @ np.diag(own) @ axes.T for axes, own in zip(layout.axes, layout.damping, strict=True)
     ]
@@ -81,7 +82,7 @@ def integrated(dynamics, drive):
         ]
         load = drive.wrenches[sample] - inertia @ palm
         load[3:] -= np.cross(o, layout.inertia_kg_m2 @ o)
-        load[:3] += layout.mass_kg * drive.gravity[sample]
+        load[:3] += layout.object_kg * drive.gravity[sample]
         load = load - m_t * sum(J.T @ a for J, a in zip(jacobians, bases, strict=True))
 
         def rate(_, y, load=load):

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.execution.settings import KINDS, TrialKind
+from sim_validate.settings.executions import KINDS, TrialKind
 
 
 def test_trials_are_put_in_order_and_counted_once():

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
@@ -16,6 +15,7 @@ from sim_validate.execution.verdict import (
     best_executed,
     ended,
 )
+from sim_validate.settings.executions import ExecutionSettings
 
 
 def trial(kind, survived, fate="stuck"):

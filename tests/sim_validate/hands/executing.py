@@ -23,5 +23,5 @@ def standing(name):
     reach, hand = stood(name)
     body, settings = scaled(OBJECT, RADIUS), hand_execution_settings(MASS)
     best = hand_squeeze(hand, body, reach, FRICTION, settings)
-    scene = held_hand_scene(hand, body, reach, best.grip, MASS, settings.hand)
+    scene = held_hand_scene(hand, body, reach, best.grip, settings)
     return reach, hand, scene, best

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.errors import InputError, UnfaithfulError
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.closure.verdict import AGREEMENT
 from sim_validate.hands.hand_gate import known_hand
 from sim_validate.hands.validate_hand import hand_setup

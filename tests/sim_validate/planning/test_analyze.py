@@ -44,7 +44,7 @@ def test_the_centers_of_a_tetrahedron(analyze):
 
 
 def test_what_is_resisted_in_every_direction_is_no_more_than_along_the_axes(analyze):
-    _, document = analyze(TETRAHEDRON, "--max-normal-force", "5")
+    _, document = analyze(TETRAHEDRON, "--max-normal-force-n", "5")
     (grasp,) = document["grasps"]
     weakest = grasp["weakest_axis_wrench"]
     everywhere = grasp["resisted_in_every_direction_n"]

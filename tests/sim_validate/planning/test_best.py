@@ -13,7 +13,7 @@ from sim_validate.kit.command_flags import Plan
 from sim_validate.main import main
 from sim_validate.planning.best_json import Best
 
-ASKED = ["plan", "tetrahedron", "--limit", "2", "--family", "concurrent", "--best"]
+ASKED = ["plan", "tetrahedron", "--limit", "2", "--families", "concurrent", "--best"]
 
 
 @pytest.fixture(scope="module")

@@ -149,7 +149,16 @@ def ring_around(contact, radius):
 
 
 def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
-    asked = ["run", "tetrahedron", "--limit", "1", "--family", "concurrent", "--out", str(tmp_path)]
+    asked = [
+        "run",
+        "tetrahedron",
+        "--limit",
+        "1",
+        "--families",
+        "concurrent",
+        "--out",
+        str(tmp_path),
+    ]
     assert main([*asked, "--regions", "--no-report", "-q"]) == Exit.GOOD
     (grasp,) = json.loads((tmp_path / "grasps.json").read_text())["grasps"]
     assert grasp["regions"][0]["kind"] == "certified"

@@ -355,7 +355,7 @@ def test_a_baseline_keeps_the_scale_of_its_part(odd, capsys):
     assert (record["unit"], record["scale"]) == ("m", ODD)
     code, said = run_pytest(odd)
     assert code == 0, said
-    assert main([*check, "--scale", "1"]) == Exit.INPUT
+    assert main([*check, "--changed-part.scale", "1"]) == Exit.INPUT
     said = capsys.readouterr().err
     assert "the unit of the changed part is not clear" in said
     assert "the scale if it has one" in said
@@ -383,7 +383,7 @@ def test_blessing_commands_and_markers_refuse_a_changed_part_too(project, capsys
     with pytest.raises(ChangedPartError):
         suite_from_toml(project / "part.grasps.toml").bless()
     baseline, grasps = str(project / "part.baseline.json"), str(project / "grasps.json")
-    asked = "--refuse-changed-part"
+    asked = "--changed-part.refuse"
     assert main(["baseline", "check", baseline, "--bless", asked]) == Exit.INPUT
     assert "part.obj: this is not the mesh that" in capsys.readouterr().err
     assert main(["baseline", "record", grasps, "-o", baseline, asked]) == Exit.INPUT
@@ -399,7 +399,8 @@ def test_commands_carry_grasps_over_and_name_the_face(project, capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert "1 within bands" in said
     assert f"part.obj has changed: {FACE} moved 1.00 mm outward" in said
-    assert main(["baseline", "check", baseline, "--distance-m", "0.0005"]) == Exit.NEGATIVE
+    near = ["--changed-part.distance-m", "0.0005"]
+    assert main(["baseline", "check", baseline, *near]) == Exit.NEGATIVE
     said = " ".join(capsys.readouterr().out.split())
     assert "1 gone" in said
     assert f"{FACE} moved 1.00 mm outward" in said
@@ -411,7 +412,7 @@ def test_commands_carry_grasps_over_and_name_the_face(project, capsys):
     assert main(["baseline", "check", baseline, "--object", other, "-q"]) == Exit.GOOD
     before = (project / "part.baseline.json").read_text()
     edited(project)
-    asked = ["--distance-m", "0.0005"]
+    asked = ["--changed-part.distance-m", "0.0005"]
     assert main(["baseline", "record", grasps, "-o", baseline, *asked]) == Exit.INPUT
     assert main(["baseline", "check", baseline, "--bless", "-q", *asked]) == Exit.INPUT
     assert (project / "part.baseline.json").read_text() == before

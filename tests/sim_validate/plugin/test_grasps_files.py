@@ -113,7 +113,7 @@ def test_blessing_keeps_what_the_baseline_was_made_with(blessed, tmp_path):
     task = {"wrenches": [{"name": "lift", "force_n": [0, 0, -0.1]}]}
     write_text(tmp_path / "task.json", json.dumps(task))
     grasps, baseline = (str(tmp_path / name) for name in ("grasps.json", "wedge.baseline.json"))
-    asked = ("--wrenches", str(tmp_path / "task.json"), "--trials", "2", "--seed", "7")
+    asked = ("--wrenches", str(tmp_path / "task.json"), "--repeats", "2", "--seed", "7")
     assert main(["baseline", "record", grasps, "-o", baseline, *asked, "-q"]) == Exit.GOOD
     before = (tmp_path / "wedge.baseline.json").read_text()
     code, said = run_pytest(tmp_path, "--grasp-bless")
@@ -125,7 +125,7 @@ def test_blessing_keeps_what_the_baseline_was_made_with(blessed, tmp_path):
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("trials = 2", "trials: 0 -> 2"),
+        ("repeats = 2", "repeats: 0 -> 2"),
         ("seed = 5", "seed: 0 -> 5"),
         ('wrenches = "task.json"', "wrenches.lift: None -> "),
         ('setup = "setup.toml"', "setup.hold.hold_s: 0.4 -> 0.3"),

@@ -36,14 +36,14 @@ import pytest
 pytestmark = pytest.mark.grasp(object="wedge")
 
 def test_good_enough(grasp_case, assert_stable):
-    assert_stable(grasp_case, min_margin=0.3, trials=3, min_pass_rate=0.5)
+    assert_stable(grasp_case, min_margin=0.3, repeats=3, min_pass_rate=0.5)
 
 def test_close_to_slipping(grasp_case, assert_stable):
     assert_stable(grasp_case, min_margin=0.49)
 
 def test_often_dropped(grasp_case, assert_stable):
-    from sim_validate.engine.setup import Noise
-    assert_stable(grasp_case, trials=8, noise=Noise(mass=0.5), min_pass_rate=0.99)
+    from sim_validate.settings.trials import Noise
+    assert_stable(grasp_case, repeats=8, noise=Noise(mass=0.5), min_pass_rate=0.99)
 """
 
 
@@ -115,8 +115,8 @@ def test_assert_stable_in_code(tmp_path):
 
 
 BAD_DEMANDS = [
-    ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `trials`, too"),
-    ("assert_stable(grasp_case, trials=2, min_pass_rate=80)", "from 0 up to 1, got 80"),
+    ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `repeats`"),
+    ("assert_stable(grasp_case, repeats=2, min_pass_rate=80)", "from 0 up to 1, got 80"),
     ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be a number from 0"),
     ("assert_stable(grasp_case, trial=2)", "no setting is named 'trial'; choose from wrenches"),
     ("assert_stable(grasp_case, wrenches=[[1, 2]])", "each item a NamedWrench"),

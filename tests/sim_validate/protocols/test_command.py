@@ -52,7 +52,7 @@ def test_a_test_without_loads_has_a_margin_of_null(wedge_plan, capsys):
 
 def test_fingers_that_hardly_push_fail_and_the_command_says_why(wedge_plan, capsys):
     """The weight of a decagram of push is nothing beside one newton."""
-    words = ["--protocol", "dexgraspbench", "--max-normal-force", "0.01", "--limit", "1"]
+    words = ["--protocol", "dexgraspbench", "--max-normal-force-n", "0.01", "--limit", "1"]
     assert main(["validate", str(wedge_plan), *words]) == Exit.NEGATIVE
     found = capsys.readouterr()
     assert "moved by" in found.err
@@ -113,7 +113,7 @@ def test_a_hand_is_judged_and_its_records_are_written(bracket_plan, tmp_path, ca
     assert all(each["hand"] == "allegro" for each in document["judgements"])
     good = all(e["theirs"] and e["held"] for e in document["judgements"])
     assert code == (Exit.GOOD if good and len(ids) == 2 else Exit.NEGATIVE)
-    assert reached["summary"]["complete"]
+    assert reached["complete"]
     assert not any("simulated" in each for each in reached["reaches"])
     assert "is not convex" in found.err
     names = sorted(path.name for path in (tmp_path / "records" / "graspdata").iterdir())

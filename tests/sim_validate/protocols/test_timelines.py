@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.mujoco.fingertips import FingerSettings
 from scenes.mujoco.tested import fingertip_scene
+from scenes.settings import FingerSettings
 from sim_validate.protocols.published import Step, protocol
 from sim_validate.protocols.runs import CHUNK, timeline
 from tests.grasp_core.hands.gripping import scaled

@@ -11,8 +11,8 @@ from sim_validate.report.report import write_report
 def small_run(tmp_path_factory):
     """The folder of a run of three grasps with certified regions and simulated limits."""
     folder = tmp_path_factory.mktemp("run")
-    asked = ["run", "wedge", "--limit", "3", "--family", "pencil", "--family", "concurrent"]
-    asked += ["--limits", "ramp", "--trials", "2", "--no-report", "-q"]
+    asked = ["run", "wedge", "--limit", "3", "--families", "pencil,concurrent"]
+    asked += ["--limits", "ramp", "--repeats", "2", "--no-report", "-q"]
     assert main([*asked, "--out", str(folder)]) == Exit.GOOD
     certify = ["regions", str(folder / "grasps.json"), "--max-cones", "64", "-q"]
     assert main([*certify, "--out", str(folder)]) == Exit.GOOD

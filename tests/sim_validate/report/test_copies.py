@@ -24,7 +24,7 @@ def planned(tmp_path_factory):
     """The folder of a plan with many copies, and with more cards than are drawn at first."""
     folder = tmp_path_factory.mktemp("planned")
     asked = ["plan", "octahedron", "--limit", "16", "--out", str(folder), "-q"]
-    assert main([*asked, "--family", "concurrent", "--family", "pencil"]) == Exit.GOOD
+    assert main([*asked, "--families", "concurrent,pencil"]) == Exit.GOOD
     return folder
 
 

@@ -13,11 +13,9 @@ import sim_validate as sv
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from scenes.mujoco.held import HeldSettings
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate import main as commands
 from sim_validate.execution.asked_executions import execution_settings
-from sim_validate.execution.settings import ExecutionSettings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -37,6 +35,7 @@ from sim_validate.report.drawn_grasps import Drawn
 from sim_validate.report.executed_grasps import execute_command, said_of_both
 from sim_validate.report.report import write_report
 from sim_validate.report.run_folder import runs_in
+from sim_validate.settings.executions import ExecutionSettings
 from tests.sim_validate.changing import changed, slipped
 from tests.sim_validate.report.test_report import EVIL, Page
 
@@ -253,8 +252,11 @@ def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
     [
         SETTINGS,
         ExecutionSettings(
-            0.1, 7.5, 950.0, 0.004, HeldSettings(0.02, 0.7, (0.1, -0.25, -1e-3)),
-            ("weight", "misplaced"), 0.1, 0.4, 2.0, 7.0, 9.0, 0.4, 0.01, 1.5, 3.0, 4, 17, 6.0, 7.0,
+            mass_kg=0.1, push_n=7.5, tip_stiffness_n_per_m=950.0, tip_radius_m=0.004,
+            tip_mass_kg=0.02, damping_ratio=0.7, down=(0.1, -0.25, -1e-3),
+            trials=("weight", "misplaced"), lift_m=0.1, lift_s=0.4, shake_g=2.0, shake_hz=7.0,
+            stop_m_per_s2=9.0, stop_from_m_per_s=0.4, knock_n_s=0.01, off_mm=1.5, off_deg=3.0,
+            misplacements=4, seed=17, max_mm=6.0, max_deg=7.0,
         ),
     ],
 )  # fmt: skip
@@ -267,5 +269,4 @@ def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monk
     (flags,) = asked
     assert (flags.friction, flags.grasp) == (0.35, "c-0-1-2-7")
     of = read_grasps(flags.grasps)
-    asked = of.body, flags.seed, of.finger, flags.executing, flags.trials, flags.down
-    assert execution_settings(*asked) == settings
+    assert execution_settings(flags.executing, of.body, flags.seed, of.finger) == settings

@@ -10,7 +10,7 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.changing import slipped
 
-NOISE = ("--noise-shift", ".02", "--noise-turn-deg", "3", "--noise-friction", ".3")
+NOISE = ("--noise.shift", ".02", "--noise.turn-deg", "3", "--noise.friction", ".3")
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_controls(folder, replay):
 
 def test_repeats_with_noise(folder, replay, tmp_path):
     grasps = (folder / "grasps.json", "--limit", "1")
-    repeats = ("--trials", "12", *NOISE, "--out", tmp_path, "-q")
+    repeats = ("--repeats", "12", *NOISE, "--out", tmp_path, "-q")
     assert main(["validate", *map(str, (*grasps, *repeats))]) == Exit.GOOD
     verdict = verdicts_in(tmp_path)[0]
     about = (tmp_path, "--grasps", folder / "grasps.json", "--grasp", verdict["id"])

@@ -5,10 +5,10 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.engine.gate import measured_gate, require_faithful, require_touch
-from sim_validate.engine.schedules import FrictionProtocol, HoldProtocol, LimitProtocol
 from sim_validate.engine.setup import Setup
+from sim_validate.settings.trials import FrictionProtocol, HoldProtocol, LimitProtocol
 from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
@@ -91,7 +91,7 @@ def test_nothing_is_validated_with_broken_settings():
 
 def test_the_gate_is_measured_once_for_the_same_settings():
     first = measured_gate(Setup())
-    fingers = scenes.FingerSettings(radius_m=0.01)
+    fingers = scenes.FingerSettings(fingertip_radius_m=0.01)
     assert measured_gate(Setup(threads=2, timeout_s=5.0, fingers=fingers)) is first
     assert measured_gate(Setup(physics=replace(GOOD, timestep=0.001))) is not first
 
@@ -105,7 +105,7 @@ def test_the_gate_passes_at_other_forces(force):
 
 def test_fingers_far_too_heavy_are_noticed():
     """A ton behind each fingertip does not move in half a second."""
-    assert not measured_gate(Setup(fingers=scenes.FingerSettings(mass_kg=1e6))).passed
+    assert not measured_gate(Setup(fingers=scenes.FingerSettings(fingertip_mass_kg=1e6))).passed
 
 
 @pytest.mark.parametrize("friction", [0.02, 2.0, *more(0.2)])
@@ -120,6 +120,6 @@ def test_frictions_at_which_the_simulator_fails_are_refused():
 
 def test_given_masses_and_stiffnesses_are_judged_at_the_size_of_the_object():
     """What suits an object of 7 cm: 2 kg and 1000 N/m are far too much or too little for others."""
-    fingers = scenes.FingerSettings(mass_kg=1.0, stiffness_n_per_m=1000.0)
+    fingers = scenes.FingerSettings(fingertip_mass_kg=1.0, stiffness_n_per_m=1000.0)
     assert measured_gate(Setup(fingers=fingers), radius_m=0.07).passed
     assert not measured_gate(Setup(fingers=fingers), radius_m=7e-4).passed

@@ -7,7 +7,8 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.mujoco.held import HeldSettings
+from scenes.mujoco.held import gravity_of
+from scenes.settings import HeldSettings
 from sim_validate.execution.gate import cases_of, measured_case, require_faithful_execution
 from tests.marks import MORE, more
 from tests.sim_validate.execution.gate.settings_of_gates import (
@@ -105,9 +106,8 @@ def test_no_grasp_is_executed_with_broken_settings():
     body = scenes.example_object("wedge")
     grasp, settings = held(body)
     contacts = [gc.Contact(each.position, each.normal) for each in grasp.contacts]
-    layout = scenes.build_held_scene(
-        body, gc.best_squeeze(body, contacts, 0.5, gc.any_direction(0.2), max_push_n=10.0).grip, 0.2
-    )
+    best = gc.best_squeeze(body, contacts, 0.5, gc.any_direction(0.2), max_push_n=10.0)
+    layout = scenes.build_held_scene(body, best.grip, scenes.HeldSettings(mass_kg=0.2))
     physics = replace(layout.physics, cone="pyramidal")
     with pytest.raises(gc.UnfaithfulError, match=r"no grasp is executed.*obliquely.*OUT OF TOL"):
         sv.execute(body, grasp, 0.5, settings, physics=physics)
@@ -122,8 +122,8 @@ def test_settings_are_measured_once_whatever_the_direction_of_gravity():
     scene = case.held_box()
     hand = HeldSettings(down=(1.0, 0.0, 0.0))
     (first,) = cases_of(scene.layout, scene.physics, HeldSettings(), 10.0)
-    turned = replace(scene.physics, gravity=tuple(hand.gravity.tolist()))
-    nearly = replace(scene.layout, mass_kg=1.001 * scene.layout.mass_kg)
+    turned = replace(scene.physics, gravity=tuple(gravity_of(hand).tolist()))
+    nearly = replace(scene.layout, object_kg=1.001 * scene.layout.object_kg)
     (second,) = cases_of(nearly, turned, hand, 10.0)
     assert measured_case(first) is measured_case(second)
     require_faithful_execution(scene.layout, scene.physics, HeldSettings(), 10.0)

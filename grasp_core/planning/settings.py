@@ -1,0 +1,54 @@
+"""Settings of plans: which grasps of an object are looked for, and how."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from grasp_core.kinds import (
+    METHODS,
+    ConeKind,
+    Count,
+    Friction,
+    Many,
+    Method,
+    NotNegative,
+    Quantity,
+    RankBy,
+    Seed,
+)
+from grasp_core.settings import Settings
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PlanSettings(Settings):
+    """Which grasps to plan."""
+
+    friction: Friction = 0.5
+    """Coulomb coefficient at every contact."""
+    families: Annotated[tuple[Method, ...], Many()] = METHODS
+    """Families of grasps to construct. `free` looks for grasps of any type on the faces that the
+    other families leave over. For faces without a grasp it proves that they have none, or says that
+    it is undecided."""
+    theta_deg: Quantity | None = None
+    """Half-angle of the friction cones to plan with [deg]; if not given, that of the friction
+    coefficient."""
+    cones: ConeKind = "tilted"
+    """Axes of the force cones that grasps are constructed with: only the face normals, as in the
+    paper, or tilted ones too, which serve boxes, prisms and any friction."""
+    limit: Count | None = None
+    """Keep at most this many grasps, the best ones; if not given, all."""
+    rank_by: RankBy = "radius"
+    """Which grasps are best: those with the largest discs, of each family in turn; with the least
+    critical friction; with the largest quality; that carry the largest mass in any orientation
+    under one squeeze of at most 10 N; or each next one the farthest from those before it."""
+    max_face_parts: Count = 1
+    """Number of parts into which the family `free` may divide the four faces while it is undecided.
+    """
+    complete: bool = False
+    """Divide the faces on which it is undecided whether a grasp exists, until each case is decided.
+    """
+    edge_clearance_m: NotNegative = 0.0
+    """How far contacts and their regions stay from the edges of their faces [m]."""
+    share_faces_m: NotNegative | None = None
+    """Let two fingers stand on one face, at least this far apart [m]."""
+    seed: Seed = 0
+    """Seed of all random choices."""
