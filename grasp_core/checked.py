@@ -6,6 +6,7 @@ command-line flags can use the same bounds.
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -31,6 +32,33 @@ SHOWN = 60
 """Largest number of characters of a refused value that a message shows."""
 
 
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Ends of a range of numbers; without an upper end numbers must be finite."""
+
+    above: float | None = None
+    least: float | None = None
+    below: float | None = None
+    most: float | None = None
+
+    def holds(self, value: float) -> bool:
+        """Return whether a number is in the range."""
+        inside = math.isfinite(value) if self.most is None else value <= self.most
+        return (
+            inside
+            and (self.above is None or value > self.above)
+            and (self.least is None or value >= self.least)
+            and (self.below is None or value < self.below)
+        )
+
+    def __str__(self) -> str:
+        """Return the ends in words."""
+        words = {"above": "above", "least": "from", "below": "below", "most": "up to"}
+        ends = {word: getattr(self, name) for name, word in words.items()}
+        return " ".join(f"{word} {end:g}" for word, end in ends.items()
+                        if end is not None and not math.isinf(end))  # fmt: skip
+
+
 def number(
     value: Any,
     name: str,
@@ -43,12 +71,10 @@ def number(
 ) -> float:
     """Check that a value is a number in a range; it is finite unless `most` is infinite."""
     real = not isinstance(value, bool) and isinstance(value, Real)
-    size = _as_float(value) if real else math.nan
-    inside = math.isfinite(size) if most is None else size <= most
-    inside &= (above is None or size > above) and (least is None or size >= least)
-    if not (inside and (below is None or size < below)):
-        ends = _ends(above=above, least=least, below=below, most=most)
-        raise InputError(f"{name} must be a number{ends}{where}, got {shown(value)}")
+    size, ends = _as_float(value) if real else math.nan, Range(above, least, below, most)
+    if not ends.holds(size):
+        said = f"{name} must be a number {ends}".rstrip()
+        raise InputError(f"{said}{where}, got {shown(value)}")
     return size
 
 
@@ -155,10 +181,3 @@ def _as_float(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
-
-
-def _ends(**ends: float | None) -> str:
-    words = {"above": "above", "least": "from", "below": "below", "most": "up to"}
-    said = [f"{words[name]} {end:g}" for name, end in ends.items()
-            if end is not None and not math.isinf(end)]  # fmt: skip
-    return "".join(f" {part}" for part in said)

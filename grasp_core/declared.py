@@ -15,7 +15,7 @@ that a copy equals its original. Fields that are declared with `compare=False` d
 imported here, since command-line help waits for it.
 """
 
-from collections.abc import Mapping, Sized
+from collections.abc import Callable, Mapping, Sized
 from dataclasses import MISSING, Field, fields
 from functools import cache
 from textwrap import shorten
@@ -37,6 +37,10 @@ SHORT_VECTOR = 6
 NOTHING = 1e-12
 """Share of a vector's largest number below which a number is shown as zero."""
 Item = TypeVar("Item")
+Draw = Callable[[Any], str | None]
+"""A function that returns the HTML of a value, or None where it has no picture of it."""
+_DRAWN_WITH: list[Draw] = []
+"""The function that was handed over, or none."""
 
 
 class FieldError(InputError):
@@ -163,12 +167,10 @@ def plan(kind: type, *, exact: bool = False) -> Plan:
     takers = tuple((name, takes(each, exact=exact)) for name, each in types(kind).items())
     shapes = ((name, getattr(rule, "shape", ()))
               for name, each in types(kind).items() for rule in rules(each))  # fmt: skip
-    lettered = tuple((name, shape) for name, shape in shapes if any(map(_is_text, shape)))
+    lettered = tuple(
+        (name, shape) for name, shape in shapes if any(isinstance(n, str) for n in shape)
+    )
     return Plan(takers, lettered)
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
 
 
 def rules(kind: Any) -> tuple[Any, ...]:
@@ -188,6 +190,14 @@ def trusted(kind: type[Item], /, **given: Any) -> Item:
     made, put = object.__new__(kind), object.__setattr__
     for name in given:
         put(made, name, given[name])
+    return made
+
+
+def altered(value: Item, /, **given: Any) -> Item:
+    """Copy a frozen value with some other fields, which were checked before, unchecked."""
+    made, put = object.__new__(type(value)), object.__setattr__
+    for name in cast("Any", value).__dataclass_fields__:
+        put(made, name, given[name] if name in given else getattr(value, name))
     return made
 
 
@@ -276,3 +286,28 @@ def vector(value: Any) -> str:
     sizes = [float(x) for x in value]
     nothing = NOTHING * max(map(abs, sizes), default=0.0)
     return f"({', '.join(f'{0.0 if abs(x) < nothing else x:.6g}' for x in sizes)})"
+
+
+class InNotebooks:
+    """Base of values that show a picture at the end of a notebook's cell.
+
+    A package that stands on this one draws it: `scenes` hands over a function when it is imported,
+    and values ask for it. Without `scenes` notebooks show `repr`.
+    """
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str | None:
+        """Return HTML with a picture; None where there is none, so that notebooks show `repr`."""
+        try:
+            return self._html()
+        except Exception:  # a picture that fails must not hide the value, which still has a text
+            return None
+
+    def _html(self) -> str | None:
+        return _DRAWN_WITH[0](self) if _DRAWN_WITH else None
+
+
+def draw_with(draw: Draw) -> None:
+    """Hand over the function that draws values; a second one takes the place of the first."""
+    _DRAWN_WITH[:] = [draw]

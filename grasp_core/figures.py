@@ -13,11 +13,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, NamedTuple, cast
 
 from grasp_core.declared import rules
-from grasp_core.files.records import entries, inside_record, property_kinds
-from grasp_core.kinds import words
+from grasp_core.files.records import entries, property_kinds
 
 NONE = "-"
 """What a cell shows where there is no figure."""
@@ -235,49 +234,3 @@ def unit_of(name: str) -> str:
     parts = name.split("_")
     ends = ("_".join(parts[start:]) for start in range(1, len(parts)))
     return next((UNITS[end] for end in ends if end in UNITS), "")
-
-
-class Part(NamedTuple):
-    """An object of a file: where it stands, and what its keys mean."""
-
-    where: str
-    kind: type
-    rows: tuple[tuple[str, str], ...]
-
-
-def described(kind: type) -> list[Part]:
-    """Describe a file: its record, and the records inside it, each once and in their order."""
-    parts: list[Part] = []
-    waiting: list[tuple[str, type]] = [("", kind)]
-    for where, each in waiting:
-        if all(each is not known.kind for known in parts):
-            rows, inner = _rows_of(each, where)
-            parts.append(Part(where, each, tuple(rows)))
-            waiting += inner
-    return parts
-
-
-def _rows_of(kind: type, where: str) -> tuple[list[tuple[str, str]], list[tuple[str, type]]]:
-    """Return the keys of a record with their meaning, and the records inside it."""
-    own, properties = entries(kind)
-    rows: list[tuple[str, str]] = []
-    inner: list[tuple[str, type]] = []
-    for each in (*own, *properties):
-        found = record_within(each.kind)
-        if each.flat is not None:
-            more, deeper = _rows_of(each.flat, where)
-            rows, inner = rows + more, inner + deeper
-            continue
-        said = meanings(kind).get(each.name, "")
-        if found is not None:
-            inner.append((f"{where}.{each.key}".lstrip("."), found))
-            said = said or (found.__doc__ or "").partition("\n")[0]
-        rows.append((each.key, said or words(each.kind)))
-    return rows, inner
-
-
-def record_within(kind: Any) -> type | None:
-    """Return the class of the records that a kind holds, also as items or values; or None."""
-    own = inside_record(kind)
-    inner = (record_within(part) for part in get_args(kind))
-    return own or next((found for found in inner if found is not None), None)

@@ -23,6 +23,7 @@ from grasp_core.checked import (
     MOST_EDGES,
     MOST_SEED,
     SMALLEST,
+    Range,
 )
 
 Take = Callable[[Any], Any]
@@ -31,33 +32,6 @@ Take = Callable[[Any], Any]
 
 class UnfitError(ValueError):
     """Error for a value that is not of a kind; its text says why, where the kind's words do not."""
-
-
-@dataclass(frozen=True, slots=True)
-class Range:
-    """Ends of a range of numbers; without an upper end numbers must be finite."""
-
-    above: float | None = None
-    least: float | None = None
-    below: float | None = None
-    most: float | None = None
-
-    def holds(self, value: float) -> bool:
-        """Return whether a number is in the range."""
-        inside = math.isfinite(value) if self.most is None else value <= self.most
-        return (
-            inside
-            and (self.above is None or value > self.above)
-            and (self.least is None or value >= self.least)
-            and (self.below is None or value < self.below)
-        )
-
-    def __str__(self) -> str:
-        """Return the ends in words."""
-        words = {"above": "above", "least": "from", "below": "below", "most": "up to"}
-        ends = {word: getattr(self, name) for name, word in words.items()}
-        return " ".join(f"{word} {end:g}" for word, end in ends.items()
-                        if end is not None and not math.isinf(end))  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,10 +161,6 @@ def takes(kind: Any, *, exact: bool = False) -> Take:
     return (EXACT if exact else PLAIN).get(kind) or _instance(origin or kind, exact)
 
 
-def _any(value: Any) -> Any:
-    return value
-
-
 def _if(allowed: Callable[[Any], bool]) -> Take:
     def take(value: Any) -> Any:
         if not allowed(value):
@@ -285,8 +255,8 @@ def _none(value: Any) -> None:
 
 
 PLAIN: Mapping[Any, Take] = {
-    Any: _any, float: _numbers(endless=False), int: _whole, Path: _path, type(None): _none,
-    bool: _if(lambda value: isinstance(value, bool)),
+    Any: lambda value: value, float: _numbers(endless=False), int: _whole, Path: _path,
+    type(None): _none, bool: _if(lambda value: isinstance(value, bool)),
     str: _if(lambda value: isinstance(value, str)),
 }  # fmt: skip
 EXACT: Mapping[Any, Take] = {

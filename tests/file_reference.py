@@ -6,8 +6,11 @@ The page has a line `<!-- fields: verdicts.json -->` where the tables of a file 
 
 import re
 from pathlib import Path
+from typing import Any, NamedTuple, get_args
 
-from grasp_core.figures import described
+from grasp_core.figures import meanings
+from grasp_core.files.records import entries, inside_record
+from grasp_core.kinds import words
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.rows import TABLES, dataset_tables
@@ -23,6 +26,52 @@ IN_FILES = re.compile(r"\b(None|NaN)\b")
 """What JSON lacks: files have null there."""
 COLUMNS = re.compile(r"(<!-- columns: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 MARKED = re.compile(r"(<!-- fields: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
+
+
+class Part(NamedTuple):
+    """An object of a file: where it stands, and what its keys mean."""
+
+    where: str
+    kind: type
+    rows: tuple[tuple[str, str], ...]
+
+
+def described(kind: type) -> list[Part]:
+    """Describe a file: its record, and the records inside it, each once and in their order."""
+    parts: list[Part] = []
+    waiting: list[tuple[str, type]] = [("", kind)]
+    for where, each in waiting:
+        if all(each is not known.kind for known in parts):
+            rows, inner = _rows_of(each, where)
+            parts.append(Part(where, each, tuple(rows)))
+            waiting += inner
+    return parts
+
+
+def _rows_of(kind: type, where: str) -> tuple[list[tuple[str, str]], list[tuple[str, type]]]:
+    """Return the keys of a record with their meaning, and the records inside it."""
+    own, properties = entries(kind)
+    rows: list[tuple[str, str]] = []
+    inner: list[tuple[str, type]] = []
+    for each in (*own, *properties):
+        found = record_within(each.kind)
+        if each.flat is not None:
+            more, deeper = _rows_of(each.flat, where)
+            rows, inner = rows + more, inner + deeper
+            continue
+        said = meanings(kind).get(each.name, "")
+        if found is not None:
+            inner.append((f"{where}.{each.key}".lstrip("."), found))
+            said = said or (found.__doc__ or "").partition("\n")[0]
+        rows.append((each.key, said or words(each.kind)))
+    return rows, inner
+
+
+def record_within(kind: Any) -> type | None:
+    """Return the class of the records that a kind holds, also as items or values; or None."""
+    own = inside_record(kind)
+    inner = (record_within(part) for part in get_args(kind))
+    return own or next((found for found in inner if found is not None), None)
 
 
 def tables_of(file: str, known: dict[type, str]) -> str:

@@ -20,7 +20,7 @@ HEAVY = (
     "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
     "mujoco", "resvg_py",
 )  # fmt: skip
-NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "pydantic", "scipy.spatial", "scipy.optimize")
+NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "scipy.spatial", "scipy.optimize")
 
 NOT_TO_PLAN_AGAIN = (
     *NOT_TO_PLAN, "highspy", "clarabel", "resvg_py", "PIL", "pyarrow", "jinja2",

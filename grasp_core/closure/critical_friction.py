@@ -17,7 +17,7 @@ enters the program only through the balance, whose multiplier is the twist, so t
 
 v_i being the velocity of contact i under the twist. Newton's method says where to try next.
 
-A compiled search of the same kind comes first (see `critical_friction_kernel`). The forces and the
+A compiled search of the same kind comes first (see `margin_kernel`). The forces and the
 twist that it finds are checked like all others; where there are none, or their interval is not
 narrow, `friction_search` goes program by program, with proofs in rational arithmetic. With torsion,
 `soft_closure` searches below what hard fingers need.

@@ -36,7 +36,7 @@ from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
 from grasp_core.solvers.conic import ConicProgram, minimize
 
-KERNEL = "grasp_core.closure.critical_friction_kernel"
+KERNEL = "grasp_core.closure.margin_kernel"
 """Kernel of the search for critical friction, which solves the same program at many frictions."""
 SIGN_SHARE = 0.1
 """Gap, as in `margin_kernel`, that may be left where only the sign of a margin is asked for."""

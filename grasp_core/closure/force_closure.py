@@ -31,7 +31,7 @@ made explicit; the cone program is standard.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated
 
@@ -224,6 +224,9 @@ def force_closure(
     if answer.closed is False:
         wrench = to_origin(answer.twist, center, size)
     if answer.closed is not None:
+        for array in (points, units, forces, wrench, torques):
+            if array is not None:
+                array.setflags(write=False)
         made = partial(
             trusted, ClosureCertificate, closed=answer.closed, positions=points, normals=units,
             friction=mu, forces=forces, separating_wrench=wrench, torsion_m=torsions,
@@ -232,7 +235,7 @@ def force_closure(
         # a caution above one leaves room for `verify` to round otherwise on another processor
         found = made(margin=made(margin=0.0).proved(CAUTION))
         if found.verify():
-            return replace(found)
+            return found
     if abs(answer.margin) < UNSAFE:
         raise UndecidedError(
             f"the closure margin is {answer.margin:.2g}, too close to zero to decide; change the "

@@ -2,8 +2,8 @@
 
 Fingers squeeze with forces that balance, and whose commands stay as they are when loads come.
 Given the response of the grip, what a squeeze survives are rows that are linear in the squeeze, the
-scale s of the loads and the limit N on pushes (see `squeeze_rows`). So the largest scale for a
-limit, and the least limit for the scale one, are linear programs with a row for every contact and
+scale s of the loads and the limit N on pushes (see `squeeze_certificate`). So the largest scale for
+a limit, and the least limit for the scale one, are linear programs with a row for every contact and
 tangent direction. The response depends on the squeeze, but only through the geometric stiffness:
 each round takes the response anew at the squeeze found so far, solves the program, and adds the
 rows that the squeeze found breaks most. Of equal optima the one nearest to zero is taken
@@ -28,8 +28,14 @@ from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import LoadSet
-from grasp_core.execution.squeeze_certificate import ROUNDING, BestSqueeze, no_scale
-from grasp_core.execution.squeeze_rows import Cuts, Rows, Survival
+from grasp_core.execution.squeeze_certificate import (
+    ROUNDING,
+    BestSqueeze,
+    Cuts,
+    Rows,
+    Survival,
+    no_scale,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize

@@ -15,7 +15,7 @@ contains zero, with f = 0. The mass m is held under d if (m d, d) is in C, and h
     m is held in every orientation if S(m) contains the unit ball.                      (3)
 
 *A mass that is held.* Points v of S(m), each with its forces, whose hull contains the unit ball
-prove (3); `ball_in_hull` shows that by triangles.
+prove (3); `ball_in` of `payload` shows that by triangles.
 
 *A mass that is not.* For any twist y and multipliers u of the joints,
 
@@ -90,9 +90,9 @@ from grasp_core.checked import SMALLEST, number
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.declared import Declared, summary
-from grasp_core.execution.ball_in_hull import ball_in, nearest_facet, outward
 from grasp_core.execution.grips import Bounded
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.execution.payload import FIRST, ball_in, nearest_facet, outward
 from grasp_core.kinds import Quantity, Range
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import HELD, WrenchBody
@@ -121,8 +121,6 @@ WEAKER, TIMES = 1e-3, 3
 """Share of the largest push with which forces are sought again that are not balanced well enough,
 and how often: a thousand times smaller ones are known a thousand times better, and after three
 times the largest push that is taken, 1e9 N, is one newton."""
-FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
-"""Directions of the first rays, whose hull contains the origin."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -22,7 +22,8 @@ grasp is sure to resist (see `wrench_limits`), so that a first slip with limits 
 closure limit.
 
 Motors may be at the limit of their torques first. With the torque tau_j = (L f + g)_j of a joint
-and its change d_j = (L C w)_j per load, both in the object's axes (see `squeeze_rows`), that is at
+and its change d_j = (L C w)_j per load, both in the object's axes (see `squeeze_certificate`), that
+is at
 
     s = (c_j - sign(d_j) tau_j) / |d_j|,                                                  (2)
 

@@ -15,7 +15,11 @@ where y_F is the force part of y. So the free mass is at most h(y) / (g |y_F|) f
 at least the distance of the origin from the hull of the points lambda d. The next ray goes through
 the hull's nearest facet.
 
-That a hull contains a ball about the origin is shown by its triangles, (1) of `ball_in_hull`.  (2)
+If triangles of points have the origin on their inner side, and every edge belongs to two of them in
+opposite directions, then the cones over them cover all directions, and the ball whose radius is the
+least distance of their planes is inside the points' hull.                            (2)
+
+No hull is computed again to check this: sums, cross products and a look at the edges do.
 
 With the same limits on pushes and torques the fixed mass is at most the free one where fingertips
 do not roll, as the forces at rest plus their change balance the load at the contacts. Rolling moves
@@ -29,19 +33,19 @@ h(y) the support under these bounds, (3) of `wrench_limits`. The hand turns with
 the weight of its links turns: `Motors.in_any_orientation` has limits that leave room for it.
 """
 
+import importlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Amount, Array, Triangles
+from grasp_core.arrays import Amount, Array, Indices, Triangles, is_indices
 from grasp_core.checked import positive
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
-from grasp_core.execution.ball_in_hull import ball_in, least_distance, nearest_facet, outward
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
@@ -50,9 +54,12 @@ from grasp_core.kinds import Range
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, limit_of
-from grasp_core.solvers.ties import first_best
+from grasp_core.solvers.ties import first_best, on_grid
 from grasp_core.values import Contact, Grasp
 
+UNITS_LOST = 16.0
+"""Rounding units by which the volume of a triangle's cone may be off, relative to the product of
+its sides and its distance: differences, products and sums lose about one each."""
 GAP = 1e-3
 """Gap between the bounds of the free mass, relative to it, at which no more rays follow."""
 RAYS = 200
@@ -63,6 +70,57 @@ ROUNDING = 1e-9
 """Slack of bounds, relative to them."""
 FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
 """Directions of the first rays, whose hull contains the origin."""
+
+
+def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
+    """Find the hull's facet nearest to zero: normal, distance; and all triangles, (t, 3)."""
+    spatial: Any = importlib.import_module("scipy.spatial")
+    hull = spatial.ConvexHull(points)
+    equations: Array = hull.equations
+    # equally near facets are taken in the order of their normals, the same on every machine
+    equations = equations[np.lexsort(on_grid(equations[:, :3]).T)]
+    nearest = equations[first_best(equations[:, 3])]
+    return nearest[:3], -float(nearest[3]), np.asarray(hull.simplices, dtype=np.int64)
+
+
+def outward(points: Array, triangles: Indices) -> Indices:
+    """Turn triangles, (t, 3), so that the origin is on their inner side."""
+    turned = np.linalg.det(points[triangles]) < 0.0
+    return np.where(turned[:, None], triangles[:, ::-1], triangles)
+
+
+def least_distance(corners: Array) -> float:
+    """Return the least distance of the origin from planes of triangles, (t, 3, 3).
+
+    The distance is negative where a triangle has the origin on its outer side, and lower by what
+    rounding may add, which is much for corners that are nearly in line.
+    """
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    if not (lengths > 0.0).all():
+        return -np.inf
+    far = np.linalg.norm(corners, axis=2).max(axis=1)
+    # a cross product is off by some rounding units of the product of its factors
+    sides = np.linalg.norm(b - a, axis=1) * np.linalg.norm(c - a, axis=1)
+    lost = UNITS_LOST * np.finfo(np.float64).eps * far * sides
+    return float(((np.einsum("ti,ti->t", normals, a) - lost) / lengths).min())
+
+
+def ball_in(points: Array, triangles: Any) -> float:
+    """Return the radius of the ball that triangles show by (2) to be in a hull, or -inf."""
+    if not (is_indices(triangles, None, 3) and len(triangles)):
+        return -np.inf
+    if triangles.min() < 0 or triangles.max() >= len(points) or not _is_closed(triangles):
+        return -np.inf
+    return least_distance(points[triangles])
+
+
+def _is_closed(triangles: Indices) -> bool:
+    """Return whether every edge belongs to two triangles, in opposite directions."""
+    edges = [tuple(edge) for t in triangles.tolist() for edge in zip(t, t[1:] + t[:1], strict=True)]
+    known = set(edges)
+    return len(known) == len(edges) and all((b, a) in known for a, b in edges)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -2,7 +2,7 @@
 
 The rows of a program are those that `placements` gets, and so are the steps: the largest
 smallest radius, the largest sum of radii, and of its optima the point nearest to the origin. Every
-answer is checked here by its residuals, with the limits of `solvers.lp`, `solvers.nearest_point`
+answer is checked here by its residuals, with the limits of `solvers.lp`, `solvers.qp`
 and `solvers.ties`. Nothing is claimed where a check fails: such a program is left to these modules.
 
 The programs of `concurrent` and `pencil` grow four discs and maximise the smallest radius. Its

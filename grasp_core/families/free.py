@@ -68,7 +68,7 @@ from grasp_core.geometry.polygons import clip
 from grasp_core.kinds import FrictionOrZero
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.solvers.qp import least_distance
 from grasp_core.solvers.ties import first_best, graded
 from grasp_core.values import FINGERS, four
 

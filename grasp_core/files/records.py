@@ -248,7 +248,7 @@ def reads(kind: Any) -> Read | None:
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return _values_read(parts[1])
     own = inside_record(kind)
-    return None if own is None else partial(_record_read, own)
+    return None if own is None else partial(from_record, own)
 
 
 def _narrowed_read(kind: Any, *given: Any) -> Read | None:
@@ -268,10 +268,6 @@ def _narrowed_read(kind: Any, *given: Any) -> Read | None:
         return inner(value, where)
 
     return read
-
-
-def _record_read(kind: type, value: Any, where: str) -> Any:
-    return from_record(cast("type[Any]", kind), value, where)
 
 
 def _array_read(shape: tuple[int | str | None, ...], value: Any, where: str) -> Any:

@@ -1,10 +1,32 @@
-"""Contact forces that balance given wrenches, or come near to it, with checks of what is given.
+"""Finds contact forces that balance given wrenches, or come near to it, and checks what is given.
 
-`force_programs` derives the programs behind the answers and solves them.
+Programs in pyramids come first, then programs in exact cones. Solved for, with the map G from
+forces f to their wrench and the external wrench w,
+
+    G f = -w,                                                                                 (1)
+    l <= f_n <= u  for all contacts,                                                          (2)
+    |f_t| <= mu f_n  for all contacts.                                                        (3)
+
+Pyramids of 16 sides inside the cones make (3) linear, R f <= 0, and programs strictly convex and
+quadratic. They give away 2 % of the friction; where they hold no forces, as just above the critical
+friction, a conic program decides (`solvers.conic`). There are three objectives: the least norm |f|
+(`solvers.qp`); the least friction, that is, the smallest r = max_i |f_t| / (a f_n), where contacts
+whose frictions differ have weights a; and, where nothing balances, the least imbalance. The latter
+two are nearest points of polyhedra. The second is found by Dinkelbach's iteration, in pyramids and
+then in cones: forces with the least
+
+    excess t,  |f_t| <= a (r f_n + t),                                                        (4)
+
+over the current r need less friction, until they do not.
+
+Forces are local, (normal, tangent, tangent) for each contact, in units of the largest normal force
+or of the load, and lengths in units of the longest arm. An answer counts if it meets (1) to (3)
+itself, whatever the solver says of it.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeAlias, get_args
 
@@ -24,28 +46,297 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.soft_contacts import LOCAL, contact_torsions
 from grasp_core.closure.wrench_sets import with_torques
+from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 from grasp_core.errors import InputError, NoForcesError, SolverError
-from grasp_core.forces.force_programs import (
-    Balance,
-    balances,
-    in_cones,
-    least_friction,
-    least_imbalance,
-    least_norm,
-    least_norm_in_cones,
-    lower_friction,
-    needed_friction,
-)
-from grasp_core.solvers.conic import ConicProgram, minimize
-from grasp_core.solvers.qp import PROXQP, check_solver
+from grasp_core.solvers import conic, qp
+from grasp_core.solvers.conic import ConicProgram
+from grasp_core.solvers.qp import PROXQP, QuadraticProgram, check_solver, least_distance
 from grasp_core.values import Contact, Grasp
 
+RESIDUAL = 1e-6
+"""Largest imbalance and cone violation accepted, in units of the largest normal force: a
+hundred times the accuracy asked of ProxQP."""
+FINE_RESIDUAL = 1e-9
+"""Largest imbalance, and distance outside the limits, of forces of least friction in cones."""
+CLEARLY = 1.01
+"""Factor by which a wrench must exceed all forces, so that rounding does not matter."""
+NO_FORCE = 1e-100
+"""Smallest normal force that is divided by: a contact may have no force."""
+KEPT_BACK = 1e-7
+"""Share of the friction that is not used in cones, to cover the errors of the solver."""
+REGULAR = 1e-3
+"""Weight of the forces' own size that keeps programs strictly convex, against the excess (4) and
+against the imbalance."""
+FRICTIONLESS = 1e-6
+"""Friction coefficient below which no lower one is searched for."""
+ROUNDS, IMPROVEMENT = 20, 1e-2
+"""Most rounds in pyramids, and the share by which the coefficient must fall in each."""
+CONE_ROUNDS, CONE_IMPROVEMENT = 12, 1e-4
+"""Most rounds in exact cones, and the share by which the coefficient must fall in each. The excess
+falls by half or more in a round, faster unless a finger idles; the search ends some 1e-4 above the
+least."""
 NO_PUSH = 1e-9
 """Share of the largest push below which a push counts as none: a hundred times the solver's error.
 """
 IMBALANCE = 1e-9
 """Largest imbalance of the answer, in units of the largest push, for contacts of unit size."""
 Objective: TypeAlias = Literal["least_norm", "least_friction", "closest"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Balance:
+    """A wrench on contacts, scaled to unit size, and the limits of the forces that balance it."""
+
+    frames: Array
+    """Columns (normal, tangent, tangent) of each contact, (k, 3, 3)."""
+    G: Array
+    """Matrix from stacked local forces to their wrench, (6, 3k)."""
+    inverse: Array
+    """Pseudo-inverse of G, (3k, 6)."""
+    null: Array
+    """Orthonormal basis of the forces whose wrench is zero, as columns, (3k, v)."""
+    scale: float
+    """Unit of force [N]."""
+    w: Array
+    """External wrench, (6,), in units of `scale` and of the longest arm."""
+    least: float
+    """Least normal force allowed at any contact."""
+    largest: float
+    """Largest normal force allowed at any contact."""
+
+    def beyond(self, friction: Array) -> bool:
+        """Return whether the wrench exceeds all forces within limits and cones.
+
+        No arm is longer than one, so this bounds forces and torques alike. Wrenches far beyond that
+        would keep solvers busy for seconds.
+        """
+        most = CLEARLY * np.sqrt(1.0 + friction**2).sum()
+        return bool(np.linalg.norm(self.w.reshape(2, 3), axis=1).max() > most * self.largest)
+
+    def pyramids(self, friction: Array) -> Array:
+        """Return rows R with R @ f <= 0 in pyramids inside the friction cones, (16 k, 3 k)."""
+        count, each = len(friction), np.arange(len(friction))
+        rows = np.zeros((count, PYRAMID_SIDES, count, 3))
+        rows[each, :, each, 0] = -friction[:, None] * inscribed_share()
+        rows[each, :, each, 1:] = facet_turns(PYRAMID_SIDES)
+        return rows.reshape(count * PYRAMID_SIDES, 3 * count)
+
+    def checked(self, f: Array, residual: float = RESIDUAL) -> Array | None:
+        """Make forces (3k,) balance to rounding; None where they then break a limit."""
+        # the least change that balances f is the pseudo-inverse of what is left
+        exact = f[None] - (f[None] @ self.G.T + self.w) @ self.inverse.T
+        along = exact[0, 0::3]
+        wrong = float(np.abs(exact @ self.G.T + self.w).max())
+        wrong = max(wrong, self.least - along.min(), along.max() - self.largest)
+        return exact[0] if wrong <= residual else None
+
+    def in_space(self, f: Array) -> Array:
+        """Turn local forces into forces in the object's frame, (k, 3) [N]."""
+        local = np.einsum("kij,nkj->nki", self.frames, f.reshape(1, -1, 3))
+        return self.scale * np.asarray(local[0], dtype=np.float64)
+
+
+def balances(
+    arms: Array, normals: Array, wrenches: Array, normal_force: tuple[float, float], *,
+    by_load: bool,
+) -> list[Balance]:  # fmt: skip
+    """Scale contacts and external wrenches to unit size.
+
+    Takes `arms` (k, 3) [m]; `normals` (k, 3); `wrenches` (force, torque), (n, 6) [N, N m];
+    `normal_force` [N].
+    """
+    least, largest = normal_force
+    size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
+    frames = contact_frames(normals)
+    G = in_frames(grasp_map(arms / size), frames)
+    U, sizes, Vt = np.linalg.svd(G)
+    rank = int(np.count_nonzero(sizes > max(G.shape) * np.finfo(np.float64).eps * sizes[0]))
+    inverse, null = (Vt[:rank].T / sizes[:rank]) @ U[:, :rank].T, Vt[rank:].T
+    found: list[Balance] = []
+    for wrench in wrenches:
+        scale = largest
+        # the unit of force, the load or the limit, keeps all numbers of order one
+        if by_load or not math.isfinite(largest):
+            load = float(np.linalg.norm(wrench / np.repeat([1.0, size], 3)))
+            scale = min(max(load, least), largest) or 1.0
+        w = wrench / scale
+        w[3:] /= size
+        found.append(Balance(frames, G, inverse, null, scale, w, least / scale, largest / scale))
+    return found
+
+
+def needed_friction(f: Array, weights: Array) -> float:
+    """Return the largest ratio of tangential to weighted normal force of forces (3k,)."""
+    along, across = f[0::3], np.hypot(f[1::3], f[2::3])
+    ratios = across / np.maximum(weights * along, NO_FORCE)
+    return float(np.where(across <= RESIDUAL, 0.0, ratios).max())
+
+
+def in_cones(f: Array | None, friction: Array) -> bool:
+    """Return whether local forces (3k,) are there and need no more than the friction."""
+    return f is not None and needed_friction(f, friction) <= 1.0 + RESIDUAL
+
+
+def least_norm(balance: Balance, friction: Array, solver: str) -> Array | None:
+    """Find balanced forces of least norm, (3k,), in pyramids or else in cones; None without any."""
+    n, rows = len(balance.inverse), balance.pyramids(friction)
+    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+    lower[0::3], upper[0::3] = balance.least, balance.largest
+    f = qp.minimize(
+        QuadraticProgram(
+            np.eye(n), np.zeros(n), rows, np.zeros(len(rows)), balance.G, -balance.w, lower, upper
+        ),
+        solver,
+    )
+    f = None if f is None else balance.checked(f)
+    return f if in_cones(f, friction) else least_norm_in_cones(balance, friction)
+
+
+def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
+    """Find balanced forces of least norm in the exact cones, (3k,), or None.
+
+    Forces just above the critical friction are many times the load: the program is solved once to
+    find their size, and again in units of it.
+    """
+    unit = 1.0
+    for _ in range(2):
+        program = _cone_program(balance, friction * (1.0 - KEPT_BACK), unit=unit)
+        try:
+            f = unit * conic.minimize(program).x[:-1]
+        except SolverError:
+            return None
+        found = balance.checked(f)
+        if in_cones(found, friction):
+            return found
+        unit = max(float(np.abs(f).max()), 1.0)
+    return None
+
+
+def least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
+    """Find forces (3k,) that need the least r, each contact having the friction r times its weight.
+
+    The iteration starts from a coefficient on the way to it.
+    """
+    best, friction = None, start
+    for _ in range(ROUNDS):
+        better = _toward_less_friction(balance, friction, weights)
+        if better is None:
+            break
+        needed = needed_friction(better, weights)
+        if best is not None and needed > friction * (1.0 - IMPROVEMENT):
+            break
+        best, friction = better, needed
+    return None if best is None else lower_friction(balance, weights, best)
+
+
+def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> Array | None:
+    """Find balanced forces (3k,) in pyramids with the least excess (4) over `friction`.
+
+    The forces that solve (1) are f0 + N z with the null space N of G. With the excess t, what is
+    minimised is, but for a constant, half the square of (sqrt(REGULAR) z, t + 1), so that the
+    answer is the nearest point of a polyhedron.
+    """
+    null, F0 = balance.null, -balance.w[None] @ balance.inverse.T
+    rows, along, pushes = balance.pyramids(friction * weights), null[0::3], F0[:, 0::3]
+    # the pyramids widened by t, R f <= weight t, then (2) with the forces put in
+    allowance = np.repeat(weights, len(rows) // len(weights))
+    C, D = [rows @ null, -along], [-F0 @ rows.T - allowance, pushes - balance.least]
+    if math.isfinite(balance.largest):
+        C.append(along)
+        D.append(balance.largest - pushes)
+    sides, root = np.vstack(C), math.sqrt(REGULAR)
+    excess = np.zeros((len(sides), 1))
+    excess[: len(rows), 0] = -allowance
+    z = least_distance(np.hstack([sides / root, excess]), np.hstack(D))[0, :-1] / root
+    return None if np.isnan(z).any() else balance.checked((F0 + z[None] @ null.T)[0])
+
+
+def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
+    """Find forces (3k,) in cones that need the least friction; the given ones if none need less."""
+    best, friction = forces, _largest_ratio(forces, weights)
+    for _ in range(CONE_ROUNDS):
+        if friction <= FRICTIONLESS:
+            break
+        program = _cone_program(balance, friction * weights, excess=weights)
+        try:
+            better = balance.checked(conic.minimize(program).x[:-1], FINE_RESIDUAL)
+        except SolverError:
+            break
+        needed = math.inf if better is None else _largest_ratio(better, weights)
+        if better is None or not needed < friction:
+            break
+        # an improvement is kept, but a small one ends the search
+        improved = needed < friction * (1.0 - CONE_IMPROVEMENT)
+        best, friction = better, needed
+        if not improved:
+            break
+    return best
+
+
+def least_imbalance(balance: Balance, friction: Array) -> Array:
+    """Find forces (3k,) in cones and limits that leave the least imbalance.
+
+    The square of what (1) leaves, and a little of the forces' own size, is f'Pf/2 + q'f but for a
+    constant: with P = L L', the least |L'f + inv(L) q|.
+    """
+    n = balance.G.shape[1]
+    rows, along = balance.pyramids(friction), np.eye(n)[0::3]
+    L = np.linalg.cholesky(balance.G.T @ balance.G + REGULAR * np.eye(n))
+    back, shift = np.linalg.inv(L).T, np.linalg.solve(L, balance.G.T @ balance.w)
+    C, d = [rows, -along], [np.zeros(len(rows)), np.full(len(along), -balance.least)]
+    if math.isfinite(balance.largest):
+        C.append(along)
+        d.append(np.full(len(along), balance.largest))
+    turned = np.vstack(C) @ back
+    z = least_distance(turned, (np.concatenate(d) + turned @ shift)[None])[0]
+    if np.isnan(z).any():
+        raise SolverError("no forces were found in the friction cones, though pure pushes are some")
+    f = back @ (z - shift)
+    # normal parts are brought into the limits first, since they say how far slides may reach
+    along = np.clip(f[0::3], balance.least, balance.largest)
+    across = np.hypot(f[1::3], f[2::3])
+    shrink = np.minimum(1.0, friction * along / np.maximum(across, NO_FORCE))
+    return np.stack([along, shrink * f[1::3], shrink * f[2::3]], axis=1).ravel()
+
+
+def _largest_ratio(f: Array, weights: Array) -> float:
+    """Return the largest ratio of tangential to weighted normal force, however small both are."""
+    along, across = f[0::3], np.hypot(f[1::3], f[2::3])
+    ratios = across / np.maximum(weights * along, NO_FORCE)
+    return float(ratios[weights > 0.0].max())
+
+
+def _cone_program(
+    balance: Balance, friction: Array, *, excess: Array | None = None, unit: float = 1.0
+) -> ConicProgram:
+    """Build the program with (1) to (3): of least norm or, with weights a, of least excess (4).
+
+    Its last variable is a bound on the norm, or the excess. Forces are in units of `unit`.
+    """
+    n, count = balance.G.shape[1], len(friction)
+    forces, last = np.eye(n, n + 1), np.eye(n + 1)[n]
+    normal, cones, flat = forces[0::3], -forces, np.zeros(count, dtype=bool)
+    cones[0::3] *= friction[:, None]
+    equations = np.hstack([balance.G, np.zeros((WRENCH, 1))])
+    if excess is None:
+        # a cone of friction zero is a ray: its tangential parts are equations instead
+        flat = friction == 0.0
+        slides = np.delete(forces[np.repeat(flat, 3)], np.s_[::3], axis=0)
+        equations, cones = np.vstack([equations, slides]), cones[np.repeat(~flat, 3)]
+        tail, lengths = -np.vstack([last, forces]), (n + 1,)
+    else:
+        cones[0::3] -= excess[:, None] * last
+        tail, lengths = np.empty((0, n + 1)), ()
+    bounded = [(-normal, -balance.least)]
+    if math.isfinite(balance.largest):
+        bounded.append((normal, balance.largest))
+    A = np.vstack([equations, *(side for side, _ in bounded), cones, tail])
+    b = np.zeros(len(A))
+    b[:WRENCH] = -balance.w / unit
+    for side, (_, limit) in enumerate(bounded):
+        b[len(equations) + side * count :][:count] = limit / unit
+    each = (3,) * int((~flat).sum())
+    return ConicProgram(last, A, b, len(equations), count * len(bounded), (*each, *lengths))
 
 
 def contact_forces(
@@ -185,7 +476,7 @@ def even_forces(
     # rows: (1), the upper and the lower bounds of (2), the cones (3)
     A = np.vstack([balance, pushes, least - pushes, -np.eye(n, n + 1)])
     b = np.concatenate([np.zeros(WRENCH), np.ones(k), np.zeros(k + n)])
-    x = minimize(ConicProgram(-least, A, b, WRENCH, 2 * k, (width,) * k)).x[:-1]
+    x = conic.minimize(ConicProgram(-least, A, b, WRENCH, 2 * k, (width,) * k)).x[:-1]
     along = x[0::width]
     if not along.min() > NO_PUSH:
         raise NoForcesError(

@@ -25,12 +25,11 @@ from grasp_core.checked import (
     shown,
     text,
 )
-from grasp_core.declared import Declared, counted, summary
+from grasp_core.declared import Declared, InNotebooks, counted, summary
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import Range
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import read_triangles
-from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
 from grasp_core.objects.surface import Face, Surface
 from grasp_core.settings import extended

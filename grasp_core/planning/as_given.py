@@ -9,27 +9,22 @@ closure and regions are preserved. A separating twist (a, b) becomes (D a, -D b)
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import trusted
+from grasp_core.declared import altered
 from grasp_core.families.free import Absence
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.standard_order import FLIP, Standard
 from grasp_core.planning.certify import Certified
-from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, four
+from grasp_core.values import FaceQuadruple, four
 
 PAIRED = ("p", "r")
 """Letters with which the ids of pencil and regulus grasps begin: their fingers (0, 1) and (2, 3)
 form pairs."""
-
-
-MANY_PIECES = 1024
-"""Number of mirrored pieces kept: grasps of one object share their pieces."""
 Place: TypeAlias = tuple[int, str]
 """The face on which a finger stands, by its number on the object as it was given, and the half of
 the face, `a` or `b`; empty for a whole face."""
@@ -87,19 +82,10 @@ def _mirrored_grasp(found: Certified) -> Certified:
     placement = found.placement
     return replace(
         found,
-        pieces=tuple(_mirrored_once(piece) for piece in found.pieces),
-        cones=tuple(
-            trusted(ForceCone, axis=frozen_copy(cone.axis * FLIP), half_angle=cone.half_angle)
-            for cone in found.cones
-        ),
+        pieces=tuple(map(_mirrored_piece, found.pieces)),
+        cones=tuple(altered(cone, axis=frozen_copy(cone.axis * FLIP)) for cone in found.cones),
         regions=tuple(
-            trusted(
-                ContactRegion,
-                kind=each.kind,
-                polygon=frozen_copy(each.polygon[::-1] * FLIP),
-                inscribed_radius=each.inscribed_radius,
-            )
-            for each in found.regions
+            altered(each, polygon=frozen_copy(each.polygon[::-1] * FLIP)) for each in found.regions
         ),
         placement=replace(
             placement,
@@ -114,23 +100,18 @@ def _mirrored_grasp(found: Certified) -> Certified:
 
 def _mirrored_piece(piece: FacePiece) -> FacePiece:
     """Mirror a convex piece of a face; its frame is mirrored too, so plane coordinates stay."""
-    return replace(
-        piece,
-        normal=piece.normal * FLIP,
-        origin=piece.origin * FLIP,
-        frame=piece.frame * FLIP[:, None],
-    )
-
-
-_mirrored_once = lru_cache(maxsize=MANY_PIECES)(_mirrored_piece)
+    return altered(
+        piece, normal=frozen_copy(piece.normal * FLIP), origin=frozen_copy(piece.origin * FLIP),
+        frame=frozen_copy(piece.frame * FLIP[:, None]),
+    )  # fmt: skip
 
 
 def absence_as_given(proof: Absence, on: Standard) -> Absence:
     """Translate a proof of absence to the faces of the object as it was given."""
-    pieces = [replace(piece, face=on.faces[on.owners[piece.face]]) for piece in proof.pieces]
+    pieces = [altered(piece, face=on.faces[on.owners[piece.face]]) for piece in proof.pieces]
     if not on.mirrored:
-        return replace(proof, pieces=tuple(pieces))
-    return replace(
+        return altered(proof, pieces=tuple(pieces))
+    return altered(
         proof,
         pieces=tuple(map(_mirrored_piece, pieces)),
         leaves=tuple((path, _mirrored_certificate(leaf)) for path, leaf in proof.leaves),
@@ -139,15 +120,14 @@ def absence_as_given(proof: Absence, on: Standard) -> Absence:
 
 def _mirrored_certificate(leaf: ClosureCertificate) -> ClosureCertificate:
     # a torque is an axial vector: it takes the other sign
-    wrench = leaf.separating_wrench
-    return replace(
+    return altered(
         leaf,
-        positions=leaf.positions * FLIP,
-        normals=leaf.normals * FLIP,
+        positions=frozen_copy(leaf.positions * FLIP),
+        normals=frozen_copy(leaf.normals * FLIP),
         forces=_mirrored_or_none(leaf.forces, FLIP),
-        separating_wrench=_mirrored_or_none(wrench, np.concatenate([FLIP, -FLIP])),
+        separating_wrench=_mirrored_or_none(leaf.separating_wrench, np.concatenate([FLIP, -FLIP])),
     )
 
 
 def _mirrored_or_none(vectors: Array | None, flip: Array) -> Array | None:
-    return None if vectors is None else vectors * flip
+    return None if vectors is None else frozen_copy(vectors * flip)

@@ -16,7 +16,7 @@ from grasp_core.closure.critical_friction import critical_friction, critical_fri
 from grasp_core.closure.force_closure import closing_margins, force_closure
 from grasp_core.closure.lines import classify_each
 from grasp_core.cones.spanning import span_angles
-from grasp_core.declared import kept, trusted
+from grasp_core.declared import altered, kept, trusted
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
 from grasp_core.frames import kept_angle
@@ -227,4 +227,4 @@ def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> 
 def _kept_cone(cone: ForceCone) -> ForceCone:
     """Return a force cone with the half-angle that degrees keep."""
     half_angle = kept_angle(cone.half_angle)
-    return cone if half_angle == cone.half_angle else ForceCone(cone.axis, half_angle)
+    return cone if half_angle == cone.half_angle else altered(cone, half_angle=half_angle)

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field, replace
 from textwrap import shorten
 from typing import Annotated, Any, Protocol, TypeAlias, runtime_checkable
 
-from grasp_core.declared import Declared, counted, summary
+from grasp_core.declared import Declared, InNotebooks, counted, summary
 from grasp_core.figures import Shown, figure
 from grasp_core.files.records import UNRECORDED, Key
 from grasp_core.grasp_tables import ById, chosen, data_frame
 from grasp_core.kinds import Friction, Method, Number, Seed
-from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.values import Bounds, FaceQuadruple, Grasp, HalfAngle

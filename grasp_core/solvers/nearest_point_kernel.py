@@ -2,7 +2,7 @@
 
     minimise |x|  subject to  C x <= d,  for every row d of D.
 
-Solved: x and multipliers u >= 0 with x = -C'u, which `nearest_point` checks.
+Solved: x and multipliers u >= 0 with x = -C'u, which `qp` checks.
 
 Method. With the rows a_1 .. a_q active, x is the nearest point of where these hold with equality,
 and their multipliers are not negative: x = 0 without any. If x violates a row a, write

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SHIFT, Array, Indices
 from grasp_core.solvers.lp import LinearProgram, Optimum
-from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.solvers.qp import least_distance
 
 SAME_VALUE = 1e-5
 """Share of a program's value that the nearest optimum may give up: with less, optima form thin

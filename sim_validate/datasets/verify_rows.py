@@ -21,7 +21,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import GraspError, InputError, UndecidedError
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import any_direction
-from grasp_core.execution.squeeze_rows import Survival
+from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.frames import POSE
 from grasp_core.geometry.nearest_points import Surface
 from grasp_core.hands.collisions import clearances, tip_distances

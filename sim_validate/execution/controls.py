@@ -24,8 +24,8 @@ from grasp_core.closure.contacts import grasp_map
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.grips import Grip
+from grasp_core.execution.loads import Reactions
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.execution.worst_loads import Reactions
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.held import HeldLayout
 from sim_validate.execution import paths

@@ -20,7 +20,7 @@ from grasp_core.kinds import Family
 from grasp_core.planning.planner import plan
 from grasp_core.processes import local_processes
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.solvers.qp import least_distance
 from scenes.example_objects import example_object
 
 OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])

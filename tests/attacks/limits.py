@@ -11,9 +11,9 @@ import numpy as np
 
 import grasp_core as gc
 import grasp_core.quality.wrench_limits as checked
-from grasp_core.execution import carried_mass, squeeze_certificate, squeeze_rows
+from grasp_core.execution import carried_mass, squeeze_certificate
 from grasp_core.execution.payload import Payload
-from grasp_core.execution.squeeze_rows import Survival
+from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.quality.wrench_limits import WrenchLimit, body_of
 from tests.attacks.searching import Attack, always, cycled, power, tiny
 from tests.tampering import table
@@ -221,7 +221,7 @@ def kept_values(rng):
 
 def short_counts(monkeypatch):
     """Multipliers count at the length at which they come."""
-    monkeypatch.setattr(squeeze_rows, "of_order_one", lambda *arrays: list(arrays))
+    monkeypatch.setattr(squeeze_certificate, "of_order_one", lambda *arrays: list(arrays))
 
 
 def keeping(monkeypatch):

@@ -25,7 +25,7 @@ print(compiled("{CALLER}").half_angles.py_func.__code__.co_filename)
 """
 UNKEPT = """
 import numpy as np
-from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.solvers.qp import least_distance
 print(least_distance(np.eye(3), -np.ones((1, 3))))
 """
 

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, in_frames
-from grasp_core.execution.worst_loads import Reactions
+from grasp_core.execution.loads import Reactions
 from tests.grasp_core.execution.held import (
     bodies_and_grasps,
     box,

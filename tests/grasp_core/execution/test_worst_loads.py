@@ -3,7 +3,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.execution.first_slip import first_slip
-from grasp_core.execution.worst_loads import Reactions
+from grasp_core.execution.loads import Reactions
 from tests.grasp_core.execution.held import directions, planned_grips
 
 G = 9.80665

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import nnls
 
 from grasp_core.compiled import compiled
-from grasp_core.solvers import nearest_point as module
-from grasp_core.solvers.nearest_point import least_distance
+from grasp_core.solvers import qp as module
+from grasp_core.solvers.qp import least_distance
 
 NEAR = 1e-9
 CLOSE = 1e-10
