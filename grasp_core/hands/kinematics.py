@@ -47,7 +47,7 @@ def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) ->
     poses = np.ascontiguousarray(np.broadcast_to(pose, (count, POSE, POSE)))
     R, p = np.empty((count, length, 3, 3)), np.empty((count, length, 3))
     W = np.empty_like(p)
-    kernel = compiled("grasp_core.hands.kinematics_kernel")
+    kernel = compiled("grasp_core.hands.collisions_kernel")
     kernel.many_chains(
         arrays.positions, arrays.rotations, arrays.axes, arrays.starts, poses, angles, R, p, W
     )

@@ -59,7 +59,7 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
         wanted = Wanted(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
         sums = kernel.empty_sums(arrays, aims)
         kernel.settle(arrays, tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
-        compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
+        compiled("grasp_core.hands.pose_kernel").place(arrays, aims, pose)
         away = np.einsum("ki,ki->k", contacts.positions - pose.fronts, contacts.normals)
         open_by = away - arrays.tip_roundings[found.fingers]
         if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose, None, clear):
@@ -97,7 +97,7 @@ def _is_free(asked: Asked, found: FoundPose, joints: Array, way: Array) -> bool:
     pose.palm[:], pose.q[:] = found.palm_pose[:3, :3], joints
     for back in np.arange(TICK, LINE + 0.5 * TICK, TICK):
         pose.origin[:] = found.palm_pose[:3, 3] - back * way
-        compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
+        compiled("grasp_core.hands.pose_kernel").place(arrays, aims, pose)
         if blocking(asked, pose, None, asked.clearance):
             return False
     return True
