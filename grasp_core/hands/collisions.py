@@ -15,7 +15,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import PALM, SAME, Hand
-from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays, kept_by_identity
+from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays
 from grasp_core.hands.kinematics import places
 from grasp_core.objects.polyhedron import Polyhedron
 
@@ -25,7 +25,6 @@ FAR = 0.02
 """Distance up to which clearances are measured [m]."""
 
 
-@kept_by_identity(8)
 @lru_cache(maxsize=8)
 def surface_tree(body: Polyhedron) -> SurfaceTree:
     """Sort the triangles of an object; equal objects share the tree."""
@@ -60,7 +59,7 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
     return SurfaceTree(
         np.ascontiguousarray(corners),
         np.divide(across, sizes, out=np.zeros_like(across), where=sizes > 0.0),
-        order.astype(np.int64), np.array([middle for middle, _ in balls]),
+        np.array([middle for middle, _ in balls]),
         np.array([radius for _, radius in balls]), np.array(links, np.int64),
     )  # fmt: skip
 
@@ -82,15 +81,15 @@ def clearances(
     """Measure the distances of a hand from itself, an object and a table."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
-    kernel, worst = compiled("grasp_core.hands.collisions_kernel"), np.empty(2, np.int64)
+    kernel = compiled("grasp_core.hands.collisions_kernel")
     touching = np.isin(arrays.shape_tips, fingers)
     never = np.full(len(touching), -np.inf)
     apart = [
-        kernel.of_object(arrays, turned, middles, tree, np.where(left_out, never, FAR), worst[:1])
+        kernel.of_object(arrays, turned, middles, tree, np.where(left_out, never, FAR))
         for left_out in (touching, ~touching)
     ]
-    low = FAR if up is None else kernel.of_table(arrays, turned, middles, up, height, worst[:1])
-    own = kernel.of_itself(arrays, turned, middles, FAR, worst)
+    low = FAR if up is None else kernel.of_table(arrays, turned, middles, up, height)
+    own = kernel.of_itself(arrays, turned, middles, FAR)
     return Clearances(
         min(own, FAR), min(apart[0], 0.0) + FAR, min(apart[1], 0.0) + FAR, min(low, FAR)
     )
@@ -128,10 +127,12 @@ def tip_distances(
     """Measure how far points are from fingertips: zero where these touch them, (k,) [m]."""
     arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.collisions_kernel")
     turned, middles = _shapes(hand, arrays, joints, palm_pose)
-    return np.array([
-        kernel.tip_point(arrays, turned, middles, finger, point)
-        for finger, point in zip(fingers, points, strict=True)
-    ])  # fmt: skip
+    apart: list[float] = []
+    for finger, point in zip(fingers, points, strict=True):
+        s = arrays.tip_shapes[finger]
+        corners, rounding = kernel.core_in(arrays, turned[s], middles[s], s)
+        apart.append(beyond_hull(corners, point[None])[0] - rounding)
+    return np.array(apart)
 
 
 def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> tuple[Array, Array]:

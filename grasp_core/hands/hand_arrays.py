@@ -1,21 +1,15 @@
-"""Arrays of a hand, a surface, aims and poses, which compiled loops read and change.
-
-Hands and objects keep their arrays by identity: equal ones that are other objects share them too.
-"""
+"""Arrays of a hand, a surface, aims and poses, which compiled loops read and change."""
 
 import math
-from collections.abc import Callable
-from functools import lru_cache, wraps
+from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
 
-Value = TypeVar("Value")
-Result = TypeVar("Result")
 LEAST_BALL = 0.008
 """Least radius of the balls that stand for a shape while a pose is sought [m]: thinner parts of a
 link lie beside thicker ones."""
@@ -26,27 +20,6 @@ BALLS_APART = 1.7
 """Largest distance between neighbouring balls of a shape, in the smallest half-size."""
 OUTSIDE = 0.006
 """How far a ball must stick out of every larger ball of its link to be kept [m]."""
-
-
-def kept_by_identity(most: int) -> Callable[[Callable[[Value], Result]], Callable[[Value], Result]]:
-    """Return a decorator that keeps results for at most so many arguments, and these alive."""
-
-    def decorated(function: Callable[[Value], Result]) -> Callable[[Value], Result]:
-        kept: dict[int, tuple[Value, Result]] = {}
-
-        @wraps(function)
-        def looked_up(value: Value) -> Result:
-            known = kept.get(id(value))
-            if known is None:  # a kept argument is alive, so that no other has its address
-                known = value, function(value)
-                if len(kept) >= most:
-                    kept.clear()
-                kept[id(value)] = known
-            return known[1]
-
-        return looked_up
-
-    return decorated
 
 
 class HandArrays(NamedTuple):
@@ -65,6 +38,7 @@ class HandArrays(NamedTuple):
     ratios: Array  # (j,)
     offsets: Array  # (j,) [rad]
     starts: Indices  # first link of each finger, and the number of links, (f + 1,)
+    link_firsts: Indices  # first link of the finger of each link, (j,)
     tip_centers: Array  # middles of the fingertips' balls, (f, 3)
     tip_radii: Array  # radii of these balls, (f,)
     tip_corners: Array  # of all fingertips, for a ball its middle, (c, 3)
@@ -92,7 +66,6 @@ class SurfaceTree(NamedTuple):
 
     corners: Array  # of the triangles, in the order of the leaves, (t, 3, 3)
     normals: Array  # outward unit normals, (t, 3); zero for a triangle without area
-    numbers: Indices  # number of each of these triangles in the body, (t,)
     middles: Array  # of the balls, (n, 3)
     radii: Array  # of the balls, (n,)
     links: Indices
@@ -164,7 +137,6 @@ _Part: TypeAlias = tuple[int, LinkShape]
 """A shape with the number of its link."""
 
 
-@kept_by_identity(16)
 @lru_cache(maxsize=16)
 def hand_arrays(hand: Hand) -> HandArrays:
     """Lay a hand out as arrays; equal hands share them."""
@@ -194,7 +166,7 @@ def hand_arrays(hand: Hand) -> HandArrays:
         rotations=np.array([link.joint.rotation for link in links]),
         axes=np.array([link.joint.axis for link in links]),
         ranges=drives.ranges, drivers=drives.drivers, ratios=drives.ratios, offsets=drives.offsets,
-        starts=starts,
+        starts=starts, link_firsts=np.repeat(starts[:-1], lengths),
         tip_centers=np.array([finger.tip.center for finger in hand.fingers]),
         tip_radii=np.array([finger.tip.radius for finger in hand.fingers]),
         tip_corners=np.concatenate(corners),

@@ -32,7 +32,7 @@ from grasp_core.hands.collisions_kernel import (
     tip_surface,
     turn,
 )
-from grasp_core.hands.distances_kernel import into_frame, nearest
+from grasp_core.hands.distances_kernel import into_frame, nearest, squared
 from grasp_core.hands.hand_arrays import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
 
 SCALE_MOVE, SCALE_TURN = 1e6, 2.5e3
@@ -49,6 +49,8 @@ FREE = 1e-9
 """Sum of squares below which nothing overlaps [mm^2]."""
 MOVES = 6
 """Unknowns of the palm."""
+OFF, TOUCH, OVERLAP = 0, 1, 2
+"""Places of what `Sums.parts` holds."""
 MM = 1e3
 EQUAL = 3.0
 """Weight of touching."""
@@ -63,10 +65,7 @@ ON_SURFACE = 1e-9
 @loop()
 def place(hand: HandArrays, targets: Targets, pose: Pose) -> None:
     """Fill in where the links, shapes and fingertips of a pose are."""
-    chains(
-        hand.positions, hand.rotations, hand.axes, hand.starts, pose.palm, pose.origin, pose.q,
-        pose.R, pose.p, pose.W,
-    )  # fmt: skip
+    chains(hand, pose.palm, pose.origin, pose.q, pose.R, pose.p, pose.W)
     place_shapes(hand, pose.palm, pose.origin, pose.R, pose.p, pose.turned, pose.middles)
     for k in range(len(targets.fingers)):
         last = hand.starts[targets.fingers[k] + 1] - 1
@@ -132,11 +131,7 @@ def _moves(
             sums.row[3 + j] += sign * way[j] * MM
     if link < 0:
         return
-    first = 0
-    for f in range(len(hand.starts) - 1):
-        if hand.starts[f] <= link:
-            first = hand.starts[f]
-    for k in range(first, link + 1):
+    for k in range(hand.link_firsts[link], link + 1):
         for j in range(3):
             arm[j] = x[j] - pose.p[k, j]
         cross(pose.W[k], arm, way)
@@ -144,9 +139,10 @@ def _moves(
 
 
 @loop()
-def _add(sums: Sums, residual: float) -> None:
-    """Add the row with its residual [mm] to the sums, and clear it."""
+def _add(sums: Sums, part: int, residual: float) -> None:
+    """Add the row with its residual [mm] to the sums, and its square to a part; clear the row."""
     row = sums.row
+    sums.parts[part] += residual**2
     for i in range(len(row)):
         if row[i] != 0.0:
             sums.g[i] += row[i] * residual
@@ -161,20 +157,16 @@ def _tip(
     off: float,
 ) -> None:  # fmt: skip
     """Add a residual of a fingertip, whose derivative is along a direction."""
-    sums.parts[1] += (weight * off * MM) ** 2
     _moves(hand, pose, sums, link, pose.tips[k], along, weight, True)
-    rolled, first = np.zeros(3), 0
+    rolled = np.zeros(3)
     for j in range(3):
         for i in range(3):
             rolled[j] += along[i] * pose.rolls[k, i, j]
         sums.row[3 + j] += weight * rolled[j] * MM
-    for f in range(len(hand.starts) - 1):
-        if hand.starts[f] <= link:
-            first = hand.starts[f]
-    for a in range(first, link + 1):
+    for a in range(hand.link_firsts[link], link + 1):
         turned = hand.ratios[a] * weight * dotted(pose.W[a], rolled) * MM
         sums.row[MOVES + hand.drivers[a]] += turned
-    _add(sums, weight * off * MM)
+    _add(sums, TOUCH, weight * off * MM)
 
 
 @loop()
@@ -186,24 +178,23 @@ def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, su
         gap = float(hand.tip_roundings[finger])
         for j in range(3):
             gap += (pose.fronts[k, j] - targets.origins[k, j]) * normal[j]
-        sums.parts[0] = max(sums.parts[0], abs(gap) * MM)
-        sums.parts[1] += (EQUAL * gap * MM) ** 2
+        sums.parts[OFF] = max(sums.parts[OFF], abs(gap) * MM)
         _moves(hand, pose, sums, link, pose.fronts[k], normal, EQUAL, True)
-        _add(sums, EQUAL * gap * MM)
+        _add(sums, TOUCH, EQUAL * gap * MM)
         pinned = targets.pinned[k] > 0.0
         for side in range(2):
             tangent, off = targets.tangents[k, side], 0.0
             for j in range(3):
                 off += (pose.tips[k, j] - targets.origins[k, j]) * tangent[j]
             if pinned:
-                sums.parts[0] = max(sums.parts[0], abs(off) * MM)
+                sums.parts[OFF] = max(sums.parts[OFF], abs(off) * MM)
             _tip(hand, pose, sums, link, k, tangent, EQUAL if pinned else wanted.pull, off)
     for e in range(len(targets.edge_contacts)):
         k, short = targets.edge_contacts[e], wanted.margin
         for j in range(3):
             short -= (pose.tips[k, j] - targets.edge_points[e, j]) * targets.edge_inward[e, j]
         if short > 0.0:
-            sums.parts[0] = max(sums.parts[0], (short - wanted.margin) * MM)
+            sums.parts[OFF] = max(sums.parts[OFF], (short - wanted.margin) * MM)
             link = int(hand.starts[targets.fingers[k] + 1] - 1)
             _tip(hand, pose, sums, link, k, -targets.edge_inward[e], EQUAL, short)
 
@@ -211,23 +202,20 @@ def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, su
 @loop()
 def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> float:
     """Return the signed distance of a point from a surface, and fill in the way out."""
-    near, square = np.empty(3), 0.0
-    for j in range(3):
-        square += (center[j] - tree.middles[0, j]) ** 2
+    near, square = np.empty(3), squared(center, tree.middles[0])
     if square > (tree.radii[0] + need) ** 2:
         return ANYWHERE
-    t = nearest(center, need, tree.corners, tree.middles, tree.radii, tree.links, near)
+    t = nearest(center, need, tree, near)
     if t < 0:
         if square > tree.radii[0] * tree.radii[0]:
             return ANYWHERE
         # far from the surface: outside, or deep inside
-        t = nearest(center, ANYWHERE, tree.corners, tree.middles, tree.radii, tree.links, near)
-    away, square = 0.0, 0.0
+        t = nearest(center, ANYWHERE, tree, near)
     for j in range(3):
         along[j] = center[j] - near[j]
-        away += along[j] * tree.normals[t, j]
-        square += along[j] ** 2
-    distance = np.sqrt(square) if away >= 0.0 else -np.sqrt(square)
+    distance = np.sqrt(dotted(along, along))
+    if dotted(along, tree.normals[t]) < 0.0:
+        distance = -distance
     if abs(distance) > ON_SURFACE:
         for j in range(3):
             along[j] /= distance
@@ -242,9 +230,8 @@ def _keep_off(
     short: float,
 ) -> None:  # fmt: skip
     """Add the residual of a point that must move by `short` against sign * along."""
-    sums.parts[2] += (short * MM) ** 2
     _moves(hand, pose, sums, link, x, along, sign, True)
-    _add(sums, short * MM)
+    _add(sums, OVERLAP, short * MM)
 
 
 @loop()
@@ -284,10 +271,9 @@ def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
             hand, pose.turned, pose.middles, a, b, wanted.apart, along, x
         )
         if short > 0.0:
-            sums.parts[2] += (short * MM) ** 2
             _moves(hand, pose, sums, int(hand.shape_links[a]), x, along, 1.0, False)
             _moves(hand, pose, sums, int(hand.shape_links[b]), x, along, -1.0, False)
-            _add(sums, short * MM)
+            _add(sums, OVERLAP, short * MM)
 
 
 @loop()
@@ -297,11 +283,10 @@ def _farthest(
     """Return how far a shape reaches beyond a plane, and fill in its corner there."""
     (corners, rounding), farthest = core_in(hand, pose.turned[s], pose.middles[s], s), -np.inf
     for c in range(len(corners)):
-        square, height = 0.0, rounding
+        height = rounding
         for j in range(3):
-            square += (corners[c, j] - left_out[j]) ** 2
             height += (corners[c, j] - origin[j]) * way[j]
-        if square > AT_TIP * AT_TIP and height > farthest:
+        if squared(corners[c], left_out) > AT_TIP * AT_TIP and height > farthest:
             farthest = height
             x[:] = corners[c]
     return farthest
@@ -430,20 +415,12 @@ def _step(
 @loop()
 def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose) -> None:
     """Fill in palm and joints of the pose after a step, within ranges and as they are coupled."""
-    axis, angle, about, arm = np.zeros(3), 0.0, np.empty((3, 3)), np.empty(3)
-    for j in range(3):
-        angle += step[3 + j] ** 2
-    angle = np.sqrt(angle)
-    if angle > 0.0:
-        for j in range(3):
-            axis[j] = step[3 + j] / angle
-    turn(axis, angle, about)
+    about, turned = np.empty((3, 3)), step[3:MOVES]
+    angle = np.sqrt(dotted(turned, turned))
+    turn(turned / angle if angle > 0.0 else np.zeros(3), angle, about)
     product(about, pose.palm, new.palm)
-    for j in range(3):
-        arm[j] = pose.origin[j] - pivot[j]
-    moved(about, pivot, arm, new.origin)
-    for j in range(3):
-        new.origin[j] += step[j]
+    moved(about, pivot, pose.origin - pivot, new.origin)
+    new.origin[:] = new.origin + step[:3]
     for k in range(len(pose.q)):
         angle = pose.q[k] + step[MOVES + k]
         new.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
@@ -456,15 +433,15 @@ def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose)
 def settle(
     hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
     most_steps: int, good: float,
-) -> int:  # fmt: skip
-    """Move a hand until it touches and overlaps no more; return the number of steps."""
+) -> None:  # fmt: skip
+    """Move a hand until it touches and overlaps no more, or is given up."""
     A, step, new = np.empty_like(sums.H), np.empty_like(sums.g), empty_pose(hand, len(pose.tips))
     tried = empty_sums(hand, targets)
     new.palm[:], new.origin[:], new.q[:] = pose.palm, pose.origin, pose.q
     damping, stalled, before, steps = FIRST_DAMPING, 0, np.inf, 0
     while True:
         residuals(hand, tree, targets, wanted, new, tried)
-        after = tried.parts[1] + tried.parts[2]
+        after = tried.parts[TOUCH] + tried.parts[OVERLAP]
         if after < before:
             pose.palm[:], pose.origin[:], pose.q[:] = new.palm, new.origin, new.q
             sums.H[:], sums.g[:], sums.parts[:] = tried.H, tried.g, tried.parts
@@ -474,9 +451,9 @@ def settle(
         else:
             damping *= GROWTH
             stalled += 1
-        settled = sums.parts[0] <= good and sums.parts[2] <= FREE
+        settled = sums.parts[OFF] <= good and sums.parts[OVERLAP] <= FREE
         if settled or stalled >= PATIENCE or damping > MOST_DAMPING or steps == most_steps:
-            return steps
+            return
         # damping grows until it outweighs the rest of the matrix, which then is definite
         while not _step(hand, wanted, pose, sums, damping, A, step):
             damping *= GROWTH
@@ -512,10 +489,7 @@ def lay(
             last = hand.starts[finger + 1] - 1
             into_frame(pose.R[last], pose.p[last], tip, targets.touching[k])
         off = max(off, abs(distance - hand.tip_roundings[finger]))
-        ahead, square = 0.0, 0.0
-        for j in range(3):
-            square += (points[k, j] - tip[j]) ** 2
-        length = np.sqrt(square)  # the distance of a block is only a bound on it
+        length, ahead = np.sqrt(squared(points[k], tip)), 0.0  # a block's distance is but a bound
         for j in range(3):
             targets.normals[k, j] = (points[k, j] - tip[j]) / length
             ahead += (points[k, j] - targets.origins[k, j]) * targets.normals[k, j]

@@ -20,7 +20,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import combinations, permutations
 
 import numpy as np
@@ -32,7 +32,14 @@ from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.frames import POSE, plane_tangents
 from grasp_core.hands.collisions import surface_tree
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
+from grasp_core.hands.hand_arrays import (
+    HandArrays,
+    Pose,
+    SurfaceTree,
+    Targets,
+    Wanted,
+    hand_arrays,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
 from grasp_core.values import FINGERS, Grasp
@@ -85,10 +92,7 @@ ROUND = 9
 """Digits after the point to which rests are compared: ties are decided by the order."""
 
 
-UPRIGHT = (0.0, 0.0, 1.0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Asked:
     """What a pose is sought for."""
 
@@ -104,6 +108,16 @@ class Asked:
     regions: bool  # whether contacts may be anywhere in their regions
     seed: int
     most_starts: int  # largest number of starts for each choice of contacts
+
+    @cached_property
+    def arrays(self) -> HandArrays:
+        """Return the hand in arrays."""
+        return hand_arrays(self.hand)
+
+    @cached_property
+    def tree(self) -> SurfaceTree:
+        """Return the object's surface."""
+        return surface_tree(self.body)
 
 
 def contact_choices(
@@ -140,35 +154,33 @@ def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCer
         return None
 
 
-def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
+def targets(asked: Asked, used: Indices, *, regions: bool) -> Targets:
     """Say where fingertips are to touch, finger k at the k-th of the contacts that are used."""
-    normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
+    normals, own = asked.grasp.normals[used], [asked.grasp.regions[int(k)] for k in used]
     aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROW for each in own]
-    rows = [
-        (finger, *row)
-        for finger, region in enumerate(own)
-        if aimed[finger]
-        for row in _edges(region.polygon, normals[finger])
+    edges = [
+        _edges(region.polygon, normal) if aim else np.empty((2, 0, 3))
+        for aim, region, normal in zip(aimed, own, normals, strict=True)
     ]
+    numbers, (points, inward) = np.arange(len(used)), np.concatenate(edges, axis=1)
     return Targets(
-        np.arange(len(used), dtype=np.int64), to_digits(grasp.positions[used]), normals,
+        numbers, to_digits(asked.grasp.positions[used]), normals,
         np.array([plane_tangents(*normal) for normal in normals.tolist()]),
         np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOFT,
-        np.array([row[0] for row in rows], np.int64),
-        np.array([row[1] for row in rows]).reshape(-1, 3),
-        np.array([row[2] for row in rows]).reshape(-1, 3), np.array(up), height,
+        np.repeat(numbers, [each.shape[1] for each in edges]), points, inward,
+        np.array(asked.up), asked.height,
     )  # fmt: skip
 
 
-def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
-    """Return a point of each edge and the unit vector from it into the convex polygon."""
+def _edges(polygon: Array, normal: Array) -> Array:
+    """Return points of the edges and unit vectors from them into the convex polygon, (2, e, 3)."""
     polygon = to_digits(polygon)
     along = np.roll(polygon, -1, axis=0) - polygon
     kept = np.linalg.norm(along, axis=1) > SHORT
     starts, inward = polygon[kept], cross(normal, along[kept])
     sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
     inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
-    return list(zip(starts, inward, strict=True))
+    return np.array([starts, inward])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -239,21 +251,11 @@ def _steady(turn: Array) -> Array:
 
     From some starts the search is so sensitive that they would decide where it ends.
     """
-    x, aside = to_digits(turn.T[:2], 1.0).tolist()
-    x = _unit(x)
-    z = _unit(_crossed(x, aside))
-    return np.array([x, _crossed(z, x), z]).T
-
-
-def _unit(v: list[float]) -> list[float]:
-    length = math.hypot(*v)
-    return [part / length for part in v]
-
-
-def _crossed(a: list[float], b: list[float]) -> list[float]:
-    return [
-        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
-    ]  # fmt: skip
+    x, aside = to_digits(turn.T[:2], 1.0)
+    x = x / math.hypot(*x)
+    z = cross(x, aside)
+    z = z / math.hypot(*z)
+    return np.array([x, cross(z, x), z]).T
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -279,9 +281,7 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
     tally: Counter[str] = Counter()
     for chosen in choices:
         used = np.array(chosen, np.int64)
-        aims = targets(
-            asked.grasp, used, regions=asked.regions, up=asked.up, height=asked.height
-        )  # fmt: skip
+        aims = targets(asked, used, regions=asked.regions)
         for start in starts(
             asked.hand, aims.origins, aims.normals, seed=asked.seed, count=asked.most_starts
         ):
@@ -294,22 +294,21 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
 
 def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPose | str:
     """Move the hand from one start; return a pose, or what is in the way."""
-    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
     kernel = compiled("grasp_core.hands.pose_kernel")
-    pose: Pose = kernel.empty_pose(arrays, len(used))
+    pose: Pose = kernel.empty_pose(asked.arrays, len(used))
     pose.palm[:], pose.origin[:], pose.q[:] = start.rotation, start.position, start.joints
-    sums = kernel.empty_sums(arrays, aims)
+    sums = kernel.empty_sums(asked.arrays, aims)
     room = asked.clearance + ROOM
-    far = Wanted(room, asked.clearance, asked.clearance + ROOM, MARGIN, PULL, True, True)
-    kernel.settle(arrays, tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
-    if sums.parts[0] > ROUGH_MM:
-        return _why_away(asked.hand, pose.q)
+    far = Wanted(room, asked.clearance, room, MARGIN, PULL, True, True)
+    kernel.settle(asked.arrays, asked.tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
     near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
-    laid = _laid(asked, aims, near, pose)
+    laid = None if sums.parts[0] > ROUGH_MM else _laid(asked, aims, near, pose)
     if laid is None:
-        return _why_away(asked.hand, pose.q)
+        low, high = asked.arrays.ranges.T
+        at_limit = ((pose.q <= low) | (pose.q >= high)) & (low < high)
+        return "limit" if at_limit.any() else "away"
     targets, points = laid
-    if blocked := blocking(asked, pose, start.fingers, asked.clearance):
+    if blocked := blocking(asked, pose, start.fingers):
         return blocked
     certificate = proved_closure(points, targets.normals, asked.friction)
     if certificate is None or not certificate.closed:
@@ -327,8 +326,7 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
 
     Which point of a block touches is only known then, so that its region is asked for again.
     """
-    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
-    kernel = compiled("grasp_core.hands.pose_kernel")
+    arrays, kernel = asked.arrays, compiled("grasp_core.hands.pose_kernel")
     laid = aims._replace(
         origins=np.array(aims.origins), normals=np.array(aims.normals),
         touching=np.array(aims.touching), soft=HARD,
@@ -336,8 +334,8 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
     sums, balls = kernel.empty_sums(arrays, aims), len(arrays.tip_corners) == len(arrays.tip_radii)
     points, off, before, inside = np.empty((len(laid.fingers), 3)), np.inf, np.inf, True
     for _ in range(MOST_TOUCHES):
-        kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
-        before, off = off, kernel.lay(arrays, tree, laid, pose, points)
+        kernel.settle(arrays, asked.tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
+        before, off = off, kernel.lay(arrays, asked.tree, laid, pose, points)
         inside = balls or all(_are_within(aims, points, TOUCHING))
         if inside and (off <= RESTING_MM or abs(before - off) <= SETTLED):
             break
@@ -356,47 +354,34 @@ def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
     return tuple(within)
 
 
-def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:
+def blocking(asked: Asked, pose: Pose, fingers: Indices | None = None) -> str:
     """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing."""
-    arrays, worst = hand_arrays(asked.hand), np.empty(2, np.int64)
+    arrays, clearance = asked.arrays, asked.clearance
     kernel = compiled("grasp_core.hands.collisions_kernel")
     needs = np.full(len(arrays.shape_links), clearance)
     if fingers is not None:
         needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
         needs[np.isin(arrays.shape_tips, fingers)] = -TOUCHING
-    turned, middles = pose.turned, pose.middles
-    if kernel.of_itself(arrays, turned, middles, clearance, worst) < clearance:
+    shapes = arrays, pose.turned, pose.middles
+    if kernel.of_itself(*shapes, clearance) < clearance:
         return "self"
-    if asked.height > -np.inf:
-        low = kernel.of_table(arrays, turned, middles, asked.up, asked.height, worst[:1])
-        if low < clearance:
-            return "table"
-    tree = surface_tree(asked.body)
-    if kernel.of_object(arrays, turned, middles, tree, needs, worst[:1]) < 0.0:
-        return "object"
-    return ""
-
-
-def _why_away(hand: Hand, q: Array) -> str:
-    low, high = hand.ranges.T
-    return "limit" if (((q <= low) | (q >= high)) & (low < high)).any() else "away"
+    if asked.height > -np.inf and kernel.of_table(*shapes, asked.up, asked.height) < clearance:
+        return "table"
+    return "object" if kernel.of_object(*shapes, asked.tree, needs) < 0.0 else ""
 
 
 def compile_posing(hand: Hand, body: Polyhedron) -> None:
     """Compile what moves a hand until its fingertips touch, on a hand that stands nowhere."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
-    kernel = compiled("grasp_core.hands.pose_kernel")
-    count = min(len(hand.fingers), FINGERS)
-    normals = np.tile(UPRIGHT, (count, 1))
+    kernel, count = compiled("grasp_core.hands.pose_kernel"), min(len(hand.fingers), FINGERS)
+    up, none = np.array([0.0, 0.0, 1.0]), np.empty((0, 3))
     aims = Targets(
-        np.arange(count, dtype=np.int64), np.zeros((count, 3)), normals,
-        np.array([plane_tangents(*normal) for normal in normals.tolist()]), np.ones(count),
-        np.full((count, 3), np.nan), SOFT, np.empty(0, np.int64), np.empty((0, 3)),
-        np.empty((0, 3)), np.array(UPRIGHT), -np.inf,
+        np.arange(count), np.zeros((count, 3)), np.tile(up, (count, 1)), np.zeros((count, 2, 3)),
+        np.ones(count), np.full((count, 3), np.nan), SOFT, np.empty(0, np.int64), none, none, up,
+        -np.inf,
     )  # fmt: skip
     wanted = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, overlaps=True, palm_moves=True)
     pose: Pose = kernel.empty_pose(arrays, count)
     pose.palm[:], pose.origin[:], pose.q[:] = np.eye(3), 1.0, hand.ranges.mean(axis=1)
     kernel.settle(arrays, tree, aims, wanted, pose, kernel.empty_sums(arrays, aims), 0, 1.0)
     kernel.lay(arrays, tree, aims, pose, np.empty((count, 3)))
-    compiled("grasp_core.hands.pose_kernel").place(arrays, aims, pose)
