@@ -150,7 +150,7 @@ def hand_arrays(hand: Hand) -> HandArrays:
     ]  # fmt: skip
     where = np.array([link for link, _ in parts])
     tip_shapes = np.array([np.flatnonzero(where == end)[-1] for end in ends])  # balls or covers
-    tips = [parts[number][1] for number in tip_shapes.tolist()]
+    tips = [parts[int(number)][1] for number in tip_shapes]
     corners = [finger.tip.core[0] for finger in fingers]
     one, other = np.triu_indices(len(where), 1)
     kept = _free_links(hand, starts)[where[one] + 1, where[other] + 1]  # must not overlap
