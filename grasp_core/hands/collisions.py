@@ -15,17 +15,17 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import PALM, SAME, Hand
-from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays, kept_by_identity
+from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays
 from grasp_core.hands.kinematics import places
 from grasp_core.objects.polyhedron import Polyhedron
 
+KERNEL = "grasp_core.hands.collisions_kernel"
 LEAF = 4
 """Largest number of triangles of a node without children."""
 FAR = 0.02
 """Distance up to which clearances are measured [m]."""
 
 
-@kept_by_identity(8)
 @lru_cache(maxsize=8)
 def surface_tree(body: Polyhedron) -> SurfaceTree:
     """Sort the triangles of an object; equal objects share the tree."""
@@ -60,7 +60,7 @@ def surface_tree(body: Polyhedron) -> SurfaceTree:
     return SurfaceTree(
         np.ascontiguousarray(corners),
         np.divide(across, sizes, out=np.zeros_like(across), where=sizes > 0.0),
-        order.astype(np.int64), np.array([middle for middle, _ in balls]),
+        np.array([middle for middle, _ in balls]),
         np.array([radius for _, radius in balls]), np.array(links, np.int64),
     )  # fmt: skip
 
@@ -80,17 +80,16 @@ def clearances(
     up: Array | None = None, height: float = 0.0,
 ) -> Clearances:  # fmt: skip
     """Measure the distances of a hand from itself, an object and a table."""
-    arrays, tree = hand_arrays(hand), surface_tree(body)
-    turned, middles = _shapes(hand, arrays, joints, palm_pose)
-    kernel, worst = compiled("grasp_core.hands.collisions_kernel"), np.empty(2, np.int64)
-    touching = np.isin(arrays.shape_tips, fingers)
+    kernel, tree = compiled(KERNEL), surface_tree(body)
+    shapes = _shapes(hand, joints, palm_pose)
+    touching = np.isin(shapes[0].shape_tips, fingers)
     never = np.full(len(touching), -np.inf)
     apart = [
-        kernel.of_object(arrays, turned, middles, tree, np.where(left_out, never, FAR), worst[:1])
+        kernel.of_object(*shapes, tree, np.where(left_out, never, FAR))
         for left_out in (touching, ~touching)
     ]
-    low = FAR if up is None else kernel.of_table(arrays, turned, middles, up, height, worst[:1])
-    own = kernel.of_itself(arrays, turned, middles, FAR, worst)
+    low = FAR if up is None else kernel.of_table(*shapes, up, height)
+    own = kernel.of_itself(*shapes, FAR)
     return Clearances(
         min(own, FAR), min(apart[0], 0.0) + FAR, min(apart[1], 0.0) + FAR, min(low, FAR)
     )
@@ -109,9 +108,8 @@ def tip_gaps(
     hand: Hand, body: Polyhedron, joints: Array, palm_pose: Array, fingers: Indices
 ) -> TipGaps:
     """Measure how far fingertips are from an object."""
-    arrays, tree = hand_arrays(hand), surface_tree(body)
-    turned, middles = _shapes(hand, arrays, joints, palm_pose)
-    kernel = compiled("grasp_core.hands.collisions_kernel")
+    kernel, tree = compiled(KERNEL), surface_tree(body)
+    arrays, turned, middles = _shapes(hand, joints, palm_pose)
     near, other, apart = *np.empty((2, len(fingers), 3)), np.empty(len(fingers))
     for k, finger in enumerate(fingers):
         apart[k] = kernel.tip_surface(arrays, turned, middles, tree, finger, near[k], other[k])
@@ -126,28 +124,29 @@ def tip_distances(
     hand: Hand, joints: Array, palm_pose: Array, fingers: Iterable[int], points: Array
 ) -> Array:
     """Measure how far points are from fingertips: zero where these touch them, (k,) [m]."""
-    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.collisions_kernel")
-    turned, middles = _shapes(hand, arrays, joints, palm_pose)
-    return np.array([
-        kernel.tip_point(arrays, turned, middles, finger, point)
-        for finger, point in zip(fingers, points, strict=True)
-    ])  # fmt: skip
+    kernel, (arrays, turned, middles) = compiled(KERNEL), _shapes(hand, joints, palm_pose)
+    apart: list[float] = []
+    for finger, point in zip(fingers, points, strict=True):
+        s = arrays.tip_shapes[finger]
+        corners, rounding = kernel.core_in(arrays, turned[s], middles[s], s)
+        apart.append(beyond_hull(corners, point[None])[0] - rounding)
+    return np.array(apart)
 
 
-def _shapes(hand: Hand, arrays: HandArrays, joints: Array, palm_pose: Array) -> tuple[Array, Array]:
-    found = places(hand, joints, palm_pose)
+def _shapes(hand: Hand, joints: Array, palm_pose: Array) -> tuple[HandArrays, Array, Array]:
+    """Return the arrays of a hand, and the axes and middles of its shapes where it stands."""
+    found, arrays = places(hand, joints, palm_pose), hand_arrays(hand)
     turned, middles = np.empty_like(arrays.shape_rotations), np.empty_like(arrays.shape_positions)
-    compiled("grasp_core.hands.collisions_kernel").place_shapes(
+    compiled(KERNEL).place_shapes(
         arrays, palm_pose[:3, :3].copy(), palm_pose[:3, 3].copy(), found.link_rotations[0],
         found.link_positions[0], turned, middles,
     )  # fmt: skip
-    return turned, middles
+    return arrays, turned, middles
 
 
 def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
     """Return the names of links, in order of the alphabet, that overlap at some joint angles."""
-    arrays, kernel = hand_arrays(hand), compiled("grasp_core.hands.collisions_kernel")
-    turned, middles = _shapes(hand, arrays, joints, np.eye(POSE))
+    kernel, (arrays, turned, middles) = compiled(KERNEL), _shapes(hand, joints, np.eye(POSE))
     names = [PALM, *(link.name for link in hand.links)]
     found, way, point = set[tuple[str, str]](), np.empty(3), np.empty(3)
     for i, j in arrays.pairs.tolist():

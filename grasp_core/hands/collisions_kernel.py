@@ -1,4 +1,4 @@
-"""Measures how far a hand is from itself, from an object and from a table, compiled."""
+"""Says where the parts of a hand are, and how far from itself, an object and a table, compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,60 @@ from grasp_core.hands.distances_kernel import (
     hull_surface,
     into_frame,
     nearest,
+    squared,
     windings,
 )
 from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree
-from grasp_core.hands.kinematics_kernel import chains, moved, product
 
 INSIDE = 0.5
 """Windings of a surface around a point from which the point counts as inside."""
 ROUNDING = 1e-9
 """Distance beyond a limit from which a quick bound on a distance decides [m]."""
+
+
+@loop()
+def turn(axis: Array, angle: float, out: Array) -> None:
+    """Fill in the rotation about a unit axis, (3, 3), by Rodrigues' formula."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = axis[0], axis[1], axis[2]
+    k = 1.0 - c
+    out[0, 0], out[0, 1], out[0, 2] = c + k * x * x, k * x * y - s * z, k * x * z + s * y
+    out[1, 0], out[1, 1], out[1, 2] = k * x * y + s * z, c + k * y * y, k * y * z - s * x
+    out[2, 0], out[2, 1], out[2, 2] = k * x * z - s * y, k * y * z + s * x, c + k * z * z
+
+
+@loop()
+def product(A: Array, B: Array, out: Array) -> None:
+    """Fill in the product of two (3, 3) matrices."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
+
+
+@loop()
+def moved(R: Array, p: Array, local: Array, out: Array) -> None:
+    """Fill in the point p + R local, (3,)."""
+    for i in range(3):
+        out[i] = p[i] + R[i, 0] * local[0] + R[i, 1] * local[1] + R[i, 2] * local[2]
+
+
+@loop()
+def chains(
+    hand: HandArrays, palm_rotation: Array, palm_position: Array, angles: Array, R: Array, p: Array,
+    W: Array,
+) -> None:  # fmt: skip
+    """Fill in where links are for one set of joint angles."""
+    about, frame = np.empty((3, 3)), np.empty((3, 3))
+    for f in range(len(hand.starts) - 1):
+        before, origin = palm_rotation, palm_position
+        for k in range(hand.starts[f], hand.starts[f + 1]):
+            moved(before, origin, hand.positions[k], p[k])
+            product(before, hand.rotations[k], frame)
+            for i in range(3):
+                W[k, i] = dotted(frame[i], hand.axes[k])
+            turn(hand.axes[k], angles[k], about)
+            product(frame, about, R[k])
+            before, origin = R[k], p[k]
 
 
 @loop()
@@ -46,8 +91,7 @@ def near_links(hand: HandArrays, middles: Array, limit: float, near: NDArray[np.
         for b in range(a):
             one, other, square = hand.link_shapes[a], hand.link_shapes[b], 0.0
             if one >= 0 and other >= 0:
-                for k in range(3):
-                    square += (middles[one, k] - middles[other, k]) ** 2
+                square = squared(middles[one], middles[other])
             reach = limit + hand.link_reaches[a] + hand.link_reaches[b]
             near[a, b] = near[b, a] = reach >= 0.0 and square <= reach * reach
 
@@ -55,11 +99,8 @@ def near_links(hand: HandArrays, middles: Array, limit: float, near: NDArray[np.
 @loop()
 def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) -> bool:
     """Return whether balls of two shapes are as near as a limit; few arguments make calls cheap."""
-    square = 0.0
-    for k in range(3):
-        square += (middles[i, k] - middles[j, k]) ** 2
     reach = limit + reaches[i] + reaches[j]
-    return reach >= 0.0 and square <= reach * reach
+    return reach >= 0.0 and squared(middles[i], middles[j]) <= reach * reach
 
 
 @loop()
@@ -91,9 +132,7 @@ def is_block(hand: HandArrays, s: int) -> bool:
 def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, float]:
     """Return corners (m, 3) whose hull is a shape, or its block, but for a rounding, and that."""
     if not is_block(hand, s):
-        corners = np.empty((8, 3))
-        corners_of(hand.shape_sizes[s], R, middle, corners)
-        return corners, float(hand.shape_radii[s])
+        return corners_of(hand.shape_sizes[s], R, middle), float(hand.shape_radii[s])
     first, end = hand.tip_firsts[hand.shape_tips[s]], hand.tip_firsts[hand.shape_tips[s] + 1]
     corners = np.empty((end - first, 3))
     for c in range(first, end):
@@ -116,7 +155,7 @@ def _from_block(
     if apart <= ROUNDING:
         return -np.inf
     if apart <= limit + both:
-        length = np.sqrt(((other - near) ** 2).sum())
+        length = np.sqrt(squared(other, near))
         for a in range(3):
             near[a] = (other[a] - near[a]) / length
             other[a] -= near[a] * rounding
@@ -175,24 +214,17 @@ def pair_distance(
 
 
 @loop()
-def of_itself(
-    hand: HandArrays, turned: Array, middles: Array, need: float, worst: Indices
-) -> float:
+def of_itself(hand: HandArrays, turned: Array, middles: Array, need: float) -> float:
     """Return the least distance between shapes of a hand that must not overlap."""
     best, way, point = np.nextafter(need, np.inf), np.empty(3), np.empty(3)
     near = np.empty((len(hand.link_shapes), len(hand.link_shapes)), np.bool_)
     near_links(hand, middles, best, near)
-    worst[:] = -1
     for n in range(len(hand.pairs)):
         i, j = hand.pairs[n, 0], hand.pairs[n, 1]
         if not near[hand.shape_links[i] + 1, hand.shape_links[j] + 1]:
             continue
-        if not may_be_near(middles, hand.shape_reaches, i, j, best):
-            continue
-        apart = pair_distance(hand, turned, middles, i, j, best, way, point)
-        if apart < best:
-            best = apart
-            worst[0], worst[1] = i, j
+        if may_be_near(middles, hand.shape_reaches, i, j, best):
+            best = min(best, pair_distance(hand, turned, middles, i, j, best, way, point))
     return best
 
 
@@ -202,17 +234,13 @@ def tip_surface(
     other: Array,
 ) -> float:  # fmt: skip
     """Return a surface's distance from a tip's hull, zero in it; its rounding where it touches."""
-    s, square = hand.tip_shapes[finger], 0.0
+    s = hand.tip_shapes[finger]
     if is_block(hand, s):
         corners, _ = core_in(hand, turned[s], middles[s], s)
-        return hull_surface(
-            corners, np.inf, tree.corners, tree.middles, tree.radii, tree.links, near, other
-        )
+        return hull_surface(corners, np.inf, tree, near, other)
     near[:] = middles[s]
-    nearest(near, np.inf, tree.corners, tree.middles, tree.radii, tree.links, other)
-    for j in range(3):
-        square += (other[j] - near[j]) ** 2
-    return np.sqrt(square)
+    nearest(near, np.inf, tree, other)
+    return np.sqrt(squared(other, near))
 
 
 @loop()
@@ -220,8 +248,8 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
     """Return the signed distance from a surface of the corner that is deepest in it."""
     best, at = np.inf, np.empty(3)
     for c in range(len(corners)):
-        nearest(corners[c], np.inf, tree.corners, tree.middles, tree.radii, tree.links, at)
-        away = np.sqrt(((corners[c] - at) ** 2).sum())
+        nearest(corners[c], np.inf, tree, at)
+        away = np.sqrt(squared(corners[c], at))
         if windings(corners[c], tree.corners) > INSIDE:
             away = -away
         if away < best:
@@ -231,75 +259,45 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
 
 
 @loop()
-def tip_point(hand: HandArrays, turned: Array, middles: Array, finger: int, point: Array) -> float:
-    """Return the distance of a point from a fingertip, negative within its rounding."""
-    s = hand.tip_shapes[finger]
-    corners, rounding = core_in(hand, turned[s], middles[s], s)
-    alone, near, other = np.empty((1, 3)), np.empty(3), np.empty(3)
-    alone[0] = point
-    return hull_hull(corners, alone, np.inf, near, other) - rounding
-
-
-@loop()
 def of_object(
-    hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, needs: Array, worst: Indices
+    hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, needs: Array
 ) -> float:  # fmt: skip
     """Return the least distance of shapes from a surface, beyond what each of them needs."""
     best, near, other = np.inf, np.empty(3), np.empty(3)
-    worst[0] = -1
-    low, high = tree.corners[0, 0].copy(), tree.corners[0, 0].copy()
-    for j in range(3):
-        low[j] = tree.middles[0, j] - tree.radii[0]
-        high[j] = tree.middles[0, j] + tree.radii[0]
+    low, high = tree.middles[0] - tree.radii[0], tree.middles[0] + tree.radii[0]
     for s in range(len(hand.shape_links)):
         radius, middle = hand.shape_radii[s], middles[s]
         if is_block(hand, s):
             corners, radius = core_in(hand, turned[s], middles[s], s)
             middle = corners[0]
-            apart = hull_surface(
-                corners, needs[s] + radius, tree.corners, tree.middles, tree.radii, tree.links,
-                near, other,
-            ) - radius - needs[s]  # fmt: skip
+            apart = hull_surface(corners, needs[s] + radius, tree, near, other)
         else:
-            apart = box_surface(
-                hand.shape_sizes[s], turned[s], middles[s], needs[s] + radius, tree.corners,
-                tree.middles, tree.radii, tree.links,
-            ) - radius - needs[s]  # fmt: skip
-        inner = True
-        for j in range(3):
-            inner = inner and low[j] < middle[j] < high[j]
+            size = hand.shape_sizes[s]
+            apart = box_surface(size, turned[s], middles[s], needs[s] + radius, tree)
+        apart = apart - radius - needs[s]
+        inner = (low < middle).all() and (middle < high).all()
         if apart >= 0.0 and inner and windings(middle, tree.corners) > INSIDE:
             apart = -tree.radii[0]
-        if apart < min(best, 0.0):
-            worst[0] = s
         best = min(best, apart)
     return best
 
 
 @loop()
-def of_table(
-    hand: HandArrays, turned: Array, middles: Array, up: Array, height: float, worst: Indices
-) -> float:  # fmt: skip
+def of_table(hand: HandArrays, turned: Array, middles: Array, up: Array, height: float) -> float:
     """Return the least height of a hand's shapes over a plane."""
     best = np.inf
     for s in range(len(hand.shape_links)):
         if is_block(hand, s):
             corners, rounding = core_in(hand, turned[s], middles[s], s)
-            lowest = np.inf
             for c in range(len(corners)):
-                lowest = min(lowest, dotted(up, corners[c]) - height - rounding)
-            if lowest < best:
-                best = lowest
-                worst[0] = s
+                best = min(best, dotted(up, corners[c]) - height - rounding)
             continue
         lowest = dotted(up, middles[s]) - height - hand.shape_radii[s]
         for k in range(3):
             lowest -= hand.shape_sizes[s, k] * abs(
                 up[0] * turned[s, 0, k] + up[1] * turned[s, 1, k] + up[2] * turned[s, 2, k]
             )
-        if lowest < best:
-            best = lowest
-            worst[0] = s
+        best = min(best, lowest)
     return best
 
 
@@ -311,13 +309,11 @@ def free_postures(
     count, fingers, found = len(hand.axes), len(hand.tip_radii), 0
     R, p, W = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
     turned, middles = np.empty((len(hand.shape_links), 3, 3)), np.empty((len(hand.shape_links), 3))
-    eye, zero, middle, worst = np.eye(3), np.zeros(3), np.empty(3), np.empty(2, np.int64)
+    eye, zero, middle = np.eye(3), np.zeros(3), np.empty(3)
     for n in range(len(angles)):
         if found == len(kept):
             break
-        chains(
-            hand.positions, hand.rotations, hand.axes, hand.starts, eye, zero, angles[n], R, p, W
-        )
+        chains(hand, eye, zero, angles[n], R, p, W)
         middle[:] = 0.0
         for f in range(fingers):
             last = hand.starts[f + 1] - 1
@@ -326,14 +322,11 @@ def free_postures(
                 middle[j] += tips[found, f, j] / fingers
         near = True
         for f in range(fingers):
-            square = 0.0
-            for j in range(3):
-                square += (tips[found, f, j] - middle[j]) ** 2
-            near = near and square <= widest * widest
+            near = near and squared(tips[found, f], middle) <= widest * widest
         if not near:
             continue
         place_shapes(hand, eye, zero, R, p, turned, middles)
-        if of_itself(hand, turned, middles, apart, worst) >= apart:
+        if of_itself(hand, turned, middles, apart) >= apart:
             kept[found] = n
             found += 1
     return found

@@ -17,9 +17,10 @@ between complex objects in three-dimensional space, 1988.
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
+from grasp_core.hands.hand_arrays import SurfaceTree
 
 PARALLEL = 1e-10
 """Sine of the angle between edges below which their cross product is no axis."""
@@ -31,6 +32,12 @@ CLOSE = 1e-13
 """Share of a squared distance by which a corner must be nearer to the origin to count."""
 DEEPEST = 64
 """Places on the stack of a walk through the tree; a tree of 2^32 triangles needs fewer."""
+
+
+@loop()
+def squared(p: Array, q: Array) -> float:
+    """Return the squared distance of two points."""
+    return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
 
 
 @loop()
@@ -64,11 +71,9 @@ def point_triangle(p: Array, T: Array, near: Array, weights: Array) -> float:
         total = va + vb + vc
         v, w = vb / total, vc / total
     weights[0], weights[1] = v, w
-    square = 0.0
     for j in range(3):
         near[j] = T[0, j] + v * ab[j] + w * ac[j]
-        square += (p[j] - near[j]) ** 2
-    return square
+    return squared(p, near)
 
 
 @loop()
@@ -97,12 +102,10 @@ def segment_segment(a: Array, u: Array, b: Array, v: Array, between: Array, end:
         s = min(max(-ur / uu, 0.0), 1.0)
     elif vv > 0.0:
         t = min(max(vr / vv, 0.0), 1.0)
-    square = 0.0
     for j in range(3):
         end[j] = b[j] + t * v[j]
         between[j] = end[j] - a[j] - s * u[j]
-        square += between[j] ** 2
-    return square
+    return dotted(between, between)
 
 
 @loop()
@@ -127,19 +130,21 @@ def into_frame(R: Array, middle: Array, p: Array, out: Array) -> None:
 
 
 @loop()
-def corners_of(h: Array, R: Array, middle: Array, out: Array) -> None:
-    """Fill in the corners of a box with axes R (columns), (8, 3); corner k has the signs of k."""
+def corners_of(h: Array, R: Array, middle: Array) -> Array:
+    """Return the corners of a box with axes R (columns), (8, 3); corner k has the signs of k."""
+    corners = np.empty((BOX_CORNERS, 3))
     for k in range(BOX_CORNERS):
         for i in range(3):
-            out[k, i] = middle[i]
+            corners[k, i] = middle[i]
             for j in range(3):
-                out[k, i] += R[i, j] * (h[j] if k >> j & 1 else -h[j])
+                corners[k, i] += R[i, j] * (h[j] if k >> j & 1 else -h[j])
+    return corners
 
 
 @loop()
-def edges_of(corners: Array, starts: Array, along: Array) -> None:
-    """Fill in where the edges of a box start and how they run, (12, 3) each."""
-    n = 0
+def edges_of(corners: Array) -> tuple[Array, Array]:
+    """Return where the edges of a box start and how they run, (12, 3) each."""
+    starts, along, n = np.empty((BOX_EDGES, 3)), np.empty((BOX_EDGES, 3)), 0
     for j in range(3):
         for k in range(BOX_CORNERS):
             if not k >> j & 1:
@@ -147,6 +152,7 @@ def edges_of(corners: Array, starts: Array, along: Array) -> None:
                     starts[n, i] = corners[k, i]
                     along[n, i] = corners[k | 1 << j, i] - corners[k, i]
                 n += 1
+    return starts, along
 
 
 @loop()
@@ -173,28 +179,25 @@ def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) 
 @loop()
 def box_triangle(h: Array, T: Array, limit: float) -> float:
     """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame."""
-    axis, unit, sides, way = np.empty(3), np.zeros(3), np.empty((CORNERS, 3)), np.empty(3)
+    axis, units, sides, way = np.empty(3), np.eye(3), np.empty((CORNERS, 3)), np.empty(3)
     for k in range(CORNERS):
         for j in range(3):
             sides[k, j] = T[(k + 1) % CORNERS, j] - T[k, j]
     cross(sides[0], sides[1], axis)
     widest = _try_axis(axis / max(np.sqrt(dotted(axis, axis)), 1e-300), h, T, -np.inf, way)
     for j in range(3):
-        unit[:] = 0.0
-        unit[j] = 1.0
-        widest = _try_axis(unit, h, T, widest, way)
+        widest = _try_axis(units[j], h, T, widest, way)
         if widest > limit:
             return widest
         for k in range(CORNERS):
             length = np.sqrt(dotted(sides[k], sides[k]))
             if length > 0.0:
-                cross(unit, sides[k] / length, axis)
+                cross(units[j], sides[k] / length, axis)
                 widest = _try_axis(axis, h, T, widest, way)
     if widest <= 0.0 or widest > limit:
         return widest
-    corners, starts, along = np.empty((8, 3)), np.empty((12, 3)), np.empty((12, 3))
-    corners_of(h, np.eye(3), np.zeros(3), corners)
-    edges_of(corners, starts, along)
+    corners = corners_of(h, units, np.zeros(3))
+    starts, along = edges_of(corners)
     best, near, between, weights = np.inf, np.empty(3), np.empty(3), np.empty(2)
     for k in range(CORNERS):
         best = min(best, point_box(T[k], h))
@@ -211,25 +214,16 @@ def box_box(
     h: Array, g: Array, R: Array, middle: Array, limit: float, way: Array, point: Array
 ) -> float:  # fmt: skip
     """Return the signed distance of the box |x_i| <= h_i from another box."""
-    others = np.empty((8, 3))
-    corners_of(g, R, middle, others)
-    axis, unit, widest = np.empty(3), np.zeros(3), -np.inf
+    others, axis, units, turned = corners_of(g, R, middle), np.empty(3), np.eye(3), R.T.copy()
+    widest = -np.inf
     for j in range(3):
-        unit[:] = 0.0
-        unit[j] = 1.0
-        widest = _try_axis(unit, h, others, widest, way)
-        for i in range(3):
-            axis[i] = R[i, j]
-        widest = _try_axis(axis, h, others, widest, way)
+        widest = _try_axis(units[j], h, others, widest, way)
+        widest = _try_axis(turned[j], h, others, widest, way)
         if widest > limit:
             return widest
     for j in range(3):
-        unit[:] = 0.0
-        unit[j] = 1.0
         for k in range(3):
-            for i in range(3):
-                point[i] = R[i, k]
-            cross(unit, point, axis)
+            cross(units[j], turned[k], axis)
             widest = _try_axis(axis, h, others, widest, way)
         if widest > limit:
             return widest
@@ -249,9 +243,8 @@ def _nearest_features(
     h: Array, g: Array, R: Array, middle: Array, others: Array, way: Array, point: Array
 ) -> float:  # fmt: skip
     """Compute the distance of two boxes that do not overlap, from corners and edges."""
-    corners, local, best = np.empty((8, 3)), np.empty(3), np.inf
-    between, end = np.empty(3), np.empty(3)
-    corners_of(h, np.eye(3), np.zeros(3), corners)
+    corners, best = corners_of(h, np.eye(3), np.zeros(3)), np.inf
+    local, between, end = np.empty(3), np.empty(3), np.empty(3)
     for k in range(BOX_CORNERS):
         square = point_box(others[k], h)
         if square < best:
@@ -270,11 +263,8 @@ def _nearest_features(
                 for j in range(3):
                     point[i] += R[i, j] * local[j]
                 way[i] = point[i] - corners[k, i]
-    starts, along, froms, ways = (
-        np.empty((12, 3)), np.empty((12, 3)), np.empty((12, 3)), np.empty((12, 3))
-    )  # fmt: skip
-    edges_of(corners, starts, along)
-    edges_of(others, froms, ways)
+    starts, along = edges_of(corners)
+    froms, ways = edges_of(others)
     for e in range(BOX_EDGES):
         for k in range(BOX_EDGES):
             square = segment_segment(starts[e], along[e], froms[k], ways[k], between, end)
@@ -374,8 +364,7 @@ def hull_hull(
 
 @loop()
 def hull_surface(
-    hull: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
-    near: Array, other: Array,
+    hull: Array, within: float, tree: SurfaceTree, near: Array, other: Array
 ) -> float:  # fmt: skip
     """Return the distance of a hull, (m, 3), from a surface: zero in it, inf if not within."""
     stack, gaps, depth, gap2 = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), 1, np.empty(2)
@@ -386,31 +375,28 @@ def hull_surface(
         node = stack[depth]
         if gaps[depth] > best:
             continue
-        if links[node, 0] < 0:
-            for t in range(links[node, 1], links[node, 1] - links[node, 0]):
-                away = hull_hull(hull, corners[t], best, p, s)
+        if tree.links[node, 0] < 0:
+            for t in range(tree.links[node, 1], tree.links[node, 1] - tree.links[node, 0]):
+                away = hull_hull(hull, tree.corners[t], best, p, s)
                 if away <= best and away < found:
                     best = found = away
                     near[:], other[:] = p, s
             continue
         for side in range(2):
-            child = links[node, side]
-            middle[0] = middles[child]
-            radius = float(radii[child])
+            child = tree.links[node, side]
+            middle[0] = tree.middles[child]
+            radius = float(tree.radii[child])
             gap2[side] = hull_hull(hull, middle, best + radius, p, s) - radius
         far = 0 if gap2[0] > gap2[1] else 1
         for side in (far, 1 - far):
             if gap2[side] <= best:
-                stack[depth], gaps[depth] = links[node, side], gap2[side]
+                stack[depth], gaps[depth] = tree.links[node, side], gap2[side]
                 depth += 1
     return found
 
 
 @loop()
-def nearest(
-    p: Array, within: float, corners: Array, middles: Array, radii: Array, links: Indices,
-    near: Array,
-) -> int:  # fmt: skip
+def nearest(p: Array, within: float, tree: SurfaceTree, near: Array) -> int:
     """Fill in the surface's point nearest to p; return its triangle, or -1 if not within."""
     stack, gaps, found, depth = np.empty(DEEPEST, np.int64), np.empty(DEEPEST), -1, 1
     best, at, gap2, weights = within * within, np.empty(3), np.empty(2), np.empty(2)
@@ -420,31 +406,26 @@ def nearest(
         node = stack[depth]
         if gaps[depth] > 0.0 and gaps[depth] * gaps[depth] >= best:
             continue
-        if links[node, 0] < 0:
-            for t in range(links[node, 1], links[node, 1] - links[node, 0]):
-                square = point_triangle(p, corners[t], at, weights)
+        if tree.links[node, 0] < 0:
+            for t in range(tree.links[node, 1], tree.links[node, 1] - tree.links[node, 0]):
+                square = point_triangle(p, tree.corners[t], at, weights)
                 if square < best:
                     best, found = square, t
                     near[:] = at
             continue
         for side in range(2):
-            child, square = links[node, side], 0.0
-            for j in range(3):
-                square += (p[j] - middles[child, j]) ** 2
-            gap2[side] = np.sqrt(square) - radii[child]
+            child = tree.links[node, side]
+            gap2[side] = np.sqrt(squared(p, tree.middles[child])) - tree.radii[child]
         far = 0 if gap2[0] > gap2[1] else 1
         for side in (far, 1 - far):
             if gap2[side] <= 0.0 or gap2[side] * gap2[side] < best:
-                stack[depth], gaps[depth] = links[node, side], gap2[side]
+                stack[depth], gaps[depth] = tree.links[node, side], gap2[side]
                 depth += 1
     return found
 
 
 @loop()
-def box_surface(
-    h: Array, R: Array, middle: Array, limit: float, corners: Array, middles: Array, radii: Array,
-    links: Indices,
-) -> float:  # fmt: skip
+def box_surface(h: Array, R: Array, middle: Array, limit: float, tree: SurfaceTree) -> float:
     """Return the signed distance of a box from a surface, or some number above the limit."""
     stack, depth, local, T = np.empty(DEEPEST, np.int64), 1, np.empty(3), np.empty((3, 3))
     best = np.nextafter(limit, np.inf)
@@ -452,16 +433,16 @@ def box_surface(
     while depth > 0:
         depth -= 1
         node = stack[depth]
-        into_frame(R, middle, middles[node], local)
-        if np.sqrt(point_box(local, h)) - radii[node] > max(best, 0.0):
+        into_frame(R, middle, tree.middles[node], local)
+        if np.sqrt(point_box(local, h)) - tree.radii[node] > max(best, 0.0):
             continue
-        if links[node, 0] >= 0:
-            stack[depth], stack[depth + 1] = links[node, 0], links[node, 1]
+        if tree.links[node, 0] >= 0:
+            stack[depth], stack[depth + 1] = tree.links[node, 0], tree.links[node, 1]
             depth += 2
             continue
-        for t in range(links[node, 1], links[node, 1] - links[node, 0]):
+        for t in range(tree.links[node, 1], tree.links[node, 1] - tree.links[node, 0]):
             for k in range(3):
-                into_frame(R, middle, corners[t, k], T[k])
+                into_frame(R, middle, tree.corners[t, k], T[k])
             best = min(best, box_triangle(h, T, best))
     return best
 

@@ -1,21 +1,18 @@
-"""Arrays of a hand, a surface, aims and poses, which compiled loops read and change.
-
-Hands and objects keep their arrays by identity: equal ones that are other objects share them too.
-"""
+"""Arrays of a hand, a surface, aims and poses, which compiled loops read and change."""
 
 import math
-from collections.abc import Callable
-from functools import lru_cache, wraps
+from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
 
-Value = TypeVar("Value")
-Result = TypeVar("Result")
+_Part: TypeAlias = tuple[int, LinkShape]
+"""A shape with the number of its link."""
 LEAST_BALL = 0.008
 """Least radius of the balls that stand for a shape while a pose is sought [m]: thinner parts of a
 link lie beside thicker ones."""
@@ -26,27 +23,6 @@ BALLS_APART = 1.7
 """Largest distance between neighbouring balls of a shape, in the smallest half-size."""
 OUTSIDE = 0.006
 """How far a ball must stick out of every larger ball of its link to be kept [m]."""
-
-
-def kept_by_identity(most: int) -> Callable[[Callable[[Value], Result]], Callable[[Value], Result]]:
-    """Return a decorator that keeps results for at most so many arguments, and these alive."""
-
-    def decorated(function: Callable[[Value], Result]) -> Callable[[Value], Result]:
-        kept: dict[int, tuple[Value, Result]] = {}
-
-        @wraps(function)
-        def looked_up(value: Value) -> Result:
-            known = kept.get(id(value))
-            if known is None:  # a kept argument is alive, so that no other has its address
-                known = value, function(value)
-                if len(kept) >= most:
-                    kept.clear()
-                kept[id(value)] = known
-            return known[1]
-
-        return looked_up
-
-    return decorated
 
 
 class HandArrays(NamedTuple):
@@ -65,6 +41,7 @@ class HandArrays(NamedTuple):
     ratios: Array  # (j,)
     offsets: Array  # (j,) [rad]
     starts: Indices  # first link of each finger, and the number of links, (f + 1,)
+    link_firsts: Indices  # first link of the finger of each link, (j,)
     tip_centers: Array  # middles of the fingertips' balls, (f, 3)
     tip_radii: Array  # radii of these balls, (f,)
     tip_corners: Array  # of all fingertips, for a ball its middle, (c, 3)
@@ -92,7 +69,6 @@ class SurfaceTree(NamedTuple):
 
     corners: Array  # of the triangles, in the order of the leaves, (t, 3, 3)
     normals: Array  # outward unit normals, (t, 3); zero for a triangle without area
-    numbers: Indices  # number of each of these triangles in the body, (t,)
     middles: Array  # of the balls, (n, 3)
     radii: Array  # of the balls, (n,)
     links: Indices
@@ -160,33 +136,25 @@ class Sums(NamedTuple):
     those of overlaps [mm^2], (3,)."""
 
 
-_Part: TypeAlias = tuple[int, LinkShape]
-"""A shape with the number of its link."""
-
-
-@kept_by_identity(16)
 @lru_cache(maxsize=16)
 def hand_arrays(hand: Hand) -> HandArrays:
     """Lay a hand out as arrays; equal hands share them."""
-    links, drives = hand.links, hand.drives
+    links, drives, fingers = hand.links, hand.drives, hand.fingers
+    starts = np.cumsum([0, *(len(finger.links) for finger in fingers)])
+    ends: list[int] = (starts[1:] - 1).tolist()
     parts: list[_Part] = [(-1, shape) for shape in hand.palm]
     parts += [(i, shape) for i, link in enumerate(links) for shape in link.shapes]
-    lengths = [len(finger.links) for finger in hand.fingers]
-    starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    ends = starts[1:] - 1
-    tips = [_tip_shape(finger) for finger in hand.fingers]
     parts += [
-        (int(end), tip)
-        for end, tip, finger in zip(ends, tips, hand.fingers, strict=True)
-        if finger.tip.corners is None
-    ]
-    corners = [finger.tip.core[0] for finger in hand.fingers]
-    free = _free_links(hand, starts)
-    where = np.array([link for link, _ in parts], np.int64)
+        (end, LinkShape(finger.tip.center, np.eye(3), np.zeros(3), finger.tip.radius))
+        for end, finger in zip(ends, fingers, strict=True) if finger.tip.corners is None
+    ]  # fmt: skip
+    where = np.array([link for link, _ in parts])
+    tip_shapes = np.array([np.flatnonzero(where == end)[-1] for end in ends])  # balls or covers
+    tips = [parts[int(number)][1] for number in tip_shapes]
+    corners = [finger.tip.core[0] for finger in fingers]
     one, other = np.triu_indices(len(where), 1)
-    kept = free[where[one] + 1, where[other] + 1] > 0.0  # pairs that must not overlap
+    kept = _free_links(hand, starts)[where[one] + 1, where[other] + 1]  # must not overlap
     balls = _balls([part for part in parts if part[0] not in ends])
-    at = np.array([link for link, _, _ in balls], np.int64)
     shapes = [shape for _, shape in parts]
     held = [_link_ball(parts, link) for link in range(-1, len(links))]
     return HandArrays(
@@ -194,68 +162,68 @@ def hand_arrays(hand: Hand) -> HandArrays:
         rotations=np.array([link.joint.rotation for link in links]),
         axes=np.array([link.joint.axis for link in links]),
         ranges=drives.ranges, drivers=drives.drivers, ratios=drives.ratios, offsets=drives.offsets,
-        starts=starts,
-        tip_centers=np.array([finger.tip.center for finger in hand.fingers]),
-        tip_radii=np.array([finger.tip.radius for finger in hand.fingers]),
+        starts=starts, link_firsts=np.repeat(starts[:-1], np.diff(starts)),
+        tip_centers=np.array([finger.tip.center for finger in fingers]),
+        tip_radii=np.array([finger.tip.radius for finger in fingers]),
         tip_corners=np.concatenate(corners),
         cover_corners=np.concatenate(
             [(own - tip.position) @ tip.rotation for own, tip in zip(corners, tips, strict=True)]
         ),
-        tip_firsts=np.concatenate([[0], np.cumsum([len(own) for own in corners])]).astype(np.int64),
-        tip_roundings=np.array([finger.tip.core[1] for finger in hand.fingers]),
-        tip_shapes=np.array([
-            max(n for n, (link, shape) in enumerate(parts) if shape is tip and link == end)
-            for end, tip in zip(ends, tips, strict=True)
-        ], np.int64),
+        tip_firsts=np.cumsum([0, *map(len, corners)]),
+        tip_roundings=np.array([finger.tip.core[1] for finger in fingers]),
+        tip_shapes=tip_shapes,
         shape_links=where,
         shape_positions=np.array([shape.position for shape in shapes]),
         shape_rotations=np.array([shape.rotation for shape in shapes]),
         shape_sizes=np.array([shape.half_sizes for shape in shapes]),
         shape_radii=np.array([shape.radius for shape in shapes]),
         shape_reaches=np.array([_reach(shape) for shape in shapes]),
-        shape_tips=_shape_tips(hand, parts, ends.tolist(), tips),
-        link_shapes=np.array([shape for shape, _ in held], np.int64),
-        link_reaches=np.array([reach for _, reach in held]),
-        pairs=np.column_stack([one[kept], other[kept]]).astype(np.int64),
-        ball_links=at,
+        shape_tips=np.array([
+            next((f for f, (finger, tip) in enumerate(zip(fingers, tips, strict=True))
+                  if ends[f] == link and _stands_for(shape, finger, tip)), -1)
+            for link, shape in parts
+        ]),
+        link_shapes=np.array([shape for _, shape in held]),
+        link_reaches=np.array([reach for reach, _ in held]),
+        pairs=np.column_stack([one[kept], other[kept]]),
+        ball_links=np.array([link for link, _, _ in balls], np.int64),
         ball_centers=np.array([center for _, center, _ in balls]).reshape(-1, 3),
         ball_radii=np.array([radius for _, _, radius in balls]),
     )  # fmt: skip
 
 
-def _tip_shape(finger: HandFinger) -> LinkShape:
-    """Return what stands for a fingertip: its ball, or what covers its corners."""
+def _stands_for(shape: LinkShape, finger: HandFinger, tip: LinkShape) -> bool:
+    """Return whether a shape of a last link covers the fingertip, is its ball, or ends in it."""
     if finger.tip.corners is not None:
-        return finger.links[-1].shapes[-1]
-    return LinkShape(finger.tip.center, np.eye(3), np.zeros(3), finger.tip.radius)
+        return shape is tip
+    local = (tip.position - shape.position) @ shape.rotation
+    out = np.linalg.norm(np.maximum(np.abs(local) - shape.half_sizes, 0.0))
+    return bool(abs(shape.radius - tip.radius) <= SAME and out <= SAME)
 
 
 def _reach(shape: LinkShape) -> float:
     return math.hypot(*shape.half_sizes) + shape.radius
 
 
-def _link_ball(parts: list[_Part], link: int) -> tuple[int, float]:
-    """Find the shape about whose middle the smallest ball holds a link, and its radius."""
-    best = (-1, 0.0)
+def _link_ball(parts: list[_Part], link: int) -> tuple[float, int]:
+    """Return the radius of the smallest ball that holds a link, and the shape it is about."""
     own = [(number, shape) for number, (of, shape) in enumerate(parts) if of == link]
-    for number, middle in own:
-        reach = SAME + max(
-            math.hypot(*(shape.position - middle.position)) + _reach(shape) for _, shape in own
-        )
-        if best[0] < 0 or reach < best[1]:
-            best = (number, reach)
-    return best
+    balls = (
+        (max(math.hypot(*(each.position - shape.position)) + _reach(each) for _, each in own), n)
+        for n, shape in own
+    )
+    return min(((SAME + reach, number) for reach, number in balls), default=(0.0, -1))
 
 
-def _free_links(hand: Hand, starts: Indices) -> Array:
-    """Return which links, the palm first, must not overlap, (links + 1, links + 1) of 0 and 1."""
+def _free_links(hand: Hand, starts: Indices) -> NDArray[np.bool_]:
+    """Return which links, the palm first, must not overlap, (links + 1, links + 1)."""
     names = [PALM, *(link.name for link in hand.links)]
-    free = np.ones((len(names),) * 2) - np.eye(len(names))
     pairs = [(names.index(one), names.index(other)) for one, other in hand.ignored_pairs]
     for first, end in pairwise(starts.tolist()):
         pairs += pairwise([0, *range(first + 1, end + 1)])
+    free = ~np.eye(len(names), dtype=bool)
     for i, j in pairs:
-        free[i, j] = free[j, i] = 0.0
+        free[i, j] = free[j, i] = False
     return free
 
 
@@ -283,21 +251,3 @@ def _balls(parts: list[_Part]) -> list[tuple[int, Array, float]]:
         if not inside:
             kept.append((link, center, radius))
     return kept
-
-
-def _shape_tips(
-    hand: Hand, parts: list[_Part], ends: list[int], tips: list[LinkShape]
-) -> Indices:  # fmt: skip
-    """Find the shapes that stand for fingertips: covers, balls, and capsules that end in these."""
-    found = np.full(len(parts), -1, np.int64)
-    for number, (link, shape) in enumerate(parts):
-        if link in ends:
-            finger = ends.index(link)
-            if hand.fingers[finger].tip.corners is not None:
-                found[number] = finger if shape is tips[finger] else -1
-                continue
-            local = (tips[finger].position - shape.position) @ shape.rotation
-            out = np.linalg.norm(np.maximum(np.abs(local) - shape.half_sizes, 0.0))
-            alike = abs(shape.radius - tips[finger].radius) <= SAME
-            found[number] = finger if alike and out <= SAME else -1
-    return found

@@ -1,4 +1,4 @@
-"""Derives the motors of a hand in a pose: how contact forces and gravity load its joints.
+"""Derives how the motors of a hand in a pose carry contact forces: their loads, and how they give.
 
 With origin p_j and unit axis w_j of joint j, a contact force f on the object at the point x of a
 finger that the joint moves, and links of masses m_i with their centres c_i beyond the joint, the
@@ -12,25 +12,66 @@ of the levers L of `Motors`, the second sum its gravity.
 Where joints follow others, the motor of the joint that they follow carries their torques too, by
 (2) of `couplings`: `Motors` has one row for each joint that follows none, and what joints that
 follow state as their limits does not count.
+
+Motors that are servos are springs that turn as they give. Finger i touches at x with the force f on
+the object. Joint a has the unit axis w_a and the origin p_a, its servo the stiffness k_q and a
+fixed command, so that
+
+    k_q (u_a - q_a) = l_a . f,   l_a = w_a x (x - p_a).                                   (3)
+
+The object moves by a translation d and a turn t. While nothing slips, the point of the fingertip
+that touches moves as the object does there, with L the matrix of rows l_a and W_i of `grips`:
+
+    L' dq = W_i' (d, t).                                                                  (4)
+
+Joints that turn carry the axes beyond them along, and the ball rolls on the turning face: the point
+that touches shifts on it by rho (t - v) x n, with the turn v = sum_b w_b dq_b of the fingertip. The
+change of (3) is therefore
+
+    -k_q dq = L df + H dq + B t,                                                          (5)
+    H_ab = f . (w_b x l_a) for b <= a,  f . (w_a x l_b) else,  less rho f . (w_a x (w_b x n)),
+    B t  = rho f . (w_a x (t x n))  in row a.
+
+With S = (k_q 1 + H)^-1 and K_i = (L' S L)^-1, (4) and (5) give
+
+    df = -K_i W_i' (d, t) - K_i L' S B t,                                                 (6)
+    dq = -S (L df + B t).                                                                 (7)
+
+For a squeeze that is small against k_q over the length of links, H and B vanish, and (6) is that of
+a fingertip on a spring K_i = k_q (L' L)^-1. The wrench of the contacts changes by (6) and by the
+shift of the points that touch, as in (4) of `grips`, less what the fingertips turn:
+
+    -sum_i (0, rho (v x n) x f).                                                          (8)
+
+A finger needs joints that let its fingertip move in all directions, or L' S L has no inverse.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, cross
-from grasp_core.checked import switch
-from grasp_core.closure.contacts import contact_frictions
+from grasp_core.arrays import UNIT_SLACK, Array, Shape, cross
+from grasp_core.checked import LARGEST, switch
+from grasp_core.closure.contacts import WRENCH, contact_frictions, cross_matrix
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
+from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach, Stance, direction, stance_of
+from grasp_core.kinds import Quantity
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
+
+STIFFEST = 1e12
+"""Condition of a finger's stiffness from which on it gives way in some direction only."""
 
 
 def hand_motors(
@@ -66,12 +107,9 @@ def hand_motors(
 
 def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
     found = places(hand, stance.joints, stance.palm_pose)
-    points = np.array([contact.position for contact in stance.contacts])
-    levers, own = np.zeros((len(hand.joints), len(points), 3)), chains(hand)
-    for contact, finger in enumerate(stance.fingers):  # the first factors of (1)
-        joints = list(own[finger])
-        arms = points[contact] - found.link_positions[0, joints]
-        levers[joints, contact] = cross(found.joint_axes[0, joints], arms)
+    levers = np.zeros((len(hand.joints), len(stance.contacts), 3))
+    for contact, (joints, axes, arms) in enumerate(_fingers(hand, stance, found)):
+        levers[joints, contact] = cross(axes, arms)  # the first factors of (1)
     missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
     if missing:
         raise InputError(
@@ -86,6 +124,19 @@ def chains(hand: Hand) -> list[range]:
     """Return the numbers of each finger's joints."""
     ends = np.cumsum([0, *(len(finger.links) for finger in hand.fingers)]).tolist()
     return [range(first, end) for first, end in pairwise(ends)]
+
+
+def _fingers(
+    hand: Hand, stance: Stance, found: HandPlaces
+) -> Iterator[tuple[list[int], Array, Array]]:
+    """Yield for each contact its finger's joints, their axes and the arms from them to it."""
+    for contact, finger in zip(stance.contacts, stance.fingers, strict=True):
+        joints = list(chains(hand)[finger])
+        yield (
+            joints,
+            found.joint_axes[0, joints],
+            contact.position - found.link_positions[0, joints],
+        )
 
 
 def _weights(hand: Hand, found: HandPlaces) -> Array:
@@ -150,3 +201,83 @@ def hand_payload(
     mu = contact_frictions(friction, count)
     arms = points - body.center_of_mass
     return carried_mass(CarryingHand(arms, normals, mu, max_push_n, motors, weights), gap)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HandGrip(Grip):
+    """Contacts held by fingers whose joints have servos, with commands that stay as they are."""
+
+    joint_axes: Annotated[Array, Shape("k", "m", 3)]
+    """Unit axes w_a from the palm outwards, (k, m, 3); zero for none."""
+    joint_arms: Annotated[Array, Shape("k", "m", 3, least=-LARGEST, most=LARGEST)]
+    """Arms x - p_a from them to the contact, (k, m, 3) [m]."""
+    servo_n_m_per_rad: Quantity
+    """Stiffness k_q of every servo."""
+
+    def _is_consistent(self) -> bool:
+        """Return whether the fields are those of contacts and of fingers that can move them."""
+        if not (super()._is_consistent() and self.joint_axes.shape[1]):
+            return False
+        lengths = np.linalg.norm(self.joint_axes, axis=2)
+        units = (lengths == 0.0) | (np.abs(lengths - 1.0) <= UNIT_SLACK)
+        return bool(units.all()) and all(map(self._gives, range(len(self.friction))))
+
+    def _gives(self, k: int) -> bool:
+        """Return whether the joints of a finger let its fingertip move in all directions."""
+        stiffness, L, _ = self._turning(k)
+        if not float(np.linalg.cond(stiffness)) < STIFFEST:
+            return False
+        given = L.T @ np.asarray(np.linalg.inv(stiffness)) @ L
+        return float(np.linalg.cond(given)) < STIFFEST
+
+    @cached_property
+    def force_changes(self) -> Array:
+        """Change of each contact force per motion of the object by (6), (k, 3, 6), world axes."""
+        return np.array([self._finger(k)[0] for k in range(len(self.arms))])
+
+    @cached_property
+    def geometric_stiffness(self) -> Array:
+        """What squeeze and turning links add to the springs' stiffness, (6, 6) [N/m, N, N m]."""
+        total = self.rolling_stiffness - self.elastic_stiffness
+        for k, (force, normal) in enumerate(zip(self.squeeze, self.normals, strict=True)):
+            df, turn = self._finger(k)
+            total = total - self._maps[k] @ df
+            arm = float(self.tip_radius_m[k]) * cross_matrix(force) @ cross_matrix(normal)
+            total[3:] += arm @ turn
+        return total
+
+    def _finger(self, k: int) -> tuple[Array, Array]:
+        """Return df of (6), (3, 6), and the fingertip's turn v, (3, 6), per motion (d, t)."""
+        stiffness, L, B = self._turning(k)
+        S = np.asarray(np.linalg.inv(stiffness))
+        moved: Array = self._maps[k].T + L.T @ S @ B
+        df = np.asarray(-np.linalg.solve(L.T @ S @ L, moved), dtype=np.float64)
+        turn: Array = -self.joint_axes[k].T @ S @ (L @ df + B)
+        return df, turn
+
+    def _turning(self, k: int) -> tuple[Array, Array, Array]:
+        """Return k_q 1 + H, (m, m), L, (m, 3), and B, (m, 6), of a finger."""
+        w, f, n = self.joint_axes[k], self.squeeze[k], self.normals[k]
+        rho = float(self.tip_radius_m[k])
+        L = cross(w, self.joint_arms[k])
+        outer: Array = cross(w[None], L[:, None]) @ f  # f . (w_b x l_a)
+        rolled: Array = cross(w[:, None], cross(w, n)[None]) @ f
+        H: Array = np.tril(outer) + np.tril(outer, -1).T - rho * rolled
+        B = np.zeros((len(w), WRENCH))
+        # f . (w x (t x n)) = (n x (f x w)) . t
+        B[:, 3:] = rho * cross(n, cross(f, w))
+        return self.servo_n_m_per_rad * np.eye(len(w)) + H, L, B
+
+
+def hand_grip(hand: Hand, stance: Stance, loose: Grip, servo_n_m_per_rad: float) -> HandGrip:
+    """Hold contacts with the servos of a hand, without a squeeze."""
+    found = places(hand, stance.joints, stance.palm_pose)
+    own = list(_fingers(hand, stance, found))
+    most = max(len(joints) for joints, _, _ in own)
+    axes, arms = np.zeros((2, len(own), most, 3))
+    for k, (joints, of_joints, to_contact) in enumerate(own):
+        axes[k, : len(joints)], arms[k, : len(joints)] = of_joints, to_contact
+    return HandGrip(
+        loose.arms, loose.normals, loose.friction, loose.squeeze, loose.stiffness,
+        loose.tip_radius_m, axes, arms, servo_n_m_per_rad,
+    )  # fmt: skip

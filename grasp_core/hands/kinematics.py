@@ -44,13 +44,12 @@ def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) ->
     pose = np.eye(POSE) if palm_pose is None else real_array(palm_pose, "palm_pose")
     if pose.shape not in {(POSE, POSE), (count, POSE, POSE)}:
         raise InputError(f"palm_pose must have shape (4, 4) or ({count}, 4, 4), got {pose.shape}")
-    poses = np.ascontiguousarray(np.broadcast_to(pose, (count, POSE, POSE)))
+    poses = np.broadcast_to(pose, (count, POSE, POSE))
     R, p = np.empty((count, length, 3, 3)), np.empty((count, length, 3))
     W = np.empty_like(p)
-    kernel = compiled("grasp_core.hands.kinematics_kernel")
-    kernel.many_chains(
-        arrays.positions, arrays.rotations, arrays.axes, arrays.starts, poses, angles, R, p, W
-    )
+    kernel = compiled("grasp_core.hands.collisions_kernel")
+    for own, row, *found in zip(poses, angles, R, p, W, strict=True):
+        kernel.chains(arrays, own[:3, :3].copy(), own[:3, 3].copy(), row, *found)
     last = arrays.starts[1:] - 1
     tips = p[:, last] + np.einsum("nfij,fj->nfi", R[:, last], arrays.tip_centers)
     return HandPlaces(*(frozen_copy(each) for each in (R, p, W, tips)))

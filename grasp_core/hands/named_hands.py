@@ -18,9 +18,11 @@ half a block's width, stands for a block where a tip has to be a ball.
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.checked import shown, text
@@ -31,6 +33,7 @@ Row = tuple[float, ...]
 Rows = tuple[Row, ...]
 PLAIN = (1.0, 0.0, 0.0, 0.0)
 """Quaternion of no turn."""
+NONE = (None, None, None, None)
 
 ALLEGRO_SOURCES = (
     "SimLab, allegro_hand_description (BSD-2-Clause, copyright 2016 SimLab): joints, ranges, boxes",
@@ -47,7 +50,7 @@ LEAN = 0.08726646255
 """Turn of the outer fingers against the middle one [rad]."""
 ALLEGRO_RANGES = ((-0.47, 0.47), (-0.196, 1.61), (-0.174, 1.709), (-0.227, 1.618))
 ALLEGRO_THUMB_RANGES = ((0.263, 1.396), (-0.105, 1.163), (-0.189, 1.644), (-0.162, 1.719))
-ALLEGRO_LINKS = ("base", "proximal", "medial", "distal")
+LINKS = ("base", "proximal", "medial", "distal")
 ROLL, BEND, THUMB_ROLL = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)
 STRAIGHT = ((0.0, 0.0, 0.0164), (0.0, 0.0, 0.054), (0.0, 0.0, 0.0384))
 """Offsets of the joints of a finger behind the first [m]."""
@@ -67,7 +70,7 @@ TIP_AT, THUMB_TIP_AT = (-0.0008, -0.0396, 0.0145), (-0.0008, -0.0517, -0.0145)
 DOWN = (0.0, 0.0, -1.0)
 RANGES = ((-0.314, 2.23), (-1.047, 1.047), (-0.506, 1.885), (-0.366, 2.042))
 THUMB_RANGES = ((-0.349, 2.094), (-0.349, 2.094), (-0.47, 2.443), (-1.34, 1.88))
-LINKS, THUMB_LINKS = ("base", "proximal", "medial", "distal"), ("mp", "base", "proximal", "distal")
+THUMB_LINKS = ("mp", "base", "proximal", "distal")
 FINGERS = ("index", "middle", "ring")
 MASSES_KG, THUMB_MASSES_KG = (0.044, 0.032, 0.037, 0.016), (0.032, 0.003, 0.038, 0.049)
 CENTERS = (
@@ -78,22 +81,14 @@ THUMB_CENTERS = (
     (0.0075, -0.0002, -0.011), (0.0, 0.0, -0.0070806), (-0.0020593, 0.015912, -0.013733),
     (0.00096191, -0.024203, -0.014419),
 )  # fmt: skip
-OFFSETS = (
-    (0.0, 0.0, 0.0),
-    (-0.0122, 0.0381, 0.0145),
-    (0.015, 0.0143, -0.013),
-    (0.0, -0.0361, 0.0002),
-)
+OFFSETS = ((-0.0122, 0.0381, 0.0145), (0.015, 0.0143, -0.013), (0.0, -0.0361, 0.0002))
+"""Offsets of the joints of a finger behind the first [m]."""
 ROOTS = ((-0.007, 0.023, -0.0187), (-0.0071, -0.0224, -0.0187), (-0.00709, -0.0678, -0.0187))
 TURNS = ((1.0, 1.0, 1.0, -1.0), (1.0, -1.0, -1.0, 1.0), (1.0, 1.0, -1.0, 1.0), (1.0, 0.0, 0.0, 0.0))
 THUMB_OFFSETS = ((-0.0693, -0.0012, -0.0216), (0.0, 0.0143, -0.013), (0.0, 0.0145, -0.017),
                  (0.0, 0.0466, 0.0002))  # fmt: skip
-THUMB_TURNS = (
-    (1.0, 0.0, 1.0, 0.0),
-    (1.0, 1.0, -1.0, 1.0),
-    (1.0, -1.0, 0.0, 0.0),
-    (0.0, 0.0, 0.0, 1.0),
-)
+THUMB_TURNS = ((1.0, 0.0, 1.0, 0.0), (1.0, 1.0, -1.0, 1.0), (1.0, -1.0, 0.0, 0.0),
+               (0.0, 0.0, 0.0, 1.0))  # fmt: skip
 """Quaternions, not yet of length one."""
 PALM: Rows = (
     (-9, 8, -11, 11, 13, 17), (-9, -37, -11, 11, 13, 17), (-9, -82, -11, 11, 13, 17),
@@ -168,12 +163,14 @@ def _rotation(quaternion: Row) -> Array:
     )
 
 
-def _box(middle: Row, half: Row) -> LinkShape:
-    return LinkShape(np.array(middle), np.eye(3), np.array(half), 0.0)
+def _box(
+    middle: ArrayLike, half: ArrayLike, turn: Row = PLAIN, radius: float = 0.0
+) -> LinkShape:  # fmt: skip
+    return LinkShape(np.array(middle), _rotation(turn), np.array(half), radius)
 
 
 def _finger(
-    name: str, links: Iterable[tuple[Any, ...]], tip: Fingertip, torque_limit: float | None = None
+    name: str, tip: Fingertip, rows: Iterable[tuple[Any, ...]], torque_limit: float | None = None
 ) -> HandFinger:
     """Make a finger of rows: name, offset, quaternion, axis, range, shapes, mass and its centre."""
     made = tuple(
@@ -183,7 +180,7 @@ def _finger(
                   ends[1], torque_limit),
             shapes, mass, None if center is None else np.array(center),
         )
-        for i, (link, offset, turn, axis, ends, shapes, mass, center) in enumerate(links)
+        for i, (link, offset, turn, axis, ends, shapes, mass, center) in enumerate(rows)
     )  # fmt: skip
     return HandFinger(name, made, tip)
 
@@ -195,28 +192,17 @@ def _allegro(name: str = "allegro", tips: tuple[float, float] = ALLEGRO_TIPS) ->
 
     def capsule(start: float, end: float) -> LinkShape:
         middle, half = (round(0.5 * length, 6) for length in (start + end, end - start))
-        return LinkShape(
-            np.array([0.0, 0.0, middle]), np.eye(3), np.array([0.0, 0.0, half]), ALLEGRO_TIP_RADIUS
-        )
+        return _box((0.0, 0.0, middle), (0.0, 0.0, half), radius=ALLEGRO_TIP_RADIUS)
 
-    def finger(
-        own: str, base: Row, offsets: Rows, axes: Rows, ranges: Rows, shapes: Iterable[Any],
-        tip: float,
-    ) -> HandFinger:  # fmt: skip
-        turns, none = (base, PLAIN, PLAIN, PLAIN), (None,) * 4
-        rows = zip(
-            ALLEGRO_LINKS, offsets, turns, axes, ranges, shapes, none, none, strict=True
-        )  # fmt: skip
-        return _finger(own, rows, Fingertip(np.array([0.0, 0.0, tip]), ALLEGRO_TIP_RADIUS))
-
-    far, thumb = tips
+    far, thumb = (Fingertip(np.array([0.0, 0.0, at]), ALLEGRO_TIP_RADIUS) for at in tips)
     straight = ((along(0.0082),), (along(0.027),), (along(0.0192),),
-                (along(0.008), capsule(0.009, far)))  # fmt: skip
+                (along(0.008), capsule(0.009, tips[0])))  # fmt: skip
     fingers = (
-        finger(
-            own, (math.cos(0.5 * lean), math.sin(0.5 * lean), 0.0, 0.0), (root, *STRAIGHT),
-            (ROLL, BEND, BEND, BEND), ALLEGRO_RANGES, straight, far,
-        )
+        _finger(own, far, zip(
+            LINKS, (root, *STRAIGHT),
+            ((math.cos(0.5 * lean), math.sin(0.5 * lean), 0.0, 0.0), PLAIN, PLAIN, PLAIN),
+            (ROLL, BEND, BEND, BEND), ALLEGRO_RANGES, straight, NONE, NONE, strict=True,
+        ))
         for own, root, lean in (
             ("first", (0.0, 0.0435, -0.001542), -LEAN), ("middle", (0.0, 0.0, 0.0007), 0.0),
             ("ring", (0.0, -0.0435, -0.001542), LEAN),
@@ -224,12 +210,12 @@ def _allegro(name: str = "allegro", tips: tuple[float, float] = ALLEGRO_TIPS) ->
     )  # fmt: skip
     thumb_shapes = (
         (_box((-0.0179, 0.009, 0.0145), (0.0179, 0.017, 0.02275)),), (along(0.00885),),
-        (along(0.0257),), (along(0.0157), capsule(0.027, thumb)),
+        (along(0.0257),), (along(0.0157), capsule(0.027, tips[1])),
     )  # fmt: skip
-    last = finger(
-        "thumb", ALLEGRO_THUMB_TURN, ALLEGRO_THUMB_OFFSETS, (THUMB_ROLL, ROLL, BEND, BEND),
-        ALLEGRO_THUMB_RANGES, thumb_shapes, thumb,
-    )  # fmt: skip
+    last = _finger("thumb", thumb, zip(
+        LINKS, ALLEGRO_THUMB_OFFSETS, (ALLEGRO_THUMB_TURN, PLAIN, PLAIN, PLAIN),
+        (THUMB_ROLL, ROLL, BEND, BEND), ALLEGRO_THUMB_RANGES, thumb_shapes, NONE, NONE, strict=True,
+    ))  # fmt: skip
     palm = (_box((-0.0093, 0.0, -0.0475), (0.0204, 0.0565, 0.0475)),)
     return Hand(
         name, palm, (*fingers, last), ALLEGRO_SOURCES, ignored_pairs=(("palm", "thumb_proximal"),)
@@ -238,14 +224,17 @@ def _allegro(name: str = "allegro", tips: tuple[float, float] = ALLEGRO_TIPS) ->
 
 def _leap_shape(row: Row) -> LinkShape:
     numbers = 1e-3 * np.array(row[:6])
-    return LinkShape(numbers[:3], _rotation(row[6:] or PLAIN), numbers[3:], 0.0)
+    return _box(numbers[:3], numbers[3:], row[6:] or PLAIN)
 
 
-def _cover(corners: Array) -> LinkShape:
+def _leap_end(tip: Row, block: Rows) -> tuple[Fingertip, LinkShape]:
+    """Make a fingertip, and what covers it."""
+    corners = 1e-4 * np.array(block)
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low) - ROUND
     out = np.linalg.norm(np.maximum(np.abs(corners - middle) - half, 0.0), axis=1)
-    return LinkShape(middle, np.eye(3), half, float(out.max()) + TIP_ROUNDING)
+    cover = _box(middle, half, radius=float(out.max()) + TIP_ROUNDING)
+    return Fingertip(np.array(tip), TIP_RADIUS, corners, TIP_ROUNDING), cover
 
 
 def _leap() -> Hand:
@@ -253,17 +242,16 @@ def _leap() -> Hand:
     def finger(
         name: str, rows: Iterable[tuple[Any, ...]], boxes: tuple[Rows, ...], tip: Row, block: Rows
     ) -> HandFinger:
-        corners = 1e-4 * np.array(block)
+        end, cover = _leap_end(tip, block)
         shapes = [tuple(map(_leap_shape, each)) for each in boxes]
-        shapes[-1] += (_cover(corners),)
+        shapes[-1] += (cover,)
         links = [(*row[:3], DOWN, row[3], own, *row[4:])
                  for row, own in zip(rows, shapes, strict=True)]  # fmt: skip
-        end = Fingertip(np.array(tip), TIP_RADIUS, corners, TIP_ROUNDING)
-        return _finger(name, links, end, TORQUE_LIMIT_N_M)
+        return _finger(name, end, links, TORQUE_LIMIT_N_M)
 
     fingers = (
         finger(
-            name, zip(LINKS, (root, *OFFSETS[1:]), TURNS, RANGES, MASSES_KG, CENTERS, strict=True),
+            name, zip(LINKS, (root, *OFFSETS), TURNS, RANGES, MASSES_KG, CENTERS, strict=True),
             BOXES, TIP_AT, TIP_CORNERS,
         )
         for name, root in zip(FINGERS, ROOTS, strict=True)
@@ -276,8 +264,7 @@ def _leap() -> Hand:
         "leap", tuple(map(_leap_shape, PALM)), (*fingers, thumb), LEAP_SOURCES, TORQUE_SOURCE,
         ignored_pairs=(
             *(("palm", f"{name}_{link}") for name in FINGERS for link in ("proximal", "medial")),
-            ("palm", "thumb_base"), ("palm", "thumb_proximal"),
-            *((one, other) for i, one in enumerate(bases) for other in bases[i + 1 :]),
+            ("palm", "thumb_base"), ("palm", "thumb_proximal"), *combinations(bases, 2),
             *(("thumb_mp", base) for base in bases),
         ),
     )  # fmt: skip

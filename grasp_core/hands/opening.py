@@ -11,8 +11,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
-from grasp_core.hands.collisions import surface_tree
-from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
+from grasp_core.hands.hand_arrays import Pose, Targets, Wanted
 from grasp_core.hands.pose_search import Asked, FoundPose, blocking, targets
 
 GAPS_M = (0.015, 0.01, 0.006, 0.003)
@@ -45,9 +44,9 @@ def opened(asked: Asked, found: FoundPose) -> tuple[Array | None, Array | None]:
 
 def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
     """Return joint angles at which fingertips are off the surface and nothing overlaps."""
-    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
-    kernel = compiled("grasp_core.hands.pose_kernel")
+    arrays, kernel = asked.arrays, compiled("grasp_core.hands.pose_kernel")
     contacts, clear = found.certificate, asked.clearance
+    wanted = Wanted(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
     for gap in GAPS_M:
         aims = _aims(asked, found)._replace(
             origins=contacts.positions - gap * contacts.normals, normals=np.array(contacts.normals),
@@ -56,21 +55,19 @@ def _open_joints(asked: Asked, found: FoundPose) -> Array | None:
         pose: Pose = kernel.empty_pose(arrays, len(found.used))
         pose.palm[:], pose.origin[:] = found.palm_pose[:3, :3], found.palm_pose[:3, 3]
         pose.q[:] = found.joints
-        wanted = Wanted(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
         sums = kernel.empty_sums(arrays, aims)
-        kernel.settle(arrays, tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
-        compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
+        kernel.settle(arrays, asked.tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
+        kernel.place(arrays, aims, pose)
         away = np.einsum("ki,ki->k", contacts.positions - pose.fronts, contacts.normals)
         open_by = away - arrays.tip_roundings[found.fingers]
-        if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose, None, clear):
+        if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose):
             return pose.q
     return None
 
 
 def _aims(asked: Asked, found: FoundPose) -> Targets:
     """Return targets at the planned contacts."""
-    aims = targets(asked.grasp, found.used, regions=False, up=asked.up, height=asked.height)
-    return aims._replace(fingers=found.fingers)
+    return targets(asked, found.used, regions=False)._replace(fingers=found.fingers)
 
 
 def _ways(asked: Asked, found: FoundPose) -> Array:
@@ -92,12 +89,12 @@ def _ways(asked: Asked, found: FoundPose) -> Array:
 
 def _is_free(asked: Asked, found: FoundPose, joints: Array, way: Array) -> bool:
     """Return whether the open hand is free at all steps of a straight way in."""
-    arrays, aims = hand_arrays(asked.hand), _aims(asked, found)
-    pose: Pose = compiled("grasp_core.hands.pose_kernel").empty_pose(arrays, len(found.used))
+    kernel, aims = compiled("grasp_core.hands.pose_kernel"), _aims(asked, found)
+    pose: Pose = kernel.empty_pose(asked.arrays, len(found.used))
     pose.palm[:], pose.q[:] = found.palm_pose[:3, :3], joints
     for back in np.arange(TICK, LINE + 0.5 * TICK, TICK):
         pose.origin[:] = found.palm_pose[:3, 3] - back * way
-        compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)
-        if blocking(asked, pose, None, asked.clearance):
+        kernel.place(asked.arrays, aims, pose)
+        if blocking(asked, pose):
             return False
     return True

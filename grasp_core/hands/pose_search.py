@@ -7,12 +7,21 @@ planned contacts; where fingertips come to rest in their regions, closure is pro
 From each start, a hand is moved until its fingertips touch, anywhere in their regions or at the
 contacts themselves, and balls that stand for its parts are clear of the object. Then fingertips are
 laid on the surface itself, and exact distances decide.
+
+Starts are postures of the hand, laid over the contacts. Postures are random joint angles at which
+the hand is free of itself. For each posture and each order of fingers, the fingertips are compared
+with where they would have to be: first by the distances between them and the angles between their
+ways inwards, which do not depend on the palm's pose, then by the rest that is left when one set of
+points is laid over the other by the best rigid motion (Kabsch). The motion keeps handedness, so an
+order of fingers around the palm that runs the wrong way leaves a large rest.
 """
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from functools import cached_property, lru_cache
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -23,8 +32,14 @@ from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.frames import POSE, plane_tangents
 from grasp_core.hands.collisions import surface_tree
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_arrays import Pose, Targets, Wanted, hand_arrays
-from grasp_core.hands.starts import Start, starts
+from grasp_core.hands.hand_arrays import (
+    HandArrays,
+    Pose,
+    SurfaceTree,
+    Targets,
+    Wanted,
+    hand_arrays,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
 from grasp_core.values import FINGERS, Grasp
@@ -55,40 +70,54 @@ PULL = 0.03
 MARGIN, LEAST_MARGIN = 5e-4, 1e-4
 """Distances from the edges of regions that are sought, and kept when fingertips are laid down [m].
 """
+POSTURES = 400
+"""Number of postures to choose from."""
+TRIES = 60_000
+"""Number of random joint angles among which they are looked for."""
+INNER = (0.1, 0.85)
+"""Part of the joints' ranges in which they are looked for: rather open than closed."""
+APART = 0.002
+"""Least distance between links in a posture [m]."""
+WIDEST = 0.075
+"""Largest distance of a fingertip from the middle of all [m]."""
+KEPT = 300
+"""Number of postures with an order of fingers that are laid over the contacts."""
+LENGTH = 0.02
+"""Difference of two distances between fingertips that counts as one [m]."""
+TURN = 0.3
+"""Weight of the angles between ways inwards."""
+ARM = 0.03
+"""Length of the ways inwards where they are laid over each other [m]."""
+ROUND = 9
+"""Digits after the point to which rests are compared: ties are decided by the order."""
 
 
-UPRIGHT = (0.0, 0.0, 1.0)
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a pose is sought for."""
 
+    hand: Hand
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    up: Array  # unit normal of the table, (3,)
+    height: float  # its height along it; minus infinity for none [m]
+    clearance: float
+    """Least distance of everything from what it must not touch [m], but for links whose tips touch
+    the object: they must only not overlap it."""
+    regions: bool  # whether contacts may be anywhere in their regions
+    seed: int
+    most_starts: int  # largest number of starts for each choice of contacts
 
-def targets(grasp: Grasp, used: Indices, *, regions: bool, up: Array, height: float) -> Targets:
-    """Say where fingertips are to touch, finger k at the k-th of the contacts that are used."""
-    normals, own = grasp.normals[used], [grasp.regions[int(contact)] for contact in used]
-    aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROW for each in own]
-    rows = [
-        (finger, *row)
-        for finger, region in enumerate(own)
-        if aimed[finger]
-        for row in _edges(region.polygon, normals[finger])
-    ]
-    return Targets(
-        np.arange(len(used), dtype=np.int64), to_digits(grasp.positions[used]), normals,
-        np.array([plane_tangents(*normal) for normal in normals.tolist()]),
-        np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOFT,
-        np.array([row[0] for row in rows], np.int64),
-        np.array([row[1] for row in rows]).reshape(-1, 3),
-        np.array([row[2] for row in rows]).reshape(-1, 3), np.array(up), height,
-    )  # fmt: skip
+    @cached_property
+    def arrays(self) -> HandArrays:
+        """Return the hand in arrays."""
+        return hand_arrays(self.hand)
 
-
-def _edges(polygon: Array, normal: Array) -> list[tuple[Array, Array]]:
-    """Return a point of each edge and the unit vector from it into the convex polygon."""
-    polygon = to_digits(polygon)
-    along = np.roll(polygon, -1, axis=0) - polygon
-    kept = np.linalg.norm(along, axis=1) > SHORT
-    starts, inward = polygon[kept], cross(normal, along[kept])
-    sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
-    inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
-    return list(zip(starts, inward, strict=True))
+    @cached_property
+    def tree(self) -> SurfaceTree:
+        """Return the object's surface."""
+        return surface_tree(self.body)
 
 
 def contact_choices(
@@ -125,22 +154,108 @@ def proved_closure(points: Array, normals: Array, friction: float) -> ClosureCer
         return None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Asked:
-    """What a pose is sought for."""
+def targets(asked: Asked, used: Indices, *, regions: bool) -> Targets:
+    """Say where fingertips are to touch, finger k at the k-th of the contacts that are used."""
+    normals, own = asked.grasp.normals[used], [asked.grasp.regions[int(k)] for k in used]
+    aimed = [regions and each.kind != "point" and each.inscribed_radius > NARROW for each in own]
+    edges = [
+        _edges(region.polygon, normal) if aim else np.empty((2, 0, 3))
+        for aim, region, normal in zip(aimed, own, normals, strict=True)
+    ]
+    numbers, (points, inward) = np.arange(len(used)), np.concatenate(edges, axis=1)
+    return Targets(
+        numbers, to_digits(asked.grasp.positions[used]), normals,
+        np.array([plane_tangents(*normal) for normal in normals.tolist()]),
+        np.where(aimed, 0.0, 1.0), np.full((len(used), 3), np.nan), SOFT,
+        np.repeat(numbers, [each.shape[1] for each in edges]), points, inward,
+        np.array(asked.up), asked.height,
+    )  # fmt: skip
 
-    hand: Hand
-    body: Polyhedron
-    grasp: Grasp
-    friction: float
-    up: Array  # unit normal of the table, (3,)
-    height: float  # its height along it; minus infinity for none [m]
-    clearance: float
-    """Least distance of everything from what it must not touch [m], but for links whose tips touch
-    the object: they must only not overlap it."""
-    regions: bool  # whether contacts may be anywhere in their regions
-    seed: int
-    most_starts: int  # largest number of starts for each choice of contacts
+
+def _edges(polygon: Array, normal: Array) -> Array:
+    """Return points of the edges and unit vectors from them into the convex polygon, (2, e, 3)."""
+    polygon = to_digits(polygon)
+    along = np.roll(polygon, -1, axis=0) - polygon
+    kept = np.linalg.norm(along, axis=1) > SHORT
+    starts, inward = polygon[kept], cross(normal, along[kept])
+    sides = np.einsum("ej,ej->e", inward, polygon.mean(axis=0) - starts)
+    inward *= np.copysign(1.0 / np.linalg.norm(inward, axis=1), sides)[:, None]
+    return np.array([starts, inward])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """Where a search starts."""
+
+    fingers: Indices  # the finger for each contact, (k,)
+    joints: Array  # joint angles, (j,) [rad]
+    rotation: Array  # axes of the palm's frame, (3, 3)
+    position: Array  # its origin, (3,) [m]
+
+
+@lru_cache(maxsize=16)
+def postures(hand: Hand, seed: int) -> tuple[Array, Array]:
+    """Choose at most `POSTURES` at random: joint angles, (n, j), and tips' middles, (n, f, 3)."""
+    arrays, rng = hand_arrays(hand), np.random.default_rng(seed)
+    low, high = arrays.ranges.T
+    share = rng.uniform(*INNER, (TRIES, len(low)))
+    angles = hand.drives.obeyed(low + (high - low) * share)
+    kept, tips = np.empty(POSTURES, np.int64), np.empty((POSTURES + 1, len(arrays.tip_radii), 3))
+    kernel = compiled("grasp_core.hands.collisions_kernel")
+    count = kernel.free_postures(arrays, angles, APART, WIDEST, kept, tips)
+    return angles[kept[:count]], tips[:count]
+
+
+def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: int) -> list[Start]:
+    """Choose where to start from, best first."""
+    (joints, ends), arrays = postures(hand, seed), hand_arrays(hand)
+    if not len(joints):
+        return []
+    orders = np.array(list(permutations(range(len(arrays.tip_radii)), len(normals))))
+    inward = ends.mean(axis=1, keepdims=True) - ends
+    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-9)
+    i, j = np.triu_indices(len(normals), 1)
+    # all tips of a hand are taken to be as thick as the first
+    middles = positions - arrays.tip_radii[0] * normals
+    apart = np.linalg.norm(middles[i] - middles[j], axis=1)
+    angles = np.einsum("pi,pi->p", normals[i], normals[j])
+    between = np.linalg.norm(ends[:, :, None] - ends[:, None], axis=3)
+    ways = np.einsum("nai,nbi->nab", inward, inward)
+    one, other = orders[:, i], orders[:, j]
+    off = ((between[:, one, other] - apart) ** 2).sum(axis=2) / LENGTH**2
+    off += TURN * ((ways[:, one, other] - angles) ** 2).sum(axis=2)
+    likely = np.argsort(off.round(ROUND), axis=None, kind="stable")[:KEPT]
+    which, order = np.unravel_index(likely, off.shape)
+    tips = ends[which[:, None], orders[order]]
+    held = tips.mean(axis=1)
+    ours = np.concatenate([tips - held[:, None], ARM * inward[which[:, None], orders[order]]], 1)
+    center = middles.mean(axis=0)
+    theirs = np.concatenate([middles - center, ARM * normals])
+    U, _, Vt = np.linalg.svd(np.einsum("nki,kj->nij", ours, theirs))
+    Vt[:, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[:, None]
+    turns = np.einsum("nji,nkj->nik", Vt, U)  # lay ours best over theirs
+    rests = ((np.einsum("nij,nkj->nki", turns, ours) - theirs) ** 2).sum(axis=(1, 2))
+    best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[:count]
+    places = center - np.einsum("nij,nj->ni", turns, held)
+    return [
+        Start(
+            orders[order[n]].astype(np.int64), joints[which[n]].copy(), _steady(turns[n]),
+            to_digits(places[n], LENGTH),
+        )
+        for n in best
+    ]  # fmt: skip
+
+
+def _steady(turn: Array) -> Array:
+    """Return a rotation near one, (3, 3), without the last digits, which differ by processor.
+
+    From some starts the search is so sensitive that they would decide where it ends.
+    """
+    x, aside = to_digits(turn.T[:2], 1.0)
+    x = x / math.hypot(*x)
+    z = cross(x, aside)
+    z = z / math.hypot(*z)
+    return np.array([x, cross(z, x), z]).T
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,9 +281,7 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
     tally: Counter[str] = Counter()
     for chosen in choices:
         used = np.array(chosen, np.int64)
-        aims = targets(
-            asked.grasp, used, regions=asked.regions, up=asked.up, height=asked.height
-        )  # fmt: skip
+        aims = targets(asked, used, regions=asked.regions)
         for start in starts(
             asked.hand, aims.origins, aims.normals, seed=asked.seed, count=asked.most_starts
         ):
@@ -181,22 +294,21 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
 
 def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPose | str:
     """Move the hand from one start; return a pose, or what is in the way."""
-    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
     kernel = compiled("grasp_core.hands.pose_kernel")
-    pose: Pose = kernel.empty_pose(arrays, len(used))
+    pose: Pose = kernel.empty_pose(asked.arrays, len(used))
     pose.palm[:], pose.origin[:], pose.q[:] = start.rotation, start.position, start.joints
-    sums = kernel.empty_sums(arrays, aims)
+    sums = kernel.empty_sums(asked.arrays, aims)
     room = asked.clearance + ROOM
-    far = Wanted(room, asked.clearance, asked.clearance + ROOM, MARGIN, PULL, True, True)
-    kernel.settle(arrays, tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
-    if sums.parts[0] > ROUGH_MM:
-        return _why_away(asked.hand, pose.q)
+    far = Wanted(room, asked.clearance, room, MARGIN, PULL, True, True)
+    kernel.settle(asked.arrays, asked.tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
     near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
-    laid = _laid(asked, aims, near, pose)
+    laid = None if sums.parts[0] > ROUGH_MM else _laid(asked, aims, near, pose)
     if laid is None:
-        return _why_away(asked.hand, pose.q)
+        low, high = asked.arrays.ranges.T
+        at_limit = ((pose.q <= low) | (pose.q >= high)) & (low < high)
+        return "limit" if at_limit.any() else "away"
     targets, points = laid
-    if blocked := blocking(asked, pose, start.fingers, asked.clearance):
+    if blocked := blocking(asked, pose, start.fingers):
         return blocked
     certificate = proved_closure(points, targets.normals, asked.friction)
     if certificate is None or not certificate.closed:
@@ -214,8 +326,7 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
 
     Which point of a block touches is only known then, so that its region is asked for again.
     """
-    arrays, tree = hand_arrays(asked.hand), surface_tree(asked.body)
-    kernel = compiled("grasp_core.hands.pose_kernel")
+    arrays, kernel = asked.arrays, compiled("grasp_core.hands.pose_kernel")
     laid = aims._replace(
         origins=np.array(aims.origins), normals=np.array(aims.normals),
         touching=np.array(aims.touching), soft=HARD,
@@ -223,8 +334,8 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
     sums, balls = kernel.empty_sums(arrays, aims), len(arrays.tip_corners) == len(arrays.tip_radii)
     points, off, before, inside = np.empty((len(laid.fingers), 3)), np.inf, np.inf, True
     for _ in range(MOST_TOUCHES):
-        kernel.settle(arrays, tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
-        before, off = off, kernel.lay(arrays, tree, laid, pose, points)
+        kernel.settle(arrays, asked.tree, laid, near, pose, sums, TOUCH_STEPS, FINE_MM)
+        before, off = off, kernel.lay(arrays, asked.tree, laid, pose, points)
         inside = balls or all(_are_within(aims, points, TOUCHING))
         if inside and (off <= RESTING_MM or abs(before - off) <= SETTLED):
             break
@@ -243,47 +354,34 @@ def _are_within(aims: Targets, points: Array, slack: float) -> tuple[bool, ...]:
     return tuple(within)
 
 
-def blocking(asked: Asked, pose: Pose, fingers: Indices | None, clearance: float) -> str:
+def blocking(asked: Asked, pose: Pose, fingers: Indices | None = None) -> str:
     """Return what a placed hand overlaps: `self`, `object`, `table`, or nothing."""
-    arrays, worst = hand_arrays(asked.hand), np.empty(2, np.int64)
+    arrays, clearance = asked.arrays, asked.clearance
     kernel = compiled("grasp_core.hands.collisions_kernel")
     needs = np.full(len(arrays.shape_links), clearance)
     if fingers is not None:
         needs[np.isin(arrays.shape_links, arrays.starts[fingers + 1] - 1)] = 0.0
         needs[np.isin(arrays.shape_tips, fingers)] = -TOUCHING
-    turned, middles = pose.turned, pose.middles
-    if kernel.of_itself(arrays, turned, middles, clearance, worst) < clearance:
+    shapes = arrays, pose.turned, pose.middles
+    if kernel.of_itself(*shapes, clearance) < clearance:
         return "self"
-    if asked.height > -np.inf:
-        low = kernel.of_table(arrays, turned, middles, asked.up, asked.height, worst[:1])
-        if low < clearance:
-            return "table"
-    tree = surface_tree(asked.body)
-    if kernel.of_object(arrays, turned, middles, tree, needs, worst[:1]) < 0.0:
-        return "object"
-    return ""
-
-
-def _why_away(hand: Hand, q: Array) -> str:
-    low, high = hand.ranges.T
-    return "limit" if (((q <= low) | (q >= high)) & (low < high)).any() else "away"
+    if asked.height > -np.inf and kernel.of_table(*shapes, asked.up, asked.height) < clearance:
+        return "table"
+    return "object" if kernel.of_object(*shapes, asked.tree, needs) < 0.0 else ""
 
 
 def compile_posing(hand: Hand, body: Polyhedron) -> None:
     """Compile what moves a hand until its fingertips touch, on a hand that stands nowhere."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
-    kernel = compiled("grasp_core.hands.pose_kernel")
-    count = min(len(hand.fingers), FINGERS)
-    normals = np.tile(UPRIGHT, (count, 1))
+    kernel, count = compiled("grasp_core.hands.pose_kernel"), min(len(hand.fingers), FINGERS)
+    up, none = np.array([0.0, 0.0, 1.0]), np.empty((0, 3))
     aims = Targets(
-        np.arange(count, dtype=np.int64), np.zeros((count, 3)), normals,
-        np.array([plane_tangents(*normal) for normal in normals.tolist()]), np.ones(count),
-        np.full((count, 3), np.nan), SOFT, np.empty(0, np.int64), np.empty((0, 3)),
-        np.empty((0, 3)), np.array(UPRIGHT), -np.inf,
+        np.arange(count), np.zeros((count, 3)), np.tile(up, (count, 1)), np.zeros((count, 2, 3)),
+        np.ones(count), np.full((count, 3), np.nan), SOFT, np.empty(0, np.int64), none, none, up,
+        -np.inf,
     )  # fmt: skip
     wanted = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, overlaps=True, palm_moves=True)
     pose: Pose = kernel.empty_pose(arrays, count)
     pose.palm[:], pose.origin[:], pose.q[:] = np.eye(3), 1.0, hand.ranges.mean(axis=1)
     kernel.settle(arrays, tree, aims, wanted, pose, kernel.empty_sums(arrays, aims), 0, 1.0)
     kernel.lay(arrays, tree, aims, pose, np.empty((count, 3)))
-    compiled("grasp_core.hands.pose_rows_kernel").place(arrays, aims, pose)

@@ -14,7 +14,7 @@ springs of the stiffness
 
 and so are joint inertia a and dampers c_q: m_i = a (L_i' L_i)^-1, C_i = c_q (L_i' L_i)^-1. The
 inertia is that of rotors, which a moving palm does not load. What the squeeze adds to (1), as links
-turn under it, is in `grasp_core.hands.hand_grips`. (1) needs joints that let the point of contact
+turn under it, is in `grasp_core.hands.hand_motors`. (1) needs joints that let the point of contact
 move in all directions. A stretched finger, or one with two joints, is rigid in some direction,
 which no grip of springs describes.
 
@@ -33,8 +33,7 @@ from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_grips import HandGrip
-from grasp_core.hands.hand_motors import hand_motors
+from grasp_core.hands.hand_motors import HandGrip, hand_motors
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron

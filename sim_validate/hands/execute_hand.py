@@ -13,7 +13,7 @@ from grasp_core.execution.grips import unsqueezed
 from grasp_core.execution.loads import LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_grips import hand_grip
+from grasp_core.hands.hand_motors import hand_grip
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron

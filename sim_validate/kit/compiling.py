@@ -81,7 +81,7 @@ def _clearance() -> None:
 def _hand_checks() -> None:
     from grasp_core.hands.collisions import clearances
     from grasp_core.hands.named_hands import load_hand
-    from grasp_core.hands.starts import postures
+    from grasp_core.hands.pose_search import postures
 
     hand, body = load_hand("allegro"), example_object("tetrahedron")
     (joints, *_), _ = postures(hand, 0)

@@ -47,15 +47,11 @@ def test_a_hull_is_as_far_from_a_surface_as_from_its_nearest_triangle():
     for _ in range(20):
         points = rng.normal(size=(12, 3)) * 0.01 + rng.normal(size=3) * 0.06
         near, other, buffers = np.empty(3), np.empty(3), np.empty((2, 3))
-        found = kernel.hull_surface(
-            points, np.inf, tree.corners, tree.middles, tree.radii, tree.links, near, other
-        )
+        found = kernel.hull_surface(points, np.inf, tree, near, other)
         each = [kernel.hull_hull(points, t, np.inf, *buffers) for t in tree.corners]
         assert found == pytest.approx(min(each), abs=1e-12)
         limit = 0.5 * found
-        farther = kernel.hull_surface(
-            points, limit, tree.corners, tree.middles, tree.radii, tree.links, near, other
-        )
+        farther = kernel.hull_surface(points, limit, tree, near, other)
         assert farther == (0.0 if found == 0.0 else np.inf)
 
 
@@ -148,15 +144,13 @@ def test_nearest_points_are_those_of_trimesh(name):
     mesh = trimesh.Trimesh(body.vertices, body.triangles, process=False)
     _, true, _ = trimesh.proximity.closest_point_naive(mesh, places)
     for i, place in enumerate(places):
-        t = kernel.nearest(place, 1.0, tree.corners, tree.middles, tree.radii, tree.links, near)
+        t = kernel.nearest(place, 1.0, tree, near)
         assert t >= 0
         assert np.linalg.norm(near - place) == pytest.approx(true[i], abs=1e-12)
         if true[i] > 1e-6:
             wound = kernel.windings(place, tree.corners)
             assert wound == pytest.approx(1.0 if is_inside(place, body) else 0.0, abs=1e-9)
-    none = kernel.nearest(np.full(3, 9.0), 1.0, tree.corners, tree.middles, tree.radii, tree.links,
-                          near)  # fmt: skip
-    assert none == -1
+    assert kernel.nearest(np.full(3, 9.0), 1.0, tree, near) == -1
 
 
 def test_a_box_and_a_surface_are_as_far_apart_as_its_nearest_triangle():
@@ -168,9 +162,7 @@ def test_a_box_and_a_surface_are_as_far_apart_as_its_nearest_triangle():
             random_rotation(rng),
             rng.uniform(-0.12, 0.12, 3),
         )
-        found = kernel.box_surface(
-            h, R, middle, 1.0, tree.corners, tree.middles, tree.radii, tree.links
-        )
+        found = kernel.box_surface(h, R, middle, 1.0, tree)
         box = corners(h, R, middle)
         true = min(hulls_apart(box, T) for T in body.vertices[body.triangles])
         assert max(found, 0.0) == pytest.approx(true, abs=1e-7)

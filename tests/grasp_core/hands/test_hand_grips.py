@@ -28,7 +28,7 @@ def torques(hand, reach, k, joints, point_normal, force):
 
 @pytest.mark.parametrize("name", HANDS)
 def test_changes_of_force_balance_servos_that_follow_the_object(name):
-    """At forces changed by (4), servos turn the joints so that fingertips follow the object."""
+    """At forces changed by (6), servos turn the joints so that fingertips follow the object."""
     reach, hand, _, best = standing(name)
     grip, stance = best.grip, stance_of(hand, reach)
     rng = np.random.default_rng(0)
@@ -61,7 +61,7 @@ def test_without_a_squeeze_a_hand_is_fingertips_on_springs(name):
 
 @pytest.mark.parametrize("name", HANDS)
 def test_a_small_motion_changes_the_wrench_by_the_grasp_stiffness(name):
-    """Forces, and the shift of the points that touch, as (4) and (6) say, for one motion each."""
+    """Forces, and the shift of the points that touch, as (6) and (8) say, for one motion each."""
     _, _, _, best = standing(name)
     grip = best.grip
     for motion in np.eye(6):

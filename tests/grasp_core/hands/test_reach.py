@@ -12,8 +12,7 @@ import grasp_core as gc
 from grasp_core.hands.collisions import FAR, clearances, tip_distances, tip_gaps
 from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.kinematics import places
-from grasp_core.hands.pose_search import TOUCHING
-from grasp_core.hands.starts import starts
+from grasp_core.hands.pose_search import TOUCHING, starts
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
 from tests.hand_models import hand_mjcf, numbers
 
