@@ -241,7 +241,7 @@ def test_the_first_of_equally_weak_axis_wrenches_is_named(monkeypatch):
         center_from="center of mass",
         torque_scale_from="object radius",
     )
-    own = analysis.analyze(contacts, analysis.Question(20.0)).weakest_axis
+    own = analysis.analyze(contacts, analysis.Question(20.0)).weakest_axis_wrench
     exact, rng = analysis.wrench_limits, np.random.default_rng(5)
 
     def shaken_limits(*given, **more):
@@ -252,7 +252,7 @@ def test_the_first_of_equally_weak_axis_wrenches_is_named(monkeypatch):
 
     monkeypatch.setattr(analysis, "wrench_limits", shaken_limits)
     for _ in range(TRIALS):
-        found = analysis.analyze(contacts, analysis.Question(20.0)).weakest_axis
+        found = analysis.analyze(contacts, analysis.Question(20.0)).weakest_axis_wrench
         np.testing.assert_array_equal(found.wrench, own.wrench)
 
 
