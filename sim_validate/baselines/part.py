@@ -20,7 +20,6 @@ from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
 from grasp_core.settings import Settings
-from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
     WIDEST_DEG,
@@ -31,7 +30,14 @@ from grasp_core.transferring.face_changes import (
     face_changes,
     likeness,
 )
-from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
+from grasp_core.transferring.transfer import (
+    CarriedGrasp,
+    Transfer,
+    fitting_lengths,
+    fitting_unit,
+    load_changed_part,
+    transfer,
+)
 from sim_validate.baselines.baseline import Baseline, RecordedPart, recorded_part
 
 NOTE, FAIL = "note", "fail"

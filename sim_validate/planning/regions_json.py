@@ -21,8 +21,7 @@ from grasp_core.kinds import Count, Friction, NotNegative, Range
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
-from grasp_core.regions.certificates import CertifiedRegions
-from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.settings import Settings
 from grasp_core.values import FINGERS, ContactRegion, Family, Grasp, four
 from sim_validate.kit.about_object import AboutObject

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from grasp_core.optimizing.best import result
+from grasp_core.optimizing.best import best_grasp as result
 from grasp_core.optimizing.best.support_cuts import CutTree
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from tests.attacks.searching import Attack, always, cycled, power

@@ -63,7 +63,7 @@ WIDENED = 1e-8
 MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
-KERNEL = "grasp_core.optimizing.best.cuts_kernel"
+TWISTS = "grasp_core.optimizing.best.twists_kernel"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -238,7 +238,7 @@ def first_nodes(
 
 def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, int]:
     """Cut a piece to the part nearer to a point of it than to the point's images, by (1)."""
-    clip = compiled(KERNEL).clip
+    clip = compiled(TWISTS).clip
     polygon, count = grounds.corners[piece].copy(), int(grounds.counts[piece])
     middle = polygon[:count].mean(axis=0)
     aside = sum(share * (polygon[k] - middle) for k, share in enumerate(ASIDE))

@@ -26,7 +26,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best.grounds import ROOM, SEARCH_DIGITS, Grounds
+from grasp_core.optimizing.best.grounds import ROOM, SEARCH_DIGITS, TWISTS, Grounds
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
 from grasp_core.solvers.ties import on_grid
@@ -42,8 +42,6 @@ DEEP, FIRST_ROOM = 24, 256
 small, and clearing more memory took longer than searching them. Room is doubled where it is full.
 """
 KERNEL = "grasp_core.optimizing.best.search_kernel"
-CUTS = "grasp_core.optimizing.best.cuts_kernel"
-TWISTS = "grasp_core.optimizing.best.twists_kernel"
 PART_DEPTH = 7
 """Nodes with several children above a node that becomes a part of its own: a full tree has at least
 128 such parts, four waves of them."""
@@ -258,7 +256,7 @@ class Searching:
         """Return the pieces as the kernels take them."""
         grounds = self.grounds
         each = (grounds.normals, grounds.origins, grounds.frames)
-        return compiled(CUTS).Pieces(
+        return compiled(TWISTS).Pieces(
             *(on_grid(numbers, SEARCH_DIGITS) for numbers in each), float(self.friction)
         )
 

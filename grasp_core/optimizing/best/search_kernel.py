@@ -12,8 +12,19 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, Pieces, area, clip, cut, extent
-from grasp_core.optimizing.best.twists_kernel import Demand, Pool, descend, learn, multiple
+from grasp_core.optimizing.best.twists_kernel import (
+    MOST_CORNERS,
+    Demand,
+    Pieces,
+    Pool,
+    area,
+    clip,
+    cut,
+    descend,
+    extent,
+    learn,
+    multiple,
+)
 
 FINGERS = 4
 ASK, BY_PIECES, BY_LINE, SPLICE = 0, 16, 32, 64

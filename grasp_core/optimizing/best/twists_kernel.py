@@ -1,7 +1,10 @@
-"""Keeps twists that have divided or refuted much, and finds new ones by descent, compiled.
+"""Says what contacts on convex polygons answer twists, and which twists are worth asking, compiled.
 
-Twists are weighed by the multiple of the loads that they allow: support over demand, (1) of
-`measures`.
+*Cuts.* Solved: the hull of {x in K : s(x) >= t} for a convex polygon K of a face and the support s
+of the contact's cone, as `support_cuts` derives it, from outside.
+
+*Twists* that have divided or refuted much are kept, and new ones are found by descent. They are
+weighed by the multiple of the loads that they allow: support over demand, (1) of `measures`.
 """
 
 from typing import NamedTuple
@@ -10,7 +13,171 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.cuts_kernel import SLOPES, Pieces, slopes
+
+MOST_CORNERS = 24
+"""Room for the corners of a polygon; a cut that would need more is not made."""
+SLOPES = 6
+"""Numbers that say how a contact of a piece answers a twist, see `slopes`."""
+CROSSING_STEPS = 4
+"""Steps, from both sides, towards the point in which an edge leaves the part that answers."""
+
+
+class Pieces(NamedTuple):
+    """The convex pieces of faces on which contacts lie, at unit size."""
+
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns spanning the planes, (p, 3, 2)
+    friction: float
+
+
+@loop("numpy")
+def slopes(pieces: Pieces, piece: int, y: Array, out: Array) -> None:
+    """Fill in the numbers that give the support at any point (a, b) of a piece, (6,).
+
+    The support is out0 + out1 a + out2 b + mu |(out3 - out5 b, out4 + out5 a)|: normal velocity of
+    the contact, and its velocity along the face, which is that of a turning plane.
+    """
+    n, o, F = pieces.normals[piece], pieces.origins[piece], pieces.frames[piece]
+    u0 = y[0] + y[4] * o[2] - y[5] * o[1]
+    u1 = y[1] + y[5] * o[0] - y[3] * o[2]
+    u2 = y[2] + y[3] * o[1] - y[4] * o[0]
+    out[0] = n[0] * u0 + n[1] * u1 + n[2] * u2
+    out[3] = F[0, 0] * u0 + F[1, 0] * u1 + F[2, 0] * u2
+    out[4] = F[0, 1] * u0 + F[1, 1] * u1 + F[2, 1] * u2
+    for j in range(2):
+        w0 = y[4] * F[2, j] - y[5] * F[1, j]
+        w1 = y[5] * F[0, j] - y[3] * F[2, j]
+        w2 = y[3] * F[1, j] - y[4] * F[0, j]
+        out[1 + j] = n[0] * w0 + n[1] * w1 + n[2] * w2
+        if j == 0:
+            out[5] = F[0, 1] * w0 + F[1, 1] * w1 + F[2, 1] * w2
+
+
+@loop("numpy")
+def support(at: Array, a: float, b: float, friction: float) -> float:
+    """Return the support of the cone of a contact at the point (a, b), by its `slopes`."""
+    one, two = at[3] - at[5] * b, at[4] + at[5] * a
+    return at[0] + at[1] * a + at[2] * b + friction * np.sqrt(one * one + two * two)
+
+
+@loop("numpy")
+def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
+    """Fill in what is left of a polygon where the support reaches t; return how many corners."""
+    heights = np.empty(MOST_CORNERS)
+    reached, runs = 0, 0
+    for k in range(count):
+        heights[k] = support(at, corners[k, 0], corners[k, 1], friction)
+        if heights[k] >= t:
+            reached += 1
+    for k in range(count):
+        if heights[k] < t and heights[(k + 1) % count] >= t:
+            runs += 1
+    if reached == 0:
+        return 0
+    kept = 0
+    if reached == count or reached + 2 * runs > MOST_CORNERS:
+        for k in range(count):
+            out[k, 0], out[k, 1] = corners[k, 0], corners[k, 1]
+        return count
+    for k in range(count):
+        following = (k + 1) % count
+        if heights[k] >= t:
+            out[kept, 0], out[kept, 1] = corners[k, 0], corners[k, 1]
+            kept += 1
+            if heights[following] < t:
+                _cross(corners[following], corners[k], at, friction, t, out[kept])
+                kept += 1
+        elif heights[following] >= t:
+            _cross(corners[k], corners[following], at, friction, t, out[kept])
+            kept += 1
+    return kept
+
+
+@loop("numpy")
+def _cross(low: Array, high: Array, at: Array, friction: float, t: float, out: Array) -> None:
+    """Fill in a point of an edge, just before the support reaches t on the way from low to high.
+
+    Chords of a convex function lie above it, so that a chord meets t before the function does;
+    tangents lie below it, so that a tangent meets t behind. The interval shrinks from both ends.
+    """
+    da, db = high[0] - low[0], high[1] - low[1]
+    near, far = 0.0, 1.0
+    below = support(at, low[0], low[1], friction)
+    above = support(at, high[0], high[1], friction)
+    for _ in range(CROSSING_STEPS):
+        middle = near + (far - near) * (t - below) / (above - below)
+        found = support(at, low[0] + middle * da, low[1] + middle * db, friction)
+        if found < t and middle > near:
+            near, below = middle, found
+        a, b = low[0] + far * da, low[1] + far * db
+        one, two = at[3] - at[5] * b, at[4] + at[5] * a
+        across = np.sqrt(one * one + two * two)
+        slope = at[1] * da + at[2] * db
+        if across > 0.0:
+            slope += friction * at[5] * (two * da - one * db) / across
+        if slope > 0.0:
+            trial = far - (above - t) / slope
+            if near < trial < far:
+                found = support(at, low[0] + trial * da, low[1] + trial * db, friction)
+                if found >= t:
+                    far, above = trial, found
+        if above <= below:
+            break
+    out[0], out[1] = low[0] + near * da, low[1] + near * db
+
+
+@loop("numpy")
+def clip(corners: Array, count: int, line: Array, side: float, out: Array) -> int:
+    """Fill in the corners of the part of a polygon with side * (line0 a + line1 b - line2) <= 0.
+
+    Gives how many corners the part has; if there is no room for them, the polygon stays whole.
+    """
+    kept, heights = 0, np.empty(MOST_CORNERS)
+    for k in range(count):
+        reach = line[0] * corners[k, 0] + line[1] * corners[k, 1] - line[2]
+        heights[k] = side * reach
+    for k in range(count):
+        following = (k + 1) % count
+        inside, next_inside = heights[k] <= 0.0, heights[following] <= 0.0
+        if kept + 2 > MOST_CORNERS:
+            for j in range(count):
+                out[j, 0], out[j, 1] = corners[j, 0], corners[j, 1]
+            return count
+        if inside:
+            out[kept, 0], out[kept, 1] = corners[k, 0], corners[k, 1]
+            kept += 1
+        if inside != next_inside:
+            share = heights[k] / (heights[k] - heights[following])
+            for j in range(2):
+                step = corners[following, j] - corners[k, j]
+                out[kept, j] = corners[k, j] + share * step
+            kept += 1
+    return kept
+
+
+@loop("numpy")
+def extent(corners: Array, count: int, ends: Indices) -> float:
+    """Return the largest distance of two corners, and fill in which two they are, (2,)."""
+    largest = 0.0
+    for k in range(count):
+        for j in range(k):
+            da, db = corners[k, 0] - corners[j, 0], corners[k, 1] - corners[j, 1]
+            square = da * da + db * db
+            if square > largest:
+                largest, ends[0], ends[1] = square, j, k
+    return np.sqrt(largest)
+
+
+@loop("numpy")
+def area(corners: Array, count: int) -> float:
+    """Return the area of a polygon."""
+    total = 0.0
+    for k in range(count):
+        following = (k + 1) % count
+        total += corners[k, 0] * corners[following, 1] - corners[following, 0] * corners[k, 1]
+    return 0.5 * abs(total)
+
 
 TWIST = 6
 OVER = 1.0 + 4e-16

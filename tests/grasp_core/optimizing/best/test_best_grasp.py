@@ -12,8 +12,8 @@ from grasp_core.optimizing.best import best_grasp as searching
 from grasp_core.optimizing.best import search
 from grasp_core.optimizing.best.grounds import exact_maps, grounds_of
 from grasp_core.optimizing.best.incumbents import CLIMBED, climbed
-from grasp_core.optimizing.best.proof_file import read_proof, write_proof
 from grasp_core.optimizing.best.search import Searching, Stop
+from grasp_core.optimizing.best.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.contacts_on_faces import (

@@ -11,9 +11,8 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.optimizing.ascent import _weakest
 from grasp_core.optimizing.best.grounds import exact_maps, grounds_of
-from grasp_core.optimizing.best.proof_file import read_proof, write_proof
 from grasp_core.optimizing.best.search import Searching, Stop
-from grasp_core.optimizing.best.support_cuts import ROUNDING
+from grasp_core.optimizing.best.support_cuts import ROUNDING, read_proof, write_proof
 from grasp_core.quality.measures import Measure, resisted_loads
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.best.contacts_on_faces import FRICTION, LIFT, best
