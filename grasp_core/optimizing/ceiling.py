@@ -28,7 +28,7 @@ from grasp_core.errors import InputError
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.best_grasp import FINER, lowered_twists, refuted_by_one
+from grasp_core.optimizing.best.best_grasp import AIMED, FINER, lowered_twists, refuted_by_one
 from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
 from grasp_core.optimizing.best.search import Searching, Stop
 from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
@@ -40,8 +40,6 @@ from grasp_core.values import FINGERS, FaceQuadruple
 SMALLEST_GAP, LARGEST_GAP = 1e-3, 0.9
 SMALLEST = 1e-5
 """Bound that is not lowered any more [N]."""
-AIMED = 0.999
-"""Share of the gap between bounds: multiples of round numbers would be where digits are cut."""
 SEED = 0
 
 

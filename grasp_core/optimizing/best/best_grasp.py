@@ -47,7 +47,6 @@ from grasp_core.optimizing.best.search import (
     Searching,
     Steps,
     Stop,
-    stopping,
 )
 from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
@@ -194,7 +193,8 @@ ROUNDED_UP = 1e-6
 WIDEST = 0.4
 """Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
 AIMED = 0.999
-"""Share of the gap that is aimed at, as the grasp's quality is measured anew in the end."""
+"""Share of the gap that is aimed at: the grasp's quality is measured anew in the end, and multiples
+of round numbers would be where digits are cut."""
 FINER = 64.0
 """How much finer than the gap the steps are in which qualities and bounds count."""
 SAME = 1e-9
@@ -413,6 +413,6 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
     if clearance is None:
         clearance = FINGER_RADIUS * body.radius
     number(clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m")
-    with stopping(time_limit_s) as stop:
-        levels = Levels(body, friction, loads, clearance, seed, jobs, stop, progress)
-        return levels.result(levels.closed_to(gap))
+    stop = Stop(seconds=time_limit_s)
+    levels = Levels(body, friction, loads, clearance, seed, jobs, stop, progress)
+    return levels.result(levels.closed_to(gap))

@@ -38,7 +38,13 @@ from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face, unit_pieces
+from grasp_core.objects.face_pieces import (
+    LARGEST_INSET,
+    FacePiece,
+    inset_piece,
+    pieces_by_face,
+    unit_pieces,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import clear_of_edges
 from grasp_core.objects.symmetries import symmetries
@@ -54,7 +60,6 @@ UNIT = 1e-9
 """Largest deviation of normals and frames from orthonormal."""
 LARGEST = 2.0
 """Largest coordinate of a point, in object radii."""
-HALF = 0.5
 SEARCH_DIGITS = 11
 """Digits after the point that a search is given of polygons (see `support_cuts`)."""
 EXACT = 1e-9
@@ -108,7 +113,7 @@ def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
             pieces.append(inset_piece(rooms[0], clearance / body.radius))
         elif rooms:
             depth = max(room.inradius for room in rooms) * body.radius
-            margin = min(clearance, HALF * depth)
+            margin = min(clearance, LARGEST_INSET * depth)
             alone = replace(body, faces=(body.faces[face],))
             for piece in unit_pieces(clear_of_edges(alone, margin)):
                 pieces.append(replace(piece, face=face))

@@ -13,11 +13,10 @@ loosest threshold first (see `best_grasp`).
 """
 
 import math
-import threading
+import time
 from collections import deque
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
@@ -72,39 +71,23 @@ that a search may be asked for."""
 
 
 class Stop:
-    """Tells threads to stop: when asked, or one thread after some nodes, whatever the clock."""
+    """Tells threads to stop: when asked, after a time, or one thread after some nodes."""
 
-    def __init__(self, nodes: float = math.inf) -> None:
-        self._event, self._left = threading.Event(), nodes
+    def __init__(self, nodes: float = math.inf, seconds: float | None = None) -> None:
+        self._left = nodes
+        self._end = math.inf if seconds is None else time.monotonic() + seconds
 
     def __call__(self) -> bool:
         """Return whether to stop."""
-        return self._event.is_set()
+        return self._left <= 0 or time.monotonic() >= self._end
 
     def now(self) -> None:
         """Stop."""
-        self._event.set()
+        self._left = 0
 
     def spend(self, nodes: int) -> None:
         """Take note that a thread has visited so many nodes."""
         self._left -= nodes
-        if self._left <= 0:
-            self.now()
-
-
-@contextmanager
-def stopping(seconds: float | None) -> Generator[Stop]:
-    """Yield what stops a search after a time."""
-    stop = Stop()
-    timer = None if seconds is None else threading.Timer(seconds, stop.now)
-    if timer is not None:
-        timer.daemon = True
-        timer.start()
-    try:
-        yield stop
-    finally:
-        if timer is not None:
-            timer.cancel()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,9 +97,6 @@ class Found:
     pieces: tuple[int, ...]  # the piece of each contact, (4,)
     at: Array  # plane coordinates, (4, 2)
     quality: FerrariCanny | ResistedLoads
-
-    def __post_init__(self) -> None:
-        self.at.setflags(write=False)
 
 
 @dataclass(slots=True, eq=False)

@@ -69,7 +69,7 @@ for the Ferrari-Canny quality. For other measures it is 2, and two arrays say wh
 
 import io
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -204,9 +204,10 @@ class CutTree(Declared):
 USUAL, OTHER, FORMAT = 1, 2, "graspproof cut tree"
 """Schema of files for the Ferrari-Canny quality, and for other measures; what both say they are."""
 MOST_BYTES = 2**30
-OF_GROUNDS = ("faces", "normals", "origins", "frames", "corners", "counts")
-OF_TREE = ("friction", "maps", "threshold", "deeds", "asked", "twists", "lines")
 OF_LOADS = ("measure", "loads")
+OF_GROUNDS = tuple(each.name for each in fields(Grounds))
+OF_TREE = tuple(each.name for each in fields(CutTree)
+                if each.name not in {"grounds", "measure", "owners"})  # fmt: skip
 SMALL = {"deeds": np.uint8, "asked": np.int32, "faces": np.int32, "counts": np.int32}
 """Types that hold the whole numbers of the tree in less room."""
 
@@ -239,27 +240,22 @@ def read_proof(path: Path) -> CutTree:
         raise InputError(
             f"{path}: expected the text {FORMAT!r} and schema {USUAL} or {OTHER}; write it again"
         )
-    grounds = Grounds(**{name: arrays[name] for name in OF_GROUNDS})
-    parts: dict[str, Any] = {name: arrays[name] for name in OF_TREE}
-    for name in ("friction", "threshold"):
-        if parts[name].shape != () or parts[name].dtype.kind != "f":
-            raise InputError(f"{path}: {name} must be one number, got {parts[name].shape}")
-        parts[name] = float(parts[name])
-    if schemas == [OTHER]:
-        parts["measure"] = _measure(path, arrays)
-    proof = CutTree(grounds, **parts)
-    if not np.array_equal(arrays["bound"], proof.bound):
-        raise InputError(f"{path}: bound must be the {proof.bound:.17g} that the threshold proves")
-    return proof
-
-
-def _measure(path: Path, arrays: dict[str, NDArray[Any]]) -> Measure:
-    name: Any = str(arrays["measure"])
     with about(path):
-        found = Measure(name, arrays["loads"])
-        if found.is_usual:
-            raise InputError(f"expected measure 'weight' or 'task' with schema {OTHER}, got {name}")
-    return found
+        grounds = Grounds(**{name: arrays[name] for name in OF_GROUNDS})
+        measure = FERRARI_CANNY
+        if schemas == [OTHER]:
+            name: Any = str(arrays["measure"])
+            measure = Measure(name, arrays["loads"])
+            if measure.is_usual:
+                raise InputError(
+                    f"expected measure 'weight' or 'task' with schema {OTHER}, got {name}"
+                )
+        # arrays of no axes become numbers
+        parts: dict[str, Any] = {name: arrays[name][()] for name in OF_TREE}
+        proof = CutTree(grounds, measure=measure, **parts)
+        if not np.array_equal(arrays["bound"], proof.bound):
+            raise InputError(f"bound must be the {proof.bound:.17g} that the threshold proves")
+    return proof
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
