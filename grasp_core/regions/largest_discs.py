@@ -190,10 +190,8 @@ class Proved:
     ys: Array
     radius: float
     cover: TwistCover
-    limit: float
-    """Radius of discs with contacts not in force closure; infinite where none were found."""
     choice: Array | None
-    """Contacts that are not force-closed, in discs of radius `limit`, (k, 3)."""
+    """Contacts that are not force-closed, in slightly larger discs, (k, 3); None if not found."""
 
 
 def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
@@ -204,7 +202,7 @@ def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> P
     if search.cover is None:
         return None
     search.refute(grounds.cones // REFUTING)
-    return Proved(ys, search.lower, search.cover, search.limit, search.choice)
+    return Proved(ys, search.lower, search.cover, search.choice)
 
 
 class _Search:

@@ -114,12 +114,6 @@ class CarriedContact(Declared):
     """Angle between its old normal and that of the nearest like face [rad]; 0.0 if there is none.
     """
 
-    def __repr__(self) -> str:
-        return summary(
-            "CarriedContact", finger=self.finger, old_face=self.old_face, new_face=self.new_face,
-            distance=self.distance,
-        )  # fmt: skip
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CarriedGrasp(Declared):

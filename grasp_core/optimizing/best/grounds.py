@@ -38,6 +38,7 @@ from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import convex_polygon
 from grasp_core.objects.face_pieces import (
     LARGEST_INSET,
     FacePiece,
@@ -57,7 +58,7 @@ MOST_AT_FIRST = 12
 """Largest number of corners of a piece before any cut; larger ones are divided."""
 MOST_PIECES = 128
 UNIT = 1e-9
-"""Largest deviation of normals and frames from orthonormal."""
+"""Largest deviation of normals and frames from orthonormal, and of polygons from convex ones."""
 LARGEST = 2.0
 """Largest coordinate of a point, in object radii."""
 SEARCH_DIGITS = 11
@@ -94,7 +95,7 @@ class Grounds(Declared):
         square = axes.transpose(0, 2, 1) @ axes
         sizes = max(float(np.abs(self.origins).max()), float(np.abs(self.corners).max()))
         upright = np.abs(square - np.eye(3)).max() <= UNIT and sizes <= LARGEST
-        return bool(upright) and all(map(_is_convex, self.polygons()))
+        return bool(upright) and all(convex_polygon(each, UNIT) for each in self.polygons())
 
     def polygons(self) -> list[Array]:
         """Return the corners of each polygon in its plane, (k, 2) each."""
@@ -149,16 +150,6 @@ def _small(corners: Array) -> list[Array]:
         return [corners]
     half = len(corners) // 2
     return [*_small(corners[: half + 1]), *_small(np.vstack([corners[half:], corners[:1]]))]
-
-
-def _is_convex(corners: Array) -> bool:
-    edges = np.roll(corners, -1, axis=0) - corners
-    following = np.roll(edges, -1, axis=0)
-    turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
-    along = (edges * following).sum(axis=1)
-    angles = np.arctan2(turns, along)
-    one_way = (angles > -UNIT).all() or (angles < UNIT).all()
-    return bool(one_way and abs(abs(float(angles.sum())) - 2.0 * np.pi) < UNIT)
 
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:

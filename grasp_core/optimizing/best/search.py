@@ -221,33 +221,24 @@ class Searching:
     stop: Stop
     measure: Measure = FERRARI_CANNY
     spare: float = 0.0  # how far below threshold times demand a support still counts as an answer
-    pool: Any = None
     nodes: int = 0  # how many nodes were visited in all levels
+    pieces: Any = field(init=False)  # these three are as the kernels take them
+    demand: Any = field(init=False)
+    pool: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        pieces = len(self.grounds.counts)
-        self.pool = compiled(TWISTS).Pool(
-            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((pieces, 6, POOL)),
-            np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
-        )  # fmt: skip
-
-    @property
-    def pieces(self) -> Any:
-        """Return the pieces as the kernels take them."""
-        grounds = self.grounds
+        kernel, grounds = compiled(TWISTS), self.grounds
         each = (grounds.normals, grounds.origins, grounds.frames)
-        return compiled(TWISTS).Pieces(
-            *(on_grid(numbers, SEARCH_DIGITS) for numbers in each), float(self.friction)
-        )
-
-    @property
-    def demand(self) -> Any:
-        """Return the loads as the kernels take them."""
-        kernel = compiled(TWISTS)
+        numbers = (on_grid(every, SEARCH_DIGITS) for every in each)
+        self.pieces = kernel.Pieces(*numbers, float(self.friction))
         kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
         scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
         loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
-        return kernel.Demand(int(kinds[self.measure.name]), loads)
+        self.demand = kernel.Demand(int(kinds[self.measure.name]), loads)
+        self.pool = kernel.Pool(
+            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((len(grounds.counts), 6, POOL)),
+            np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
+        )  # fmt: skip
 
     def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:
         """Add twists, (n, 6), to a pool, the common one by default."""
@@ -300,13 +291,6 @@ class Searching:
 
     def _search(self, part: Part, threshold: float, known: float, depth: int) -> None:
         """Search a part; nodes at a depth are left, and all that wait after `PART_NODES`."""
-        for why in self._runs(part, threshold, known, depth):
-            if why == compiled(KERNEL).PART:
-                leave(part)
-        part.stack = None  # the memory of a part that is done
-
-    def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
-        """Run the kernel until a part is done, and yield why it pauses for the caller."""
         kernel, pieces, demand, found_at = compiled(KERNEL), self.pieces, self.demand, -1
         work = kernel.Work(
             np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
@@ -319,22 +303,22 @@ class Searching:
             before = int(part.tree.sizes[0])
             why = kernel.run(search, BUDGET, depth if before < PART_NODES else -1)
             self.stop.spend(int(part.tree.sizes[0]) - before)
-            if why == kernel.DONE:
-                part.finished = True
-                return
-            if why == kernel.LOST:
-                return
+            if why in {kernel.DONE, kernel.LOST}:
+                part.finished = why == kernel.DONE
+                break
             if why == kernel.FULL:
                 enlarge(part)
+            elif why == kernel.PART:
+                leave(part)
             elif why == kernel.FOUND:
                 if not self._is_refuted(part, work, threshold, known):
-                    return
+                    break
                 size = int(part.tree.sizes[0])
                 # found again: the twist refutes the contacts by less than rounding
                 if size == found_at and not kernel.divide(search, int(part.stack.top[0]) - 1):
-                    return
+                    break
                 found_at = size
-            yield why
+        part.stack = None  # the memory of a part that is done
 
     def _is_refuted(self, part: Part, work: Any, threshold: float, known: float) -> bool:
         found = self.measured(work.on, work.middle)

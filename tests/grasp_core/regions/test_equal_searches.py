@@ -149,7 +149,7 @@ def test_discs_as_large_are_those_named_first():
     pieces = pieces_under(body, grasp)
     grounds = Grounds(pieces, np.full(4, 0.5), 64)
     sizes = 0.1, 0.1 + SHAKEN, 0.1 - SHAKEN
-    first, larger, smaller = (Proved(np.zeros((4, 2)), r, None, np.inf, None) for r in sizes)
+    first, larger, smaller = (Proved(np.zeros((4, 2)), r, None, None) for r in sizes)
     assert larger_inside(grounds, first, larger) is first
     assert larger_inside(grounds, first, smaller) is first
     clearly = replace(first, radius=0.11)
