@@ -32,7 +32,7 @@ from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 
 if TYPE_CHECKING:
-    from grasp_core.optimizing.best.best_grasp import BestGrasp
+    from grasp_core.optimizing.best_grasp import BestGrasp
 
 SAME_CONTACTS = 0.01
 """Distance below which two optimized contacts count as the same [object radii]; searches for one

@@ -25,7 +25,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best.grounds import ROOM, SEARCH_DIGITS, TWISTS, Grounds
+from grasp_core.optimizing.grounds import ROOM, SEARCH_DIGITS, TWISTS, Grounds
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
 from grasp_core.solvers.ties import on_grid
@@ -40,7 +40,7 @@ DEEP, FIRST_ROOM = 24, 256
 """Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
 small, and clearing more memory took longer than searching them. Room is doubled where it is full.
 """
-KERNEL = "grasp_core.optimizing.best.search_kernel"
+KERNEL = "grasp_core.optimizing.search_kernel"
 PART_DEPTH = 7
 """Nodes with several children above a node that becomes a part of its own: a full tree has at least
 128 such parts, four waves of them."""

@@ -82,7 +82,7 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_bytes, write_parts
 from grasp_core.kinds import FrictionOrZero, Many
-from grasp_core.optimizing.best.grounds import Grounds, first_nodes, fitting
+from grasp_core.optimizing.grounds import Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
@@ -107,7 +107,7 @@ more than normal forces of sum one reach on contacts with coordinates up to two,
 below a hundred."""
 LONGEST_WRENCH = 8.0
 """More than the length of any wrench of forces with normal parts of sum one, over 1 + mu."""
-KERNEL = "grasp_core.optimizing.best.replay_kernel"
+KERNEL = "grasp_core.optimizing.replay_kernel"
 
 
 class Slack(NamedTuple):

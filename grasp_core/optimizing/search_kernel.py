@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.twists_kernel import (
+from grasp_core.optimizing.twists_kernel import (
     MOST_CORNERS,
     Demand,
     Pieces,

@@ -69,7 +69,7 @@ WIDENED = 1e-8
 MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
-TWISTS = "grasp_core.optimizing.best.twists_kernel"
+TWISTS = "grasp_core.optimizing.twists_kernel"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
