@@ -44,7 +44,6 @@ from grasp_core.optimizing.grounds import (
 from grasp_core.optimizing.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.search import (
     EXACT_GAP,
-    Found,
     Searching,
     Steps,
     Stop,
@@ -54,7 +53,7 @@ from grasp_core.planning.certify import named
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import Measure, MeasureName, ResistedLoads, measured_set
 from grasp_core.solvers.ties import few_digits, first_best, on_grid, surpassing
-from grasp_core.values import FINGERS, Grasp
+from grasp_core.values import FINGERS, Grasp, four
 
 PLACED = 1e-7
 """Largest distance between equal points, and directions, in object radii."""
@@ -338,23 +337,18 @@ class Levels:
         proof = CutTree(
             self.grounds, self.friction, self.maps, self.threshold, *self.steps, self.measure
         )
-        grasp = self._grasp(self.best)
+        pieces = tuple(piece_at(self.grounds, p) for p in self.best.pieces)
+        points = np.array([piece.point(y) for piece, y in zip(pieces, self.best.at, strict=True)])
+        faces = four(piece.face for piece in pieces)
+        name = named("b", faces)
+        grasp = certified(self.body, name, pieces, points, self.friction, self.rng)
+        if grasp is None:
+            raise InputError(
+                f"best_grasp: expected that the best contacts found, on faces {list(faces)}, can "
+                "be certified, and they cannot; try another seed"
+            )
         quality = measured(self.body, grasp, self.friction, self.measure)
         return BestGrasp(grasp, quality, self.clearance, proof, ended, tuple(self.history))
-
-    def _grasp(self, best: Found) -> Grasp:
-        pieces = tuple(piece_at(self.grounds, p) for p in best.pieces)
-        points = np.array([piece.point(y) for piece, y in zip(pieces, best.at, strict=True)])
-        a, b, c, d = (piece.face for piece in pieces)
-        name = named("b", (a, b, c, d))
-        found = certified(self.body, name, pieces, points, self.friction, self.rng)
-        if found is not None:
-            return found
-        raise InputError(
-            f"best_grasp: expected that the best contacts found, on faces "
-            f"{[piece.face for piece in pieces]}, can be certified, and they cannot; try another "
-            "seed"
-        )
 
 
 def best_grasp(  # noqa: PLR0913 - each is a quantity of its own

@@ -471,8 +471,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
         count = stack.counts[node, i, p]
         work.middle[i] = 0.0
         for v in range(count):
-            for j in range(2):
-                work.middle[i, j] += stack.corners[node, i, p, v, j] / count
+            work.middle[i] += stack.corners[node, i, p, v] / count
             _place(pieces, p, stack.corners[node, i, p, v], points[m])
             on[m] = p
             m += 1
@@ -515,7 +514,5 @@ def _learned(search: Search, node: int, y: Array, now: int) -> int:
 
 @loop("numpy")
 def _place(pieces: Pieces, p: int, at: Array, point: Array) -> None:
-    for j in range(3):
-        point[j] = (
-            pieces.origins[p, j] + pieces.frames[p, j, 0] * at[0] + pieces.frames[p, j, 1] * at[1]
-        )
+    frame = pieces.frames[p]
+    point[:] = pieces.origins[p] + frame[:, 0] * at[0] + frame[:, 1] * at[1]

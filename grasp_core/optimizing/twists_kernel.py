@@ -77,8 +77,7 @@ def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: A
         return 0
     kept = 0
     if reached == count or reached + 2 * runs > MOST_CORNERS:
-        for k in range(count):
-            out[k, 0], out[k, 1] = corners[k, 0], corners[k, 1]
+        out[:count] = corners[:count]
         return count
     for k in range(count):
         following = (k + 1) % count
@@ -133,25 +132,20 @@ def clip(corners: Array, count: int, line: Array, side: float, out: Array) -> in
 
     Gives how many corners the part has; if there is no room for them, the polygon stays whole.
     """
-    kept, heights = 0, np.empty(MOST_CORNERS)
-    for k in range(count):
-        reach = line[0] * corners[k, 0] + line[1] * corners[k, 1] - line[2]
-        heights[k] = side * reach
+    kept = 0
+    heights = side * (line[0] * corners[:count, 0] + line[1] * corners[:count, 1] - line[2])
     for k in range(count):
         following = (k + 1) % count
         inside, next_inside = heights[k] <= 0.0, heights[following] <= 0.0
         if kept + 2 > MOST_CORNERS:
-            for j in range(count):
-                out[j, 0], out[j, 1] = corners[j, 0], corners[j, 1]
+            out[:count] = corners[:count]
             return count
         if inside:
-            out[kept, 0], out[kept, 1] = corners[k, 0], corners[k, 1]
+            out[kept] = corners[k]
             kept += 1
         if inside != next_inside:
             share = heights[k] / (heights[k] - heights[following])
-            for j in range(2):
-                step = corners[following, j] - corners[k, j]
-                out[kept, j] = corners[k, j] + share * step
+            out[kept] = corners[k] + share * (corners[following] - corners[k])
             kept += 1
     return kept
 
@@ -229,14 +223,12 @@ def learn(pool: Pool, pieces: Pieces, demand: Demand, y: Array, now: int) -> int
     for j in range(TWIST):
         length += y[j] * y[j]
     length = np.sqrt(length)
-    for j in range(TWIST):
-        pool.twists[place, j] = y[j] / length * OVER
+    pool.twists[place] = y / length * OVER
     pool.demands[place] = demanded(demand, pool.twists[place], np.empty(TWIST))
     at = np.empty(SLOPES)
     for p in range(len(pieces.normals)):
         slopes(pieces, p, pool.twists[place], at)
-        for j in range(SLOPES):
-            pool.asked[p, j, place] = at[j]
+        pool.asked[p, :, place] = at
     pool.used[place], pool.names[place] = now, -1
     return place
 
@@ -257,20 +249,15 @@ def demanded(demand: Demand, y: Array, hardest: Array) -> float:
             for j in range(3):
                 hardest[j] = y[j] / long
         return long
-    return _most_of(demand.loads, y, hardest)
-
-
-@loop("numpy")
-def _most_of(loads: Array, y: Array, hardest: Array) -> float:
     most = 0.0
-    for k in range(len(loads)):
+    for load in demand.loads:
         found = 0.0
         for j in range(TWIST):
-            found -= loads[k, j] * y[j]
+            found -= load[j] * y[j]
         if found > most:
             most = found
             for j in range(TWIST):
-                hardest[j] = -loads[k, j]
+                hardest[j] = -load[j]
     return most
 
 
@@ -290,17 +277,12 @@ def highest(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, slope:
     """Return the largest support of contacts at points in a direction; fill in its wrench, (6,)."""
     best, first = -np.inf, 0
     for i in range(m):
-        u0, u1, u2 = _velocity(points[i], y)
-        n = pieces.normals[on[i]]
-        along = n[0] * u0 + n[1] * u1 + n[2] * u2
-        square = u0 * u0 + u1 * u1 + u2 * u2 - along * along
-        found = along + pieces.friction * np.sqrt(max(square, 0.0))
+        _, along, across = _velocity(pieces.normals[on[i]], points[i], y)
+        found = along + pieces.friction * across
         if found > best:
             best, first = found, i
-    u0, u1, u2 = _velocity(points[first], y)
     n, x = pieces.normals[on[first]], points[first]
-    along = n[0] * u0 + n[1] * u1 + n[2] * u2
-    across = np.sqrt(max(u0 * u0 + u1 * u1 + u2 * u2 - along * along, 0.0))
+    (u0, u1, u2), along, across = _velocity(n, x, y)
     share = pieces.friction / across if across > 0.0 else 0.0
     f0 = n[0] + share * (u0 - along * n[0])
     f1 = n[1] + share * (u1 - along * n[1])
@@ -313,12 +295,14 @@ def highest(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, slope:
 
 
 @loop("numpy")
-def _velocity(x: Array, y: Array) -> tuple[float, float, float]:
-    return (
-        y[0] + y[4] * x[2] - y[5] * x[1],
-        y[1] + y[5] * x[0] - y[3] * x[2],
-        y[2] + y[3] * x[1] - y[4] * x[0],
-    )
+def _velocity(n: Array, x: Array, y: Array) -> tuple[tuple[float, float, float], float, float]:
+    """Return the velocity of a point under a twist, with its parts along and across a normal."""
+    u0 = y[0] + y[4] * x[2] - y[5] * x[1]
+    u1 = y[1] + y[5] * x[0] - y[3] * x[2]
+    u2 = y[2] + y[3] * x[1] - y[4] * x[0]
+    along = n[0] * u0 + n[1] * u1 + n[2] * u2
+    square = u0 * u0 + u1 * u1 + u2 * u2 - along * along
+    return (u0, u1, u2), along, np.sqrt(max(square, 0.0))
 
 
 @loop("numpy")
