@@ -42,8 +42,8 @@ from grasp_core.objects.polyhedron import Polyhedron as Polyhedron
 from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
 from grasp_core.objects.surface import Face as Face
 from grasp_core.objects.surface import Surface as Surface
-from grasp_core.optimizing.best.best_grasp import best_grasp as best_grasp
-from grasp_core.optimizing.best.result import BestGrasp as BestGrasp
+from grasp_core.optimizing.best_grasp import BestGrasp as BestGrasp
+from grasp_core.optimizing.best_grasp import best_grasp as best_grasp
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
 from grasp_core.optimizing.better_contacts import optimize_contacts as optimize_contacts
 from grasp_core.optimizing.ceiling import QualityCeiling as QualityCeiling
@@ -62,8 +62,8 @@ from grasp_core.quality.wrench_limits import WrenchLimit as WrenchLimit
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
 from grasp_core.records.grasps_json import load_grasps as load_grasps
 from grasp_core.records.grasps_json import save_grasps as save_grasps
-from grasp_core.regions.certificates import CertifiedRegions as CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
+from grasp_core.regions.proof import CertifiedRegions as CertifiedRegions
 from grasp_core.transferring.face_changes import FaceChange as FaceChange
 from grasp_core.transferring.transfer import CarriedContact as CarriedContact
 from grasp_core.transferring.transfer import CarriedGrasp as CarriedGrasp

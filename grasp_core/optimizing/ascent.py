@@ -209,24 +209,27 @@ class ContactFaces:
         feet = np.asarray(np.linalg.pinv(columns, rcond=FLAT), dtype=np.float64)
         shares = np.einsum("mcj,mj->mc", feet, b[:, None] * normals)
         sound = np.abs(shares).max(axis=1) < STEEPEST
-        frames = contact_frames(self.normals)
-        local = polytope.forces.reshape(len(polytope.forces), -1, 3)
-        forces = np.einsum("kij,nkj->nki", frames, local)
+        forces = self.in_space(polytope.forces)
         carried = np.einsum("mc,mcki->mki", shares[sound], forces[corners[sound]])
-        turned = np.cross(carried, normals[sound, None, 3:])
-        planes = np.array([piece.frame for piece in self.pieces])
-        slopes = np.einsum("mki,kij->mkj", turned, planes).reshape(int(sound.sum()), -1)
-        return b[sound], slopes
+        return b[sound], self.slopes(carried, normals[sound])
 
     def planes_of_loads(self, wrenches: WrenchSet, measure: Measure) -> tuple[Array, Array]:
         """Return the multiple of each load, (m,), and its slopes (2), (m, 2k)."""
         limits = task_limits(wrenches, measure)
-        local = np.array([limit.forces for limit in limits]).reshape(len(limits), -1, 3)
-        forces = np.einsum("kij,nkj->nki", contact_frames(self.normals), local)
-        turned = np.cross(forces, np.array([limit.twist for limit in limits])[:, None, 3:])
-        planes = np.array([piece.frame for piece in self.pieces])
-        slopes = np.einsum("nki,kij->nkj", turned, planes).reshape(len(limits), -1)
+        forces = self.in_space(np.array([limit.forces for limit in limits]))
+        slopes = self.slopes(forces, np.array([limit.twist for limit in limits]))
         return np.array([limit.multiple for limit in limits]), slopes
+
+    def in_space(self, local: Array) -> Array:
+        """Turn local forces of all contacts, (n, 3k), into forces in space, (n, k, 3)."""
+        frames = contact_frames(self.normals)
+        return np.einsum("kij,nkj->nki", frames, local.reshape(len(local), -1, 3))
+
+    def slopes(self, forces: Array, twists: Array) -> Array:
+        """Return how fast contacts with forces (n, k, 3) gain under twists (n, 6), (n, 2k)."""
+        turned = np.cross(forces, twists[:, None, 3:])
+        planes = np.array([piece.frame for piece in self.pieces])
+        return np.einsum("nki,kij->nkj", turned, planes).reshape(len(forces), -1)
 
 
 def climbs_for_weight(faces: ContactFaces, y: Array) -> Iterator[Array]:

@@ -2,7 +2,7 @@
 
 Solved: how much better than a known grasp any other on the same faces can be.
 
-Derivation. The search for cuts that bounds the best grasp of an object (`best.support_cuts`) bounds
+Derivation. The search for cuts that bounds the best grasp of an object (`support_cuts`) bounds
 contacts on four faces as well: each finger begins on the convex pieces of its own face, and fingers
 are not interchangeable. Of a row of bounds, each below the one before by the gap, the least that
 can be refuted is sought, in growing steps from above and then by halving: a bound is not refuted if
@@ -29,11 +29,11 @@ from grasp_core.kinds import Cases
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.best_grasp import FINER, lowered_twists, refuted_by_one
-from grasp_core.optimizing.best.grounds import Grounds, first_nodes, grounds_on
-from grasp_core.optimizing.best.search import Searching, Stop
-from grasp_core.optimizing.best.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
+from grasp_core.optimizing.best_grasp import AIMED, FINER, lowered_twists, refuted_by_one
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
+from grasp_core.optimizing.grounds import Grounds, first_nodes, grounds_on
+from grasp_core.optimizing.search import Searching, Stop
+from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.quality.measures import FERRARI_CANNY
 from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits
@@ -42,8 +42,6 @@ from grasp_core.values import FINGERS, FaceQuadruple
 SMALLEST_GAP, LARGEST_GAP = 1e-3, 0.9
 SMALLEST = 1e-5
 """Bound that is not lowered any more [N]."""
-AIMED = 0.999
-"""Share of the gap between bounds: multiples of round numbers would be where digits are cut."""
 SEED = 0
 
 

@@ -126,62 +126,30 @@ def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
 
     Gives the height from which on points see a simplex; -1 if all points are flat.
     """
-    wrenches, rest, mean = np.empty((len(edges), D)), np.empty((len(edges), D)), np.zeros(D)
+    wrenches, mean = np.empty((len(edges), D)), np.zeros(D)
     for i in range(len(edges)):
         _wrench(G, edges[i], wrenches[i])
-        for j in range(D):
-            mean[j] += wrenches[i, j] / len(edges)
-    _shift(wrenches, mean, rest)
-    flat = -1.0
+        mean += wrenches[i] / len(edges)
+    rest, flat = wrenches - mean, -1.0
     for step in range(D + 1):
-        farthest, square = _farthest(rest)
-        if square <= flat:
+        squares = np.zeros(len(rest))
+        for j in range(D):
+            squares += rest[:, j] * rest[:, j]
+        farthest = np.argmax(squares)
+        if squares[farthest] <= flat:
             return -1.0
         forces[step], points[step] = edges[farthest], wrenches[farthest]
         if step == 0:
-            flat = (FLATNESS * _shift(wrenches, points[0], rest)) ** 2
+            rest = wrenches - points[0]
+            flat = (FLATNESS * np.abs(rest).max()) ** 2
         else:
-            _flatten(rest, farthest, np.sqrt(square))
+            unit, along = rest[farthest] / np.sqrt(squares[farthest]), np.zeros(len(rest))
+            for j in range(D):
+                along += rest[:, j] * unit[j]
+            for j in range(D):
+                rest[:, j] -= along * unit[j]
     # the extent of the seven points along the axis on which it is largest
     extent = 0.0
     for j in range(D):
-        least = largest = points[0, j]
-        for i in range(D + 1):
-            least, largest = min(least, points[i, j]), max(largest, points[i, j])
-        extent = max(extent, largest - least)
+        extent = max(extent, points[: D + 1, j].max() - points[: D + 1, j].min())
     return ABOVE * extent
-
-
-@loop()
-def _shift(wrenches: Array, origin: Array, rest: Array) -> float:
-    largest = 0.0
-    for i in range(len(wrenches)):
-        for j in range(D):
-            rest[i, j] = wrenches[i, j] - origin[j]
-            largest = max(largest, abs(rest[i, j]))
-    return largest
-
-
-@loop()
-def _farthest(rest: Array) -> tuple[int, float]:
-    farthest, largest = 0, -1.0
-    for i in range(len(rest)):
-        square = 0.0
-        for j in range(D):
-            square += rest[i, j] * rest[i, j]
-        if square > largest:
-            farthest, largest = i, square
-    return farthest, largest
-
-
-@loop()
-def _flatten(rest: Array, chosen: int, length: float) -> None:
-    unit = np.empty(D)
-    for j in range(D):
-        unit[j] = rest[chosen, j] / length
-    for i in range(len(rest)):
-        along = 0.0
-        for j in range(D):
-            along += rest[i, j] * unit[j]
-        for j in range(D):
-            rest[i, j] -= along * unit[j]

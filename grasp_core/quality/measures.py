@@ -110,14 +110,19 @@ class Measure(Declared):
     (m, 6) [N]; none for other measures."""
 
     def _check_together(self) -> None:
+        count = len(self.loads)
         if self.name != "task":
-            if len(self.loads):
-                raise InputError(f"loads must be none with measure {self.name!r}; leave them out")
+            if count:
+                raise InputError(
+                    f"wrenches: expected none with measure {self.name!r}, got {count}; leave them "
+                    "out, or take measure 'task'"
+                )
             return
-        if not 0 < len(self.loads) <= MOST_LOADS:
+        if not 0 < count <= MOST_LOADS:
             raise InputError(
-                f"wrenches must be 1 to {MOST_LOADS}, got {len(self.loads)}; leave out those that "
-                "are mixtures of others"
+                f"wrenches: expected those of the task with measure 'task', 1 to {MOST_LOADS}, got "
+                f"{count}; give an array of shape (m, 6), forces in N and torques in N m, without "
+                "those that are mixtures of others"
             )
         sizes = np.linalg.norm(self.loads, axis=1)
         wrong = np.flatnonzero((sizes < SMALLEST) | (sizes > LARGEST))
@@ -129,23 +134,11 @@ class Measure(Declared):
             )
 
     @classmethod
-    def of(cls, name: str, wrenches: ArrayLike | None, radius: float) -> "Measure":
+    def of(cls, name: MeasureName, wrenches: ArrayLike | None, radius: float) -> "Measure":
         """Make a measure from a user's words and wrenches (force, torque), (m, 6) [N, N m]."""
         one_of(name, get_args(MeasureName), "measure")
-        if name != "task":
-            if wrenches is not None:
-                raise InputError(
-                    f"wrenches: expected none with measure {name!r}; leave them out, or take "
-                    "measure 'task'"
-                )
-            return cls("weight" if name == "weight" else "ferrari-canny")
-        if wrenches is None:
-            raise InputError(
-                "wrenches: expected those of the task with measure 'task', got None; give an "
-                "array of shape (m, 6), forces in N and torques in N m"
-            )
-        loads = frozen(wrenches, (None, WRENCH), "wrenches")
-        return cls("task", loads / np.repeat([1.0, radius], 3))
+        given = np.zeros((0, WRENCH)) if wrenches is None else wrenches
+        return cls(name, frozen(given, (None, WRENCH), "wrenches") / np.repeat([1.0, radius], 3))
 
     @property
     def is_usual(self) -> bool:

@@ -34,9 +34,9 @@ from grasp_core.kinds import MaxCones, Reserve
 from grasp_core.objects.face_pieces import FacePiece, inscribed_radius, piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.regions.certificates import PLACED, CertifiedRegions
 from grasp_core.regions.growth import better_centers, larger_inside, shared_out
 from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
+from grasp_core.regions.proof import PLACED, CertifiedRegions
 from grasp_core.settings import value_of
 from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four

@@ -5,6 +5,11 @@ only divided and forces chosen. Numbers in comments refer to that derivation. Co
 level by level, the oldest first, so the answer is a tree in levels: for each cone the edge at which
 it is divided, or the forces.
 
+A cone of twists is covered if contact forces together have power on all of its six rays. Such
+forces are found in rounds. In each round every ray has a weight, by how much power it has lacked so
+far, and the forces that are best for these weights are chosen. The mean of the chosen forces, later
+ones counting more, comes to have power on all rays if any forces do.
+
 A motion is six numbers for each contact and each twist of length one: the velocity of the contact's
 point along its normal and two tangents, and the rate of turning about these tangents and the
 normal.
@@ -17,13 +22,20 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
+from grasp_core.regions.largest_discs import AHEAD, Sites
 from grasp_core.regions.proof import LEAF, TWIST
-from grasp_core.regions.sites import AHEAD, ANSWERS, CLEAR_OF_CONE, EVEN, ROUNDS, Sites
 
 MOTIONS = 6
 STEPS = 40
 """Largest number of steps towards the place where a contact resists a twist least."""
 RAYS = TWIST
+ROUNDS = 30  # of the choice of forces, at most
+ANSWERS = 3
+"""Number of forces per contact that are tried as the best one for given weights."""
+EVEN = 0.02
+"""Weight added to each ray in the choice of the edge to cut, so that all edges are cut in time."""
+CLEAR_OF_CONE = 1e-12
+"""Share of the friction that contact forces leave unused, so that rounding does no harm."""
 COVERED, REFUTED, UNDECIDED = 1, -1, 0
 
 
@@ -227,7 +239,7 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
 def find_forces(
     ids: Indices, motions: Array, sites: Sites, clear: Array, forces: Array, weights: Array
 ) -> bool:
-    """Find forces with power on all rays of a cone, as `sites` describes.
+    """Find forces with power on all rays of a cone, as the head of this module says.
 
     It stops once no force has power for the weights: those of a twist that may be unresisted.
     """

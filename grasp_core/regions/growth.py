@@ -30,9 +30,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
 from grasp_core.geometry.polygons import ON_LINE, clip, nearest_point, tidy
-from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
+from grasp_core.regions.largest_discs import Grounds, Proved, Sites, largest_discs
 from grasp_core.regions.proof import TwistCover, power_of, slack_of, summed
-from grasp_core.regions.sites import Sites
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import first_best, nearest_optimum, on_grid
 

@@ -8,22 +8,74 @@ few cones for each attempt, then in smaller steps with as many cones as are allo
 A cover is a list of cones that fill the space of twists, each with contact forces that together
 have power on all its rays. Compiled code divides cones until such forces are found for each, or
 stops when it finds a twist that contacts at some places do not resist; `proof` derives why a cover
-is enough, and checks the answer, and `sites` describes how forces are found.
+is enough, and checks the answer, and `cover_kernel` describes how forces are found.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.compiled import compiled
+from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import SAME_CORNER, clip
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.regions.proof import LEAF, TWIST, TwistCover
-from grasp_core.regions.sites import Sites, stacked_corners
-from grasp_core.solvers.ties import coarse
+from grasp_core.solvers.ties import GRID_DIGITS, coarse, on_grid
+
+AHEAD = 1e-8
+"""Least power of a force that counts, relative to its size and the farthest place: more than
+rounding sites to a grid can change it."""
+
+
+class Sites(NamedTuple):
+    """Where each of k contacts may be, as plain arrays for compiled loops."""
+
+    points: Array
+    """Points of the contacts about any origin, (k, 3)."""
+    frames: Array
+    """Frames as columns (inward normal, tangent, tangent), right-handed, (k, 3, 3)."""
+    friction: Array
+    """Coulomb coefficients, (k,)."""
+    corners: Array
+    """Corners of convex polygons, along the tangents and relative to `points`, (k, c, 2); the last
+    corner may be repeated."""
+    radii: Array
+    """Radii of the discs by which the polygons are widened, (k,)."""
+    depths: Array
+    """Largest distance of contacts from the planes of their polygons, (k,)."""
+
+    def on_grid(self) -> "Sites":
+        """Round to a grid, so that last digits do not matter to a search; friction never rises."""
+        friction = -coarse(-self.friction, GRID_DIGITS)
+        return Sites(*map(on_grid, self))._replace(friction=np.clip(friction, 0.0, self.friction))
+
+    def clear(self) -> Array:
+        """Return the power per unit of force and twist that rounding to the grid may take, (k,)."""
+        aside = np.sqrt(np.einsum("kcj,kcj->kc", self.corners, self.corners)).max(axis=1)
+        places = np.sqrt(np.einsum("kj,kj->k", self.points, self.points))
+        farthest = 1.0 + float((places + aside + self.radii + self.depths).max())
+        return AHEAD * farthest * (1.0 + self.friction)
+
+    def lowest(self, i: int, slopes: Array) -> Array:
+        """Find the least values of functions with slopes (..., 2) over a contact's site, (...,)."""
+        lengths = np.sqrt(np.einsum("...j,...j->...", slopes, slopes))
+        return (slopes @ self.corners[i].T).min(axis=-1) - self.radii[i] * lengths
+
+
+def stacked_corners(polygons: list[Array]) -> Array:
+    """Put polygons (c, 2) into one array, with the last corners of shorter ones repeated."""
+    if min(map(len, polygons)) == 0:
+        raise InputError("the site of each contact must have at least one corner, got none")
+    most = max(map(len, polygons))
+    return np.array([
+        np.vstack([polygon, np.repeat(polygon[-1:], most - len(polygon), axis=0)])
+        for polygon in polygons
+    ])  # fmt: skip
+
 
 KERNEL = "grasp_core.regions.cover_kernel"
 DIAGONAL = 1e-12
@@ -138,10 +190,8 @@ class Proved:
     ys: Array
     radius: float
     cover: TwistCover
-    limit: float
-    """Radius of discs with contacts not in force closure; infinite where none were found."""
     choice: Array | None
-    """Contacts that are not force-closed, in discs of radius `limit`, (k, 3)."""
+    """Contacts that are not force-closed, in slightly larger discs, (k, 3); None if not found."""
 
 
 def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
@@ -152,7 +202,7 @@ def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> P
     if search.cover is None:
         return None
     search.refute(grounds.cones // REFUTING)
-    return Proved(ys, search.lower, search.cover, search.limit, search.choice)
+    return Proved(ys, search.lower, search.cover, search.choice)
 
 
 class _Search:

@@ -39,7 +39,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Annotated, TypeAlias
+from typing import Annotated
 
 import numpy as np
 
@@ -48,7 +48,7 @@ from grasp_core.checked import instance, number
 from grasp_core.declared import Declared, counted
 from grasp_core.errors import InputError
 from grasp_core.files.records import Key
-from grasp_core.kinds import FaceTurn
+from grasp_core.kinds import FaceTurn, Vector
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -62,7 +62,6 @@ from grasp_core.planning.given_contacts import (
 from grasp_core.settings import value_of
 from grasp_core.transferring.settings import Carrying
 
-Triple: TypeAlias = tuple[float, float, float]
 SHARE_OF_SIZE = 0.05
 """Default for how far a contact may move, relative to the old part's radius."""
 ANGLE_DEG = Carrying().angle_deg
@@ -155,9 +154,9 @@ class FaceChange(Declared):
     """Area of the successor [m^2]; 0.0 without one."""
     moved: bool
     """Whether the face is gone, or its plane is another one by more than rounding."""
-    normal: Triple
+    normal: Vector
     """Inward unit normal on the old part."""
-    center: Annotated[Triple, Key("center_m")]
+    center: Annotated[Vector, Key("center_m")]
     """Centroid on the old part [m]."""
     likely: int | None = None
     """Number of the face that it probably became although it turned too far to succeed it; None if
@@ -276,7 +275,8 @@ def _distance(face: Face, point: Array) -> float:
 def _change(
     index: int, face: Face, successor: int | None, new: Polyhedron, size: float
 ) -> FaceChange:
-    normal, center = _triple(face.normal), _triple(face.centroid)
+    (x, y, z), (a, b, c) = face.normal.tolist(), face.centroid.tolist()
+    normal, center = (x, y, z), (a, b, c)
     if successor is None:
         return FaceChange(index, None, 0.0, 0.0, face.area, 0.0, True, normal, center)
     now = new.faces[successor]
@@ -286,11 +286,6 @@ def _change(
     turn = turn_of(face.normal, now.normal)
     moved = abs(distance) > MOVED * size or turn > TURNED
     return FaceChange(index, successor, distance, turn, face.area, now.area, moved, normal, center)
-
-
-def _triple(numbers: Array) -> Triple:
-    x, y, z = numbers.tolist()
-    return x, y, z
 
 
 def turn_of(normal: Array, now: Array) -> float:

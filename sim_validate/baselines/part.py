@@ -17,7 +17,6 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
-from grasp_core.transferring.changed_part import fitting_lengths, fitting_unit, load_changed_part
 from grasp_core.transferring.face_changes import (
     FaceChange,
     added_faces,
@@ -27,7 +26,14 @@ from grasp_core.transferring.face_changes import (
     likeness,
 )
 from grasp_core.transferring.settings import IfChanged
-from grasp_core.transferring.transfer import CarriedGrasp, Transfer, transfer
+from grasp_core.transferring.transfer import (
+    CarriedGrasp,
+    Transfer,
+    fitting_lengths,
+    fitting_unit,
+    load_changed_part,
+    transfer,
+)
 from sim_validate.baselines.baseline import Baseline, RecordedPart
 
 TABLE = "changed_part"

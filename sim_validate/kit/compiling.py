@@ -66,7 +66,7 @@ def _regions() -> None:
 
 
 def _best() -> None:
-    from grasp_core.optimizing.best.best_grasp import best_grasp
+    from grasp_core.optimizing.best_grasp import best_grasp
 
     best_grasp(example_object("tetrahedron"), FRICTION, gap=0.5).verify()
 
@@ -117,7 +117,7 @@ REACHING = Loops(
 )  # fmt: skip
 """What compiles the loops that put hands to contacts."""
 EVERYTHING = Loops(
-    (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.best.search"),
+    (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.search"),
     (*PLANNING.here, _hand_checks, _hand_posing, _hand_reach, _regions, _clearance),
     (*PLANNING.beside, _best),
 )

@@ -6,9 +6,8 @@ from pathlib import Path
 from grasp_core.arrays import Array
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.best_grasp import best_grasp
-from grasp_core.optimizing.best.proof_file import write_proof
-from grasp_core.optimizing.best.result import BestGrasp, GapAt, measured
+from grasp_core.optimizing.best_grasp import BestGrasp, GapAt, best_grasp, measured
+from grasp_core.optimizing.support_cuts import write_proof
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter

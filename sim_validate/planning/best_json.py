@@ -13,7 +13,7 @@ from grasp_core.figures import Shown
 from grasp_core.files.records import RecordFile, recorded
 from grasp_core.kinds import Family, Friction, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt
+from grasp_core.optimizing.best_grasp import BestGrasp, Ended, GapAt
 from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
 from grasp_core.values import FINGERS, FaceQuadruple

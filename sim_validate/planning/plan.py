@@ -36,7 +36,7 @@ from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 from sim_validate.settings import Certifying
 
 if TYPE_CHECKING:
-    from grasp_core.optimizing.best.result import BestGrasp
+    from grasp_core.optimizing.best_grasp import BestGrasp
 
 SAME_CONTACTS = 0.01
 """Distance below which two optimized contacts count as the same [object radii]; searches for one

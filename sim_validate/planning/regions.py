@@ -14,8 +14,8 @@ from grasp_core.errors import InputError, SolverError, UndecidedError
 from grasp_core.figures import figures
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import load_grasps
-from grasp_core.regions.certificates import CertifiedRegions
 from grasp_core.regions.certify_regions import certify_regions
+from grasp_core.regions.proof import CertifiedRegions
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter, finished

@@ -22,8 +22,7 @@ from grasp_core.kinds import Count, Family, Friction, NotNegative
 from grasp_core.objects.face_pieces import inscribed_disc_radius_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
-from grasp_core.regions.certificates import CertifiedRegions
-from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.kit.files import AboutObject, read_arrays, write_arrays
 from sim_validate.settings import Certifying

@@ -17,14 +17,16 @@ from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import extended
-from grasp_core.transferring.changed_part import SURE_GROWTH, given_center, growth
 from grasp_core.transferring.face_changes import check_planar
 from grasp_core.transferring.transfer import (
     CHANGES,
+    SURE_GROWTH,
     CarriedGrasp,
     Change,
     GraspFigures,
     Transfer,
+    given_center,
+    growth,
     transfer,
 )
 from sim_validate.kit import command_flags

@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from grasp_core.optimizing.best import result
-from grasp_core.optimizing.best.support_cuts import CutTree
+from grasp_core.optimizing import best_grasp as result
+from grasp_core.optimizing.support_cuts import CutTree
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from tests.attacks.searching import Attack, always, cycled, power
 from tests.attacks.wrench_sets import hull_radius

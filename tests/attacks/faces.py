@@ -14,7 +14,7 @@ import grasp_core as gc
 from grasp_core.families.free import Absence
 from grasp_core.geometry import polygons as flat_polygons
 from grasp_core.regions import proof as covers
-from grasp_core.regions.certificates import CertifiedRegions
+from grasp_core.regions.proof import CertifiedRegions
 from tests.attacks.searching import Attack, always, cycled, power
 from tests.grasp_core.exact_judges import open_exactly
 from tests.tampering import on_planes, table

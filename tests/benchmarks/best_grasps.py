@@ -21,7 +21,7 @@ import numpy as np
 
 import grasp_core as gc
 from grasp_core.objects.face_pieces import unit_pieces
-from grasp_core.optimizing.best.result import measured
+from grasp_core.optimizing.best_grasp import measured
 from grasp_core.quality.measures import MeasureName
 from scenes.example_objects import example_object
 

@@ -6,8 +6,8 @@ import pytest
 import grasp_core as gc
 import grasp_core.regions.largest_discs as search
 from grasp_core.closure.contacts import contact_frames
+from grasp_core.regions.largest_discs import Sites
 from grasp_core.regions.proof import SLACK
-from grasp_core.regions.sites import Sites
 from tests.judges import TETRA_NORMALS, random_rotation
 
 CONES = 3_000

@@ -22,8 +22,7 @@ from grasp_core.quality import wrench_limits
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.records.contacts_json import ContactSet
 from grasp_core.regions.growth import larger_inside
-from grasp_core.regions.largest_discs import Grounds, Proved, search_cover
-from grasp_core.regions.sites import Sites
+from grasp_core.regions.largest_discs import Grounds, Proved, Sites, search_cover
 from scenes.example_objects import example_object
 from sim_validate.planning import analyze as analysis
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
@@ -150,7 +149,7 @@ def test_discs_as_large_are_those_named_first():
     pieces = pieces_under(body, grasp)
     grounds = Grounds(pieces, np.full(4, 0.5), 64)
     sizes = 0.1, 0.1 + SHAKEN, 0.1 - SHAKEN
-    first, larger, smaller = (Proved(np.zeros((4, 2)), r, None, np.inf, None) for r in sizes)
+    first, larger, smaller = (Proved(np.zeros((4, 2)), r, None, None) for r in sizes)
     assert larger_inside(grounds, first, larger) is first
     assert larger_inside(grounds, first, smaller) is first
     clearly = replace(first, radius=0.11)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.optimizing.best.proof_file import read_proof
+from grasp_core.optimizing.support_cuts import read_proof
 from grasp_core.quality.measures import MeasureName
 from sim_validate.kit.command_flags import Plan
 from sim_validate.main import main

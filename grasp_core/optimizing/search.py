@@ -13,11 +13,10 @@ loosest threshold first (see `best_grasp`).
 """
 
 import math
-import threading
+import time
 from collections import deque
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
@@ -26,7 +25,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.best.grounds import ROOM, SEARCH_DIGITS, Grounds
+from grasp_core.optimizing.grounds import ROOM, SEARCH_DIGITS, TWISTS, Grounds
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
 from grasp_core.solvers.ties import on_grid
@@ -41,9 +40,7 @@ DEEP, FIRST_ROOM = 24, 256
 """Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
 small, and clearing more memory took longer than searching them. Room is doubled where it is full.
 """
-KERNEL = "grasp_core.optimizing.best.search_kernel"
-CUTS = "grasp_core.optimizing.best.cuts_kernel"
-TWISTS = "grasp_core.optimizing.best.twists_kernel"
+KERNEL = "grasp_core.optimizing.search_kernel"
 PART_DEPTH = 7
 """Nodes with several children above a node that becomes a part of its own: a full tree has at least
 128 such parts, four waves of them."""
@@ -74,39 +71,23 @@ that a search may be asked for."""
 
 
 class Stop:
-    """Tells threads to stop: when asked, or one thread after some nodes, whatever the clock."""
+    """Tells threads to stop: when asked, after a time, or one thread after some nodes."""
 
-    def __init__(self, nodes: float = math.inf) -> None:
-        self._event, self._left = threading.Event(), nodes
+    def __init__(self, nodes: float = math.inf, seconds: float | None = None) -> None:
+        self._left = nodes
+        self._end = math.inf if seconds is None else time.monotonic() + seconds
 
     def __call__(self) -> bool:
         """Return whether to stop."""
-        return self._event.is_set()
+        return self._left <= 0 or time.monotonic() >= self._end
 
     def now(self) -> None:
         """Stop."""
-        self._event.set()
+        self._left = 0
 
     def spend(self, nodes: int) -> None:
         """Take note that a thread has visited so many nodes."""
         self._left -= nodes
-        if self._left <= 0:
-            self.now()
-
-
-@contextmanager
-def stopping(seconds: float | None) -> Generator[Stop]:
-    """Yield what stops a search after a time."""
-    stop = Stop()
-    timer = None if seconds is None else threading.Timer(seconds, stop.now)
-    if timer is not None:
-        timer.daemon = True
-        timer.start()
-    try:
-        yield stop
-    finally:
-        if timer is not None:
-            timer.cancel()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,9 +97,6 @@ class Found:
     pieces: tuple[int, ...]  # the piece of each contact, (4,)
     at: Array  # plane coordinates, (4, 2)
     quality: FerrariCanny | ResistedLoads
-
-    def __post_init__(self) -> None:
-        self.at.setflags(write=False)
 
 
 @dataclass(slots=True, eq=False)
@@ -243,33 +221,24 @@ class Searching:
     stop: Stop
     measure: Measure = FERRARI_CANNY
     spare: float = 0.0  # how far below threshold times demand a support still counts as an answer
-    pool: Any = None
     nodes: int = 0  # how many nodes were visited in all levels
+    pieces: Any = field(init=False)  # these three are as the kernels take them
+    demand: Any = field(init=False)
+    pool: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        pieces = len(self.grounds.counts)
-        self.pool = compiled(TWISTS).Pool(
-            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((pieces, 6, POOL)),
-            np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
-        )  # fmt: skip
-
-    @property
-    def pieces(self) -> Any:
-        """Return the pieces as the kernels take them."""
-        grounds = self.grounds
+        kernel, grounds = compiled(TWISTS), self.grounds
         each = (grounds.normals, grounds.origins, grounds.frames)
-        return compiled(CUTS).Pieces(
-            *(on_grid(numbers, SEARCH_DIGITS) for numbers in each), float(self.friction)
-        )
-
-    @property
-    def demand(self) -> Any:
-        """Return the loads as the kernels take them."""
-        kernel = compiled(TWISTS)
+        numbers = (on_grid(every, SEARCH_DIGITS) for every in each)
+        self.pieces = kernel.Pieces(*numbers, float(self.friction))
         kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
         scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
         loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
-        return kernel.Demand(int(kinds[self.measure.name]), loads)
+        self.demand = kernel.Demand(int(kinds[self.measure.name]), loads)
+        self.pool = kernel.Pool(
+            np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((len(grounds.counts), 6, POOL)),
+            np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
+        )  # fmt: skip
 
     def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:
         """Add twists, (n, 6), to a pool, the common one by default."""
@@ -322,13 +291,6 @@ class Searching:
 
     def _search(self, part: Part, threshold: float, known: float, depth: int) -> None:
         """Search a part; nodes at a depth are left, and all that wait after `PART_NODES`."""
-        for why in self._runs(part, threshold, known, depth):
-            if why == compiled(KERNEL).PART:
-                leave(part)
-        part.stack = None  # the memory of a part that is done
-
-    def _runs(self, part: Part, threshold: float, known: float, depth: int) -> Iterator[int]:
-        """Run the kernel until a part is done, and yield why it pauses for the caller."""
         kernel, pieces, demand, found_at = compiled(KERNEL), self.pieces, self.demand, -1
         work = kernel.Work(
             np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
@@ -341,22 +303,22 @@ class Searching:
             before = int(part.tree.sizes[0])
             why = kernel.run(search, BUDGET, depth if before < PART_NODES else -1)
             self.stop.spend(int(part.tree.sizes[0]) - before)
-            if why == kernel.DONE:
-                part.finished = True
-                return
-            if why == kernel.LOST:
-                return
+            if why in {kernel.DONE, kernel.LOST}:
+                part.finished = why == kernel.DONE
+                break
             if why == kernel.FULL:
                 enlarge(part)
+            elif why == kernel.PART:
+                leave(part)
             elif why == kernel.FOUND:
                 if not self._is_refuted(part, work, threshold, known):
-                    return
+                    break
                 size = int(part.tree.sizes[0])
                 # found again: the twist refutes the contacts by less than rounding
                 if size == found_at and not kernel.divide(search, int(part.stack.top[0]) - 1):
-                    return
+                    break
                 found_at = size
-            yield why
+        part.stack = None  # the memory of a part that is done
 
     def _is_refuted(self, part: Part, work: Any, threshold: float, known: float) -> bool:
         found = self.measured(work.on, work.middle)

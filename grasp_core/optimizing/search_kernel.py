@@ -12,8 +12,20 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.optimizing.best.cuts_kernel import MOST_CORNERS, Pieces, area, clip, cut, extent
-from grasp_core.optimizing.best.twists_kernel import Demand, Pool, descend, learn, multiple
+from grasp_core.optimizing.twists_kernel import (
+    MOST_CORNERS,
+    Demand,
+    Pieces,
+    Pool,
+    area,
+    clip,
+    cut,
+    descend,
+    extent,
+    learn,
+    multiple,
+    support,
+)
 
 FINGERS = 4
 ASK, BY_PIECES, BY_LINE, SPLICE = 0, 16, 32, 64
@@ -354,7 +366,7 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
     """Replace the node by one for each finger that may answer, cut to where it does."""
     stack, pool, tree, work = search.stack, search.pool, search.tree, search.work
     answering, twin, deed, total = np.zeros(FINGERS, np.int64), False, ASK, 0
-    t = answer_to(search, k)
+    pieces, t, rest = search.pieces, answer_to(search, k), np.empty((MOST_CORNERS, 2))
     for i in range(FINGERS):
         if work.reach[i, k] < t or (stack.fresh[node, i] and twin):
             continue
@@ -373,26 +385,18 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
     for c in range(total - 1):
         copy(stack, node, node + total - 1 - c)
     for c in range(total):
-        _cut_to(search, node + total - 1 - c, answering[c], k)
-        if total > 1:
-            stack.depths[node + total - 1 - c] += 1
+        place, i = node + total - 1 - c, answering[c]
+        stack.fresh[place, i] = 0
+        stack.depths[place] += total > 1
+        for p in range(len(pieces.normals)):
+            count = stack.counts[place, i, p]
+            if count > 0:
+                at, corners = pool.asked[p, :, k], stack.corners[place, i, p]
+                kept = cut(corners, count, at, pieces.friction, t, rest)
+                stack.counts[place, i, p] = kept
+                corners[:kept] = rest[:kept]
     stack.top[0] = node + total
     work.changed[0] = answering[0] if total > 0 else ALL
-
-
-@loop("numpy")
-def _cut_to(search: Search, place: int, i: int, k: int) -> None:
-    """Cut the polygons of a finger to where it answers a twist."""
-    pieces, stack, rest = search.pieces, search.stack, np.empty((MOST_CORNERS, 2))
-    t = answer_to(search, k)
-    stack.fresh[place, i] = 0
-    for p in range(len(pieces.normals)):
-        count = stack.counts[place, i, p]
-        if count > 0:
-            at = search.pool.asked[p, :, k]
-            kept = cut(stack.corners[place, i, p], count, at, pieces.friction, t, rest)
-            stack.counts[place, i, p] = kept
-            stack.corners[place, i, p, :kept] = rest[:kept]
 
 
 @loop("numpy", beside=True)
@@ -467,8 +471,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
         count = stack.counts[node, i, p]
         work.middle[i] = 0.0
         for v in range(count):
-            for j in range(2):
-                work.middle[i, j] += stack.corners[node, i, p, v, j] / count
+            work.middle[i] += stack.corners[node, i, p, v] / count
             _place(pieces, p, stack.corners[node, i, p, v], points[m])
             on[m] = p
             m += 1
@@ -489,10 +492,8 @@ def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
     for k in range(pool.size[0]):
         found = -np.inf
         for i in range(FINGERS):
-            at, a, b = pool.asked[on[i]], work.middle[i, 0], work.middle[i, 1]
-            one, two = at[3, k] - at[5, k] * b, at[4, k] + at[5, k] * a
-            s = at[0, k] + at[1, k] * a + at[2, k] * b
-            found = max(found, s + pieces.friction * np.sqrt(one * one + two * two))
+            at, (a, b) = pool.asked[on[i], :, k], work.middle[i]
+            found = max(found, support(at, a, b, pieces.friction))
         found = multiple(found + search.spare, pool.demands[k])
         if found < near:
             near, nearest = found, k
@@ -513,7 +514,5 @@ def _learned(search: Search, node: int, y: Array, now: int) -> int:
 
 @loop("numpy")
 def _place(pieces: Pieces, p: int, at: Array, point: Array) -> None:
-    for j in range(3):
-        point[j] = (
-            pieces.origins[p, j] + pieces.frames[p, j, 0] * at[0] + pieces.frames[p, j, 1] * at[1]
-        )
+    frame = pieces.frames[p]
+    point[:] = pieces.origins[p] + frame[:, 0] * at[0] + frame[:, 1] * at[1]

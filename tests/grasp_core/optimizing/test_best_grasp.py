@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.optimizing.best import best_grasp as searching
-from grasp_core.optimizing.best import search
-from grasp_core.optimizing.best.grounds import exact_maps, grounds_of
-from grasp_core.optimizing.best.incumbents import CLIMBED, climbed
-from grasp_core.optimizing.best.proof_file import read_proof, write_proof
-from grasp_core.optimizing.best.search import Searching, Stop
+from grasp_core.optimizing import best_grasp as searching
+from grasp_core.optimizing import search
+from grasp_core.optimizing.grounds import exact_maps, grounds_of
+from grasp_core.optimizing.incumbents import CLIMBED, climbed
+from grasp_core.optimizing.search import Searching, Stop
+from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object
-from tests.grasp_core.optimizing.best.contacts_on_faces import (
+from tests.grasp_core.optimizing.contacts_on_faces import (
     FRICTION,
     best,
     demands,
@@ -27,7 +27,7 @@ from tests.grasp_core.optimizing.best.contacts_on_faces import (
     supports,
     upper_bounds,
 )
-from tests.grasp_core.optimizing.best.independent_replay import replays
+from tests.grasp_core.optimizing.independent_replay import replays
 from tests.tampering.changes import forged
 
 CASES = {

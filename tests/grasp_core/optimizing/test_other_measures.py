@@ -10,13 +10,12 @@ import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.optimizing.ascent import _weakest
-from grasp_core.optimizing.best.grounds import exact_maps, grounds_of
-from grasp_core.optimizing.best.proof_file import read_proof, write_proof
-from grasp_core.optimizing.best.search import Searching, Stop
-from grasp_core.optimizing.best.support_cuts import ROUNDING
+from grasp_core.optimizing.grounds import exact_maps, grounds_of
+from grasp_core.optimizing.search import Searching, Stop
+from grasp_core.optimizing.support_cuts import ROUNDING, read_proof, write_proof
 from grasp_core.quality.measures import Measure, resisted_loads
 from scenes.example_objects import example_object
-from tests.grasp_core.optimizing.best.contacts_on_faces import FRICTION, LIFT, best
+from tests.grasp_core.optimizing.contacts_on_faces import FRICTION, LIFT, best
 from tests.tampering.changes import forged
 
 
@@ -83,7 +82,7 @@ def test_twists_that_ask_for_nothing_leave_room_for_rounding():
 def test_compiled_demands_are_those_of_the_definition(measure):
     body = example_object("tetrahedron")
     search = Searching(grounds_of(body, 0.05 * body.radius), FRICTION, 1, Stop(), measure)
-    kernel = compiled("grasp_core.optimizing.best.twists_kernel")
+    kernel = compiled("grasp_core.optimizing.twists_kernel")
     rng, hardest = np.random.default_rng(4), np.empty(6)
     twists = rng.normal(size=(200, 6))
     for y in twists:

@@ -14,8 +14,8 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.ascent import ContactFaces, climbs_for_weight
-from grasp_core.optimizing.best.grounds import Grounds
-from grasp_core.optimizing.best.search import Found, Searching
+from grasp_core.optimizing.grounds import Grounds
+from grasp_core.optimizing.search import Found, Searching
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.solvers.ties import largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS

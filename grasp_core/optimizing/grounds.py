@@ -38,7 +38,14 @@ from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face, unit_pieces
+from grasp_core.geometry.polygons import convex_polygon
+from grasp_core.objects.face_pieces import (
+    LARGEST_INSET,
+    FacePiece,
+    inset_piece,
+    pieces_by_face,
+    unit_pieces,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import clear_of_edges
 from grasp_core.objects.symmetries import symmetries
@@ -51,10 +58,9 @@ MOST_AT_FIRST = 12
 """Largest number of corners of a piece before any cut; larger ones are divided."""
 MOST_PIECES = 128
 UNIT = 1e-9
-"""Largest deviation of normals and frames from orthonormal."""
+"""Largest deviation of normals and frames from orthonormal, and of polygons from convex ones."""
 LARGEST = 2.0
 """Largest coordinate of a point, in object radii."""
-HALF = 0.5
 SEARCH_DIGITS = 11
 """Digits after the point that a search is given of polygons (see `support_cuts`)."""
 EXACT = 1e-9
@@ -63,7 +69,7 @@ WIDENED = 1e-8
 MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
-KERNEL = "grasp_core.optimizing.best.cuts_kernel"
+TWISTS = "grasp_core.optimizing.twists_kernel"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -89,7 +95,7 @@ class Grounds(Declared):
         square = axes.transpose(0, 2, 1) @ axes
         sizes = max(float(np.abs(self.origins).max()), float(np.abs(self.corners).max()))
         upright = np.abs(square - np.eye(3)).max() <= UNIT and sizes <= LARGEST
-        return bool(upright) and all(map(_is_convex, self.polygons()))
+        return bool(upright) and all(convex_polygon(each, UNIT) for each in self.polygons())
 
     def polygons(self) -> list[Array]:
         """Return the corners of each polygon in its plane, (k, 2) each."""
@@ -108,7 +114,7 @@ def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
             pieces.append(inset_piece(rooms[0], clearance / body.radius))
         elif rooms:
             depth = max(room.inradius for room in rooms) * body.radius
-            margin = min(clearance, HALF * depth)
+            margin = min(clearance, LARGEST_INSET * depth)
             alone = replace(body, faces=(body.faces[face],))
             for piece in unit_pieces(clear_of_edges(alone, margin)):
                 pieces.append(replace(piece, face=face))
@@ -144,16 +150,6 @@ def _small(corners: Array) -> list[Array]:
         return [corners]
     half = len(corners) // 2
     return [*_small(corners[: half + 1]), *_small(np.vstack([corners[half:], corners[:1]]))]
-
-
-def _is_convex(corners: Array) -> bool:
-    edges = np.roll(corners, -1, axis=0) - corners
-    following = np.roll(edges, -1, axis=0)
-    turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
-    along = (edges * following).sum(axis=1)
-    angles = np.arctan2(turns, along)
-    one_way = (angles > -UNIT).all() or (angles < UNIT).all()
-    return bool(one_way and abs(abs(float(angles.sum())) - 2.0 * np.pi) < UNIT)
 
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:
@@ -238,7 +234,7 @@ def first_nodes(
 
 def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, int]:
     """Cut a piece to the part nearer to a point of it than to the point's images, by (1)."""
-    clip = compiled(KERNEL).clip
+    clip = compiled(TWISTS).clip
     polygon, count = grounds.corners[piece].copy(), int(grounds.counts[piece])
     middle = polygon[:count].mean(axis=0)
     aside = sum(share * (polygon[k] - middle) for k, share in enumerate(ASIDE))

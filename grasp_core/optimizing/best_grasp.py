@@ -11,33 +11,178 @@ halved from level to level, to q / (1 - gap) at last. Contacts that are found on
 threshold become the best known, and the level is tried again. A level costs more than all before
 it, as a rule, so that little is lost by them; and the bound of the last level that was finished
 holds whenever the search is stopped.
+
+The result is a grasp with the proof of its gap, and how the search came there; `BestGrasp.verify`
+checks it without any search.
 """
 
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Amount, Array
 from grasp_core.checked import coefficient, function, number, seed_of, whole
+from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.kinds import Gap, TimeLimit
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best.grounds import SEARCH_DIGITS, exact_maps, first_nodes, grounds_of
-from grasp_core.optimizing.best.incumbents import begin, climbed, piece_at
-from grasp_core.optimizing.best.result import BestGrasp, Ended, GapAt, measured
-from grasp_core.optimizing.best.search import CUTS, TWISTS, Found, Searching, Steps, Stop, stopping
-from grasp_core.optimizing.best.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
+from grasp_core.optimizing.grounds import (
+    SEARCH_DIGITS,
+    TWISTS,
+    exact_maps,
+    first_nodes,
+    grounds_of,
+)
+from grasp_core.optimizing.incumbents import begin, climbed, piece_at
+from grasp_core.optimizing.search import (
+    EXACT_GAP,
+    Searching,
+    Steps,
+    Stop,
+)
+from grasp_core.optimizing.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.planning.certify import named
-from grasp_core.quality.measures import Measure, MeasureName
+from grasp_core.quality.ferrari_canny import FerrariCanny
+from grasp_core.quality.measures import Measure, MeasureName, ResistedLoads, measured_set
 from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits, first_best, on_grid, surpassing
-from grasp_core.values import Grasp
+from grasp_core.values import FINGERS, Grasp, four
+
+PLACED = 1e-7
+"""Largest distance between equal points, and directions, in object radii."""
+Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
+"""Why a search ended: the gap is reached, time is up, it was interrupted, or polygons became too
+small, or too many, to be divided further."""
+
+
+def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
+    """Return whether a grasp has a wrench set's contacts, in radii, on polygons of a proof."""
+    if wrenches.norm != "l1" or len(wrenches.friction) != FINGERS:
+        return False
+    if (wrenches.friction != proof.friction).any() or wrenches.width != 3:  # noqa: PLR2004
+        return False
+    each = wrenches.G.reshape(2, 3, FINGERS, 3).transpose(0, 2, 1, 3)
+    turns = each[1] @ each[0].transpose(0, 2, 1)
+    normals = each[0, :, :, 0]
+    arms = np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1)
+    away, levers = grasp.positions - grasp.positions.mean(axis=0), arms - arms.mean(axis=0)
+    size = float((away * levers).sum() / (levers * levers).sum())
+    return bool(
+        size > 0.0
+        and np.abs(away - size * levers).max() <= PLACED * size
+        and np.abs(grasp.normals - normals).max() <= PLACED
+    ) and all(_is_on(proof, *contact) for contact in zip(arms, normals, strict=True))
+
+
+def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
+    grounds = proof.grounds
+    for piece, polygon in enumerate(grounds.polygons()):
+        away = point - grounds.origins[piece]
+        at = grounds.frames[piece].T @ away
+        edges = np.roll(polygon, -1, axis=0) - polygon
+        beside = edges[:, 0] * (at - polygon)[:, 1] - edges[:, 1] * (at - polygon)[:, 0]
+        if (
+            abs(float(away @ grounds.normals[piece])) <= PLACED
+            and np.abs(normal - grounds.normals[piece]).max() <= PLACED
+            and float(beside.min()) >= -PLACED
+        ):
+            return True
+    return False
+
+
+@dataclass(frozen=True, slots=True)
+class GapAt(Declared):
+    """How far a search had come at one moment."""
+
+    seconds: float
+    """Time since it began [s]."""
+    quality: float
+    """Quality of the best grasp known then [N], or the multiple of a task's loads."""
+    bound: float
+    """What no quality exceeds [N], or no multiple."""
+    nodes: int
+    """How many nodes had been visited."""
+
+    @property
+    def gap(self) -> float:
+        """Return the share of the bound that is not reached."""
+        return 1.0 - self.quality / self.bound
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BestGrasp(Declared):
+    """The best grasp found, with a proved bound of the quality of all others."""
+
+    grasp: Grasp
+    quality: FerrariCanny | ResistedLoads
+    """Bounds of the grasp's quality (`l1`), with torques over the object's radius; or of the
+    largest multiple of the loads of another measure that its contacts resist."""
+    clearance: Amount
+    """Distance that contacts keep from the edges of faces [m], or half the radius of the largest
+    disc in a face where that is less."""
+    proof: CutTree
+    ended: Ended
+    history: tuple[GapAt, ...]
+    """How the gap closed; the times do not count when values are compared."""
+
+    @property
+    def bound(self) -> float:
+        """Return the quality [N] that no four contacts on the faces exceed, clear of the edges.
+
+        For a task it is a multiple of its wrenches, for normal forces of sum one newton.
+        """
+        return self.proof.bound
+
+    @property
+    def measure(self) -> MeasureName:
+        """Return the name of the measure that is maximised."""
+        return self.proof.measure.name
+
+    @property
+    def gap(self) -> float:
+        """Return the share of the bound that the grasp's quality does not reach."""
+        return 1.0 - self.quality.lower / self.bound
+
+    def verify(self) -> bool:
+        """Check the grasp's quality and replay the proof of the bound, without any search.
+
+        The contacts must be those of the quality, and lie on polygons of the proof. Whether these
+        are those of an object's faces, this far from edges, can only be checked with the object, by
+        `grounds_of`.
+        """
+        return (
+            self.is_sound()
+            and self.proof.owners is None  # all contacts, not those on four given faces
+            and self._has_its_measure()
+            and self.quality.verify()
+            and self.proof.verify()
+            and self.quality.lower <= self.bound
+            and are_contacts_of(self.grasp, self.quality.wrenches, self.proof)
+        )
+
+    def _has_its_measure(self) -> bool:
+        if isinstance(self.quality, ResistedLoads):
+            return self.quality.measure == self.proof.measure
+        return self.proof.measure.is_usual
+
+
+def measured(
+    body: Polyhedron, grasp: Grasp, friction: float, measure: Measure, gap: float = EXACT_GAP
+) -> FerrariCanny | ResistedLoads:
+    """Bound what a grasp of an object resists of the loads of a measure, with proofs."""
+    center, scale = body.center_of_mass, body.radius
+    wrenches = WrenchSet.of(grasp, None, friction, center=center, torque_scale=scale)
+    return measured_set(wrenches, measure, gap)
+
 
 COUNT = 384
 """Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
@@ -49,7 +194,8 @@ ROUNDED_UP = 1e-6
 WIDEST = 0.4
 """Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
 AIMED = 0.999
-"""Share of the gap that is aimed at, as the grasp's quality is measured anew in the end."""
+"""Share of the gap that is aimed at: the grasp's quality is measured anew in the end, and multiples
+of round numbers would be where digits are cut."""
 FINER = 64.0
 """How much finer than the gap the steps are in which qualities and bounds count."""
 SAME = 1e-9
@@ -83,14 +229,13 @@ def refuted_by_one(
     searching: Searching, cases: int, slack: Slack, twists: Array
 ) -> tuple[Steps, float]:
     """Return the tree that asks a single twist, and the least threshold that it refutes."""
-    support, slopes = compiled(CUTS).support, compiled(CUTS).slopes
-    pieces, at = searching.pieces, np.empty(6)
+    kernel, pieces, at = compiled(TWISTS), searching.pieces, np.empty(6)
     reached = np.full(len(twists), -math.inf)
     polygons = [on_grid(polygon, SEARCH_DIGITS) for polygon in searching.grounds.polygons()]
     for k, y in enumerate(twists):
         for p, polygon in enumerate(polygons):
-            slopes(pieces, p, y, at)
-            highest = max(support(at, a, b, searching.friction) for a, b in polygon)
+            kernel.slopes(pieces, p, y, at)
+            highest = max(kernel.support(at, a, b, searching.friction) for a, b in polygon)
             reached[k] = max(reached[k], highest)
     demands = searching.measure.demands(twists)
     if searching.measure.is_usual:
@@ -194,23 +339,18 @@ class Levels:
         proof = CutTree(
             self.grounds, self.friction, self.maps, self.threshold, *self.steps, self.measure
         )
-        grasp = self._grasp(self.best)
+        pieces = tuple(piece_at(self.grounds, p) for p in self.best.pieces)
+        points = np.array([piece.point(y) for piece, y in zip(pieces, self.best.at, strict=True)])
+        faces = four(piece.face for piece in pieces)
+        name = named("b", faces)
+        grasp = certified(self.body, name, pieces, points, self.friction, self.rng)
+        if grasp is None:
+            raise InputError(
+                f"best_grasp: expected that the best contacts found, on faces {list(faces)}, can "
+                "be certified, and they cannot; try another seed"
+            )
         quality = measured(self.body, grasp, self.friction, self.measure)
         return BestGrasp(grasp, quality, self.clearance, proof, ended, tuple(self.history))
-
-    def _grasp(self, best: Found) -> Grasp:
-        pieces = tuple(piece_at(self.grounds, p) for p in best.pieces)
-        points = np.array([piece.point(y) for piece, y in zip(pieces, best.at, strict=True)])
-        a, b, c, d = (piece.face for piece in pieces)
-        name = named("b", (a, b, c, d))
-        found = certified(self.body, name, pieces, points, self.friction, self.rng)
-        if found is not None:
-            return found
-        raise InputError(
-            f"best_grasp: expected that the best contacts found, on faces "
-            f"{[piece.face for piece in pieces]}, can be certified, and they cannot; try another "
-            "seed"
-        )
 
 
 def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
@@ -269,6 +409,6 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
     if clearance is None:
         clearance = FINGER_RADIUS * body.radius
     number(clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m")
-    with stopping(time_limit_s) as stop:
-        levels = Levels(body, friction, loads, clearance, seed, jobs, stop, progress)
-        return levels.result(levels.closed_to(gap))
+    stop = Stop(seconds=time_limit_s)
+    levels = Levels(body, friction, loads, clearance, seed, jobs, stop, progress)
+    return levels.result(levels.closed_to(gap))

@@ -1,0 +1,374 @@
+"""Says what contacts on convex polygons answer twists, and which twists are worth asking, compiled.
+
+*Cuts.* Solved: the hull of {x in K : s(x) >= t} for a convex polygon K of a face and the support s
+of the contact's cone, as `support_cuts` derives it, from outside.
+
+*Twists* that have divided or refuted much are kept, and new ones are found by descent. They are
+weighed by the multiple of the loads that they allow: support over demand, (1) of `measures`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_core.arrays import Array, Indices
+from grasp_core.compiled import loop
+
+MOST_CORNERS = 24
+"""Room for the corners of a polygon; a cut that would need more is not made."""
+SLOPES = 6
+"""Numbers that say how a contact of a piece answers a twist, see `slopes`."""
+CROSSING_STEPS = 4
+"""Steps, from both sides, towards the point in which an edge leaves the part that answers."""
+
+
+class Pieces(NamedTuple):
+    """The convex pieces of faces on which contacts lie, at unit size."""
+
+    normals: Array  # inward unit normals, (p, 3)
+    origins: Array  # points whose plane coordinates are zero, (p, 3)
+    frames: Array  # orthonormal columns spanning the planes, (p, 3, 2)
+    friction: float
+
+
+@loop("numpy")
+def slopes(pieces: Pieces, piece: int, y: Array, out: Array) -> None:
+    """Fill in the numbers that give the support at any point (a, b) of a piece, (6,).
+
+    The support is out0 + out1 a + out2 b + mu |(out3 - out5 b, out4 + out5 a)|: normal velocity of
+    the contact, and its velocity along the face, which is that of a turning plane.
+    """
+    n, o, F = pieces.normals[piece], pieces.origins[piece], pieces.frames[piece]
+    u0 = y[0] + y[4] * o[2] - y[5] * o[1]
+    u1 = y[1] + y[5] * o[0] - y[3] * o[2]
+    u2 = y[2] + y[3] * o[1] - y[4] * o[0]
+    out[0] = n[0] * u0 + n[1] * u1 + n[2] * u2
+    out[3] = F[0, 0] * u0 + F[1, 0] * u1 + F[2, 0] * u2
+    out[4] = F[0, 1] * u0 + F[1, 1] * u1 + F[2, 1] * u2
+    for j in range(2):
+        w0 = y[4] * F[2, j] - y[5] * F[1, j]
+        w1 = y[5] * F[0, j] - y[3] * F[2, j]
+        w2 = y[3] * F[1, j] - y[4] * F[0, j]
+        out[1 + j] = n[0] * w0 + n[1] * w1 + n[2] * w2
+        if j == 0:
+            out[5] = F[0, 1] * w0 + F[1, 1] * w1 + F[2, 1] * w2
+
+
+@loop("numpy")
+def support(at: Array, a: float, b: float, friction: float) -> float:
+    """Return the support of the cone of a contact at the point (a, b), by its `slopes`."""
+    one, two = at[3] - at[5] * b, at[4] + at[5] * a
+    return at[0] + at[1] * a + at[2] * b + friction * np.sqrt(one * one + two * two)
+
+
+@loop("numpy")
+def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
+    """Fill in what is left of a polygon where the support reaches t; return how many corners."""
+    heights = np.empty(MOST_CORNERS)
+    reached, runs = 0, 0
+    for k in range(count):
+        heights[k] = support(at, corners[k, 0], corners[k, 1], friction)
+        if heights[k] >= t:
+            reached += 1
+    for k in range(count):
+        if heights[k] < t and heights[(k + 1) % count] >= t:
+            runs += 1
+    if reached == 0:
+        return 0
+    kept = 0
+    if reached == count or reached + 2 * runs > MOST_CORNERS:
+        out[:count] = corners[:count]
+        return count
+    for k in range(count):
+        following = (k + 1) % count
+        if heights[k] >= t:
+            out[kept, 0], out[kept, 1] = corners[k, 0], corners[k, 1]
+            kept += 1
+            if heights[following] < t:
+                _cross(corners[following], corners[k], at, friction, t, out[kept])
+                kept += 1
+        elif heights[following] >= t:
+            _cross(corners[k], corners[following], at, friction, t, out[kept])
+            kept += 1
+    return kept
+
+
+@loop("numpy")
+def _cross(low: Array, high: Array, at: Array, friction: float, t: float, out: Array) -> None:
+    """Fill in a point of an edge, just before the support reaches t on the way from low to high.
+
+    Chords of a convex function lie above it, so that a chord meets t before the function does;
+    tangents lie below it, so that a tangent meets t behind. The interval shrinks from both ends.
+    """
+    da, db = high[0] - low[0], high[1] - low[1]
+    near, far = 0.0, 1.0
+    below = support(at, low[0], low[1], friction)
+    above = support(at, high[0], high[1], friction)
+    for _ in range(CROSSING_STEPS):
+        middle = near + (far - near) * (t - below) / (above - below)
+        found = support(at, low[0] + middle * da, low[1] + middle * db, friction)
+        if found < t and middle > near:
+            near, below = middle, found
+        a, b = low[0] + far * da, low[1] + far * db
+        one, two = at[3] - at[5] * b, at[4] + at[5] * a
+        across = np.sqrt(one * one + two * two)
+        slope = at[1] * da + at[2] * db
+        if across > 0.0:
+            slope += friction * at[5] * (two * da - one * db) / across
+        if slope > 0.0:
+            trial = far - (above - t) / slope
+            if near < trial < far:
+                found = support(at, low[0] + trial * da, low[1] + trial * db, friction)
+                if found >= t:
+                    far, above = trial, found
+        if above <= below:
+            break
+    out[0], out[1] = low[0] + near * da, low[1] + near * db
+
+
+@loop("numpy")
+def clip(corners: Array, count: int, line: Array, side: float, out: Array) -> int:
+    """Fill in the corners of the part of a polygon with side * (line0 a + line1 b - line2) <= 0.
+
+    Gives how many corners the part has; if there is no room for them, the polygon stays whole.
+    """
+    kept = 0
+    heights = side * (line[0] * corners[:count, 0] + line[1] * corners[:count, 1] - line[2])
+    for k in range(count):
+        following = (k + 1) % count
+        inside, next_inside = heights[k] <= 0.0, heights[following] <= 0.0
+        if kept + 2 > MOST_CORNERS:
+            out[:count] = corners[:count]
+            return count
+        if inside:
+            out[kept] = corners[k]
+            kept += 1
+        if inside != next_inside:
+            share = heights[k] / (heights[k] - heights[following])
+            out[kept] = corners[k] + share * (corners[following] - corners[k])
+            kept += 1
+    return kept
+
+
+@loop("numpy")
+def extent(corners: Array, count: int, ends: Indices) -> float:
+    """Return the largest distance of two corners, and fill in which two they are, (2,)."""
+    largest = 0.0
+    for k in range(count):
+        for j in range(k):
+            da, db = corners[k, 0] - corners[j, 0], corners[k, 1] - corners[j, 1]
+            square = da * da + db * db
+            if square > largest:
+                largest, ends[0], ends[1] = square, j, k
+    return np.sqrt(largest)
+
+
+@loop("numpy")
+def area(corners: Array, count: int) -> float:
+    """Return the area of a polygon."""
+    total = 0.0
+    for k in range(count):
+        following = (k + 1) % count
+        total += corners[k, 0] * corners[following, 1] - corners[following, 0] * corners[k, 1]
+    return 0.5 * abs(total)
+
+
+TWIST = 6
+OVER = 1.0 + 4e-16
+"""Factor that makes rounded unit twists at least one long."""
+SETTLING = 5
+"""Steps without progress after which a descent aims less far."""
+FIRST_AIM, LAST_AIM = 0.2, 0.004
+"""Share of the value that a step aims below the best one, at first and before a descent ends."""
+USUAL, WEIGHT, TASK = 0, 1, 2
+"""Kinds of demands."""
+SMALL_DEMAND = 1e-2
+"""Demand below which descents take this one, and twists with negative support are compared by it.
+"""
+
+
+class Demand(NamedTuple):
+    """The loads whose largest resisted multiple is sought."""
+
+    kind: int
+    """Whose length is at most one (`USUAL` for wrenches, `WEIGHT` for forces), or of a `TASK`."""
+    loads: Array  # loads of a task, (m, 6)
+
+
+class Pool(NamedTuple):
+    """Twists to ask, with what they ask of each piece."""
+
+    twists: Array
+    """Twists at least one long, with torques over the object's radius, (c, 6)."""
+    demands: Array  # how much of the loads each asks for, (c,)
+    asked: Array  # the `slopes` of each piece under each twist, (p, 6, c)
+    used: Indices  # when each was used last, (c,)
+    names: Indices
+    """Their places among the twists that a tree names, -1 for none, (c,)."""
+    size: Indices  # how many there are, (1,)
+
+
+@loop("numpy")
+def learn(pool: Pool, pieces: Pieces, demand: Demand, y: Array, now: int) -> int:
+    """Put a twist into the pool, in place of the one unused for longest if that is full."""
+    place = pool.size[0]
+    if place < len(pool.used):
+        pool.size[0] += 1
+    else:
+        place = 0
+        for k in range(len(pool.used)):
+            if pool.used[k] < pool.used[place]:
+                place = k
+    length = 0.0
+    for j in range(TWIST):
+        length += y[j] * y[j]
+    length = np.sqrt(length)
+    pool.twists[place] = y / length * OVER
+    pool.demands[place] = demanded(demand, pool.twists[place], np.empty(TWIST))
+    at = np.empty(SLOPES)
+    for p in range(len(pieces.normals)):
+        slopes(pieces, p, pool.twists[place], at)
+        pool.asked[p, :, place] = at
+    pool.used[place], pool.names[place] = now, -1
+    return place
+
+
+@loop("numpy")
+def demanded(demand: Demand, y: Array, hardest: Array) -> float:
+    """Return how much of the loads a unit twist asks for, and fill in minus the load that does.
+
+    For the usual measure that is one; its load, along the twist, is left out, as descents move
+    across it.
+    """
+    hardest[:] = 0.0
+    if demand.kind == USUAL:
+        return 1.0
+    if demand.kind == WEIGHT:
+        long = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+        if long > 0.0:
+            for j in range(3):
+                hardest[j] = y[j] / long
+        return long
+    most = 0.0
+    for load in demand.loads:
+        found = 0.0
+        for j in range(TWIST):
+            found -= load[j] * y[j]
+        if found > most:
+            most = found
+            for j in range(TWIST):
+                hardest[j] = -load[j]
+    return most
+
+
+@loop("numpy")
+def multiple(support: float, asked: float) -> float:
+    """Return the multiple of the loads that a twist allows; a negative one if it allows none.
+
+    It is below a positive number t if and only if the support is below t times what is asked for.
+    """
+    if support < 0.0:
+        return support / max(asked, SMALL_DEMAND)
+    return support / asked if asked > 0.0 else np.inf
+
+
+@loop("numpy")
+def highest(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, slope: Array) -> float:
+    """Return the largest support of contacts at points in a direction; fill in its wrench, (6,)."""
+    best, first = -np.inf, 0
+    for i in range(m):
+        _, along, across = _velocity(pieces.normals[on[i]], points[i], y)
+        found = along + pieces.friction * across
+        if found > best:
+            best, first = found, i
+    n, x = pieces.normals[on[first]], points[first]
+    (u0, u1, u2), along, across = _velocity(n, x, y)
+    share = pieces.friction / across if across > 0.0 else 0.0
+    f0 = n[0] + share * (u0 - along * n[0])
+    f1 = n[1] + share * (u1 - along * n[1])
+    f2 = n[2] + share * (u2 - along * n[2])
+    slope[0], slope[1], slope[2] = f0, f1, f2
+    slope[3] = x[1] * f2 - x[2] * f1
+    slope[4] = x[2] * f0 - x[0] * f2
+    slope[5] = x[0] * f1 - x[1] * f0
+    return best
+
+
+@loop("numpy")
+def _velocity(n: Array, x: Array, y: Array) -> tuple[tuple[float, float, float], float, float]:
+    """Return the velocity of a point under a twist, with its parts along and across a normal."""
+    u0 = y[0] + y[4] * x[2] - y[5] * x[1]
+    u1 = y[1] + y[5] * x[0] - y[3] * x[2]
+    u2 = y[2] + y[3] * x[1] - y[4] * x[0]
+    along = n[0] * u0 + n[1] * u1 + n[2] * u2
+    square = u0 * u0 + u1 * u1 + u2 * u2 - along * along
+    return (u0, u1, u2), along, np.sqrt(max(square, 0.0))
+
+
+@loop("numpy")
+def descend(
+    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, steps: int,
+    spare: float,
+) -> float:  # fmt: skip
+    """Move a unit twist to where contacts resist less; return the least multiple that one allows.
+
+    For other measures than the usual one supports are taken to be larger by `spare` in the end.
+
+    Each step follows the wrench that attains the support, less the load that asks for most, as far
+    as would lower the multiple to an aim if these stayed the largest.
+    """
+    at, best, slope, hardest = y.copy(), np.inf, np.empty(TWIST), np.empty(TWIST)
+    aim, idle = FIRST_AIM, 0
+    for _ in range(steps):
+        found = _steepest(pieces, demand, points, on, m, at, slope, hardest)
+        if found < best:
+            idle = 0 if found < best - 0.25 * aim * abs(best) else idle + 1
+            best = found
+            y[:] = at
+        else:
+            idle += 1
+        if idle >= SETTLING:
+            aim, idle = 0.4 * aim, 0
+            at[:] = y
+            if aim < LAST_AIM:
+                break
+            found = _steepest(pieces, demand, points, on, m, at, slope, hardest)
+        along, square = 0.0, 0.0
+        for j in range(TWIST):
+            along += slope[j] * at[j]
+        for j in range(TWIST):
+            slope[j] -= along * at[j]
+            square += slope[j] * slope[j]
+        if square <= 0.0:
+            break
+        step = (found - (best - aim * abs(best))) / square
+        length = 0.0
+        for j in range(TWIST):
+            at[j] -= step * slope[j]
+            length += at[j] * at[j]
+        length = np.sqrt(length)
+        for j in range(TWIST):
+            at[j] /= length
+    if demand.kind == USUAL:
+        return best
+    found = highest(pieces, points, on, m, y, slope)
+    return multiple(found + spare, demanded(demand, y, hardest))
+
+
+@loop("numpy")
+def _steepest(
+    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, slope: Array,
+    hardest: Array,
+) -> float:  # fmt: skip
+    """Return the multiple that a twist allows, asked for a little at least; fill in its slope."""
+    found = highest(pieces, points, on, m, y, slope)
+    if demand.kind == USUAL:
+        return found
+    asked = demanded(demand, y, hardest)
+    if asked < SMALL_DEMAND:
+        asked = SMALL_DEMAND
+        hardest[:] = 0.0
+    found /= asked
+    for j in range(TWIST):
+        slope[j] = (slope[j] - found * hardest[j]) / asked
+    return found
