@@ -47,17 +47,16 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.concurrent import concurrent_radius_bounds
-from grasp_core.families.constructions import PAIRINGS, Construction
-from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable, face_table
 from grasp_core.families.pencil import pencil_radius_bounds
-from grasp_core.families.placements import LEAST_RADIUS
+from grasp_core.families.placements import LEAST_RADIUS, Attempts, Corners, FaceTable, face_table
+from grasp_core.families.placing import PAIRINGS, Construction
 from grasp_core.families.regulus import regulus_bounds
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import FINGERS, Family
 
-KERNEL = "grasp_core.families.corner_bounds_kernel"
+KERNEL = "grasp_core.families.discs_kernel"
 LEAST_SINE = 1e-6
 """Half angles between axes with a sine up to this are so small that they bound no width."""
 KERNELS: dict[Family, str] = {

@@ -10,8 +10,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import Program, bounded, edges_of, largest_discs, room_for
-from grasp_core.families.kernel_tables import LEFT, NONE, PLACED, Attempts, FaceTable, Placed
 from grasp_core.families.pencil import BALL, CELL_A, CELL_B, RADII, SMALLEST, VARIABLES, K
+from grasp_core.families.placements import LEFT, NONE, PLACED, Attempts, FaceTable, Placed
 from grasp_core.geometry.vectors_kernel import (
     angle_between,
     balancing_weights,

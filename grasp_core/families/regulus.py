@@ -53,8 +53,16 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_facets
 from grasp_core.cones.spanning import angles_between
-from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms, face_table
-from grasp_core.families.placements import NoPlacement, Placement, balanced_forces, focus_direction
+from grasp_core.families.placements import (
+    Attempts,
+    FaceTable,
+    NoPlacement,
+    Placement,
+    RegulusTerms,
+    balanced_forces,
+    face_table,
+    focus_direction,
+)
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import RESIDUAL, LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import nearest_optimum

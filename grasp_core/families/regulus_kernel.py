@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import edges_of, facet_sines, measure, room_for, vertex_of
-from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
+from grasp_core.families.placements import Attempts, FaceTable, RegulusTerms
 from grasp_core.geometry.vectors_kernel import across, angle_between, cross, dotted, focus_direction
 from grasp_core.solvers.lp_kernel import (
     INFEASIBLE,

@@ -25,10 +25,9 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.geometry.connectivity import components
 from grasp_core.objects.planar_faces import SIDES, triangle_neighbours
 from grasp_core.objects.shells import SMALL, Shells, left_out
-from grasp_core.objects.solid_checks import triangle_areas
+from grasp_core.objects.solid_checks import components, triangle_areas
 
 CERTAIN = 0.4
 """Least mean winding number on an open surface that is taken for outward: half a ball has 0.3."""

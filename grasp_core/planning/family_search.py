@@ -24,11 +24,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import each_cones_positively_span
-from grasp_core.families.constructions import Construction
 from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.free import Absence
-from grasp_core.families.kernel_tables import Attempts
-from grasp_core.families.placing import Attempt, Settling
+from grasp_core.families.placements import Attempts
+from grasp_core.families.placing import Attempt, Construction, Settling
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
 from grasp_core.planning.quadruples import Blocks, ConedQuadruples, WideQuadruples

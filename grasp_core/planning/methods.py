@@ -7,7 +7,7 @@ from functools import partial
 from itertools import chain, islice
 from typing import TypeAlias
 
-from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Certified

@@ -16,8 +16,7 @@ from functools import cached_property, lru_cache, partial
 from itertools import chain, combinations, islice, tee
 from typing import TypeAlias
 
-from grasp_core.families.constructions import CONSTRUCTIONS
-from grasp_core.families.placing import chosen_shapes
+from grasp_core.families.placing import CONSTRUCTIONS, chosen_shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified

@@ -28,8 +28,7 @@ from grasp_core.families.disc_bounds import (
     distances,
     widths_apart,
 )
-from grasp_core.families.kernel_tables import Corners
-from grasp_core.families.placements import LEAST_RADIUS, Placement
+from grasp_core.families.placements import LEAST_RADIUS, Corners, Placement
 from grasp_core.families.placing import Cones
 from grasp_core.objects.face_pieces import FacePiece, Shapes
 from grasp_core.objects.polyhedron import Polyhedron

@@ -1,4 +1,4 @@
-"""Reference for the kernel of `corner_bounds_kernel`: its bounds (1) and (2) in NumPy."""
+"""Reference for the bounds by corners in `discs_kernel`: its bounds (1) and (2) in NumPy."""
 
 from itertools import combinations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.concurrent import concurrent_radius_bounds
-from grasp_core.families.constructions import PAIRINGS
-from grasp_core.families.corner_bounds_kernel import SAME_AXIS
+from grasp_core.families.discs_kernel import SAME_AXIS
 from grasp_core.families.pencil import pencil_radius_bounds
+from grasp_core.families.placing import PAIRINGS
 from grasp_core.values import FINGERS
 
 
