@@ -41,7 +41,7 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.values import FINGERS
 
-KERNEL = "grasp_core.cones.tilting_kernel"
+KERNEL = "grasp_core.cones.spanning_kernel"
 CAPS = (0.3, 0.5, 0.7, 0.9)
 """Angles up to which axes may lean while they are balanced, in friction angles."""
 TOWARD = (0.5, 0.9)

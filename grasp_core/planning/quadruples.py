@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices, frozen_copy
 from grasp_core.cones.spanning import SpanningTable
 from grasp_core.declared import trusted
-from grasp_core.families.constructions import Construction
 from grasp_core.families.placements import LEAST_RADIUS
-from grasp_core.families.placing import Attempt, Cones
+from grasp_core.families.placing import Attempt, Cones, Construction
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.solvers.ties import coarse, graded
 from grasp_core.values import FINGERS, ForceCone, four
@@ -206,7 +205,7 @@ def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
     firsts = [max(start, FINGERS - 1) for start, _ in pairs]
 
     def make(place: int) -> WideQuadruples:
-        return _quadruples(cones, order[table.quadruples(*pairs[place]).indices])
+        return _quadruples(cones, order[table.quadruples(*pairs[place])])
 
     return coarse(cones.rooms)[order][firsts], make
 

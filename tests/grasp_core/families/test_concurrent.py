@@ -27,7 +27,7 @@ def placements(name, theta, limit):
     body = example_object(name)
     pieces = unit_pieces(body)
     found = spanning_quadruples(body.normals, theta)
-    for faces in found.indices[:limit]:
+    for faces in found[:limit]:
         quad = [pieces[face] for face in faces]
         cones = [ForceCone(piece.normal, theta) for piece in quad]
         yield quad, cones, place_concurrent(quad, cones, least=1e-4)
