@@ -154,21 +154,6 @@ class Corners(NamedTuple):
     counts: Indices  # number of corners of each face, (f,)
 
 
-class RegulusTerms(NamedTuple):
-    """Settings of `families.regulus`: slopes to try, and which lines count as a regulus."""
-
-    turns: Array  # cosines and sines of the directions in which a pyramid's facets lean, (m, 2)
-    shares: Array
-    """Positions, as shares of each slope's interval of angles, at which slopes are tried, (s,)."""
-    depth: float
-    """Least height, over their faces, of the points where lines pass the focus line, in object
-    radii."""
-    inset: float  # least distance of a contact from the edges of its face, in object radii
-    gap: float  # least distance at which a line passes the focus line, in object radii
-    tie: float  # difference of merit that counts as none; of equal slopes, those tried first win
-    enough: float  # merit above which no better slopes are sought
-
-
 def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
     """Make a table with one row per piece; rows of faces too small for a contact stay zero."""
     count, most = len(pieces), max((len(piece.E) for piece in pieces if piece), default=0)

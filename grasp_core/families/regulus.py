@@ -58,7 +58,6 @@ from grasp_core.families.placements import (
     FaceTable,
     NoPlacement,
     Placement,
-    RegulusTerms,
     balanced_forces,
     face_table,
     focus_direction,
@@ -237,11 +236,10 @@ def regulus_bounds(
     Gives the merits of the best choices, (a,): minus infinity where a proof excludes every choice,
     infinity where a choice was not decided. Then these choices, (a, 3), -1 where there is none.
     """
-    turns, shares = np.array(facet_turns(PYRAMID_SIDES)), np.array(SLOPES)
-    terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET, enough)
     bounds = np.empty(len(attempts.faces))
     chosen = np.empty((len(bounds), 3), dtype=np.int64)
-    compiled(KERNEL).regulus_bounds(table, attempts, terms, bounds, chosen)
+    turns = np.array(facet_turns(PYRAMID_SIDES))
+    compiled(KERNEL).regulus_bounds(table, attempts, turns, enough, bounds, chosen)
     return bounds, chosen
 
 
