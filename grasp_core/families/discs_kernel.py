@@ -297,7 +297,7 @@ def fill(
             continue
         before, behind = reaches(corners, faces[q], axes[q])
         reach, half = max(before, behind), np.tan(0.5 * half_angles[q])
-        # see `concurrent_radius_bounds`
+        # (5) of `concurrent`: the least s_i is at most the weighted mean of all s_i
         limits[q, 0] = reach * np.tan(half_angles[q])
         for pairing, (i, j, k, m) in enumerate(PAIRINGS):
             # see `pencil_radius_bounds`: reach first, then the widths of both pairs

@@ -8,12 +8,11 @@ import importlib
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.objects.booleans import Solid, intersection_volume
-from grasp_core.objects.planar_faces import SIDES
+from grasp_core.objects.planar_faces import SIDES, edges_of
 
 WELD = 1e-8
 """Distance below which vertices are joined, relative to the extent: single precision in a file
@@ -44,13 +43,6 @@ def welded(
     if not whole.any():
         raise MeshError(MeshRefusal.ZERO_VOLUME, "no triangle has an area; export a solid")
     return points, corners[whole], int((~whole).sum())
-
-
-def edges_of(corners: Indices) -> tuple[Indices, NDArray[np.bool_]]:
-    """Number the edge (k, k+1) of each triangle, and tell if it runs to a higher vertex, (3 t,)."""
-    tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    names = np.minimum(tail, head) * (int(corners.max()) + 1) + np.maximum(tail, head)
-    return np.unique(names, return_inverse=True)[1].ravel(), tail < head
 
 
 def surface_fault(corners: Indices) -> MeshError | None:

@@ -135,15 +135,8 @@ class WideQuadruples:
     def coned(self, rows: slice) -> ConedQuadruples:
         """Choose force cones for the face quadruples in the given rows."""
         faces = self.faces[rows]
-        axes, half_angles = self.cones.chosen(faces)
-        return ConedQuadruples(
-            faces=faces,
-            normals=self.cones.normals[faces],
-            axes=axes,
-            half_angles=half_angles,
-            limits=self.cones.limits_of(faces, axes, half_angles),
-            rooms=self.rooms[rows],
-        )
+        normals, rooms = self.cones.normals[faces], self.rooms[rows]
+        return ConedQuadruples(faces, normals, *self.cones.chosen(faces), rooms)
 
     def ranked(self, construction: Construction, worth: float) -> tuple["WideQuadruples", Array]:
         """Order the rows by the discs that their widest cones allow; drop those below `worth`.
