@@ -27,10 +27,10 @@ from grasp_core.families.placing import (
     Construction,
     Settling,
     chosen_shapes,
+    on_true_surface,
     point_region,
     regions_of,
 )
-from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
