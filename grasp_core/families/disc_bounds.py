@@ -47,8 +47,15 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.pencil import pencil_radius_bounds
-from grasp_core.families.placements import LEAST_RADIUS, Attempts, Corners, FaceTable, face_table
-from grasp_core.families.placing import PAIRINGS, Construction
+from grasp_core.families.placements import (
+    LEAST_RADIUS,
+    PAIRINGS,
+    Attempts,
+    Corners,
+    FaceTable,
+    face_table,
+)
+from grasp_core.families.placing import Construction
 from grasp_core.families.regulus import regulus_bounds
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron

@@ -20,8 +20,16 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, Attempts, Corners, FaceTable
-from grasp_core.families.placing import PAIRINGS
+from grasp_core.families.placements import (
+    KEPT,
+    LEFT,
+    NONE,
+    PAIRINGS,
+    PLACED,
+    Attempts,
+    Corners,
+    FaceTable,
+)
 from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.solvers.lp_kernel import BELOW, LOST, OPTIMAL, Rows, Vertex, proved_bound, solve

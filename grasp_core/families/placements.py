@@ -14,7 +14,7 @@ Inputs and outputs of compiled code are plain arrays; filling them does not need
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from grasp_core.solvers.lp import (
 from grasp_core.solvers.ties import nearest_optimum
 from grasp_core.values import FINGERS
 
+FingerOrder: TypeAlias = tuple[int, int, int, int]
+PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
+"""The three ways to group four faces into the pairs (first, second) and (third, fourth)."""
 LEAST_RADIUS = 1e-3
 """Least radius, relative to the object's, of a disc that counts as a region to stand in; foci of a
 pencil that are closer than this count as one point."""

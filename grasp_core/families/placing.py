@@ -43,9 +43,11 @@ from grasp_core.families.pencil import place_pencil
 from grasp_core.families.placements import (
     LEAST_RADIUS,
     LEFT,
+    PAIRINGS,
     PLACED,
     Attempts,
     FaceTable,
+    FingerOrder,
     Footprints,
     NoPlacement,
     Placed,
@@ -75,12 +77,9 @@ from grasp_core.values import (
     four,
 )
 
-FingerOrder: TypeAlias = tuple[int, int, int, int]
 Region: TypeAlias = Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
 
 AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
-PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
-"""The three ways to group four faces into the pairs (first, second) and (third, fourth)."""
 DISC_CORNERS = 64
 """Number of points that are listed on the border of a disc."""
 

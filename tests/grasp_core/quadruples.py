@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from grasp_core.cones.spanning import SpanningTable
-from grasp_core.families.placing import PAIRINGS
+from grasp_core.families.placements import PAIRINGS
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object

@@ -7,7 +7,7 @@ import numpy as np
 from grasp_core.cones.spanning import balancing_weights
 from grasp_core.families.discs_kernel import SAME_AXIS
 from grasp_core.families.pencil import pencil_radius_bounds
-from grasp_core.families.placing import PAIRINGS
+from grasp_core.families.placements import PAIRINGS
 from grasp_core.values import FINGERS
 
 

@@ -8,8 +8,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.cones.spanning import span_sines
 from grasp_core.families.disc_bounds import KERNELS, AttemptBounds, corners_of, disc_limits
-from grasp_core.families.placements import LEAST_RADIUS, Attempts, Placement
-from grasp_core.families.placing import CONSTRUCTIONS, PAIRINGS
+from grasp_core.families.placements import LEAST_RADIUS, PAIRINGS, Attempts, Placement
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.planning.quadruples import all_blocks
