@@ -61,9 +61,8 @@ def span_angle(normals: ArrayLike) -> float:
     units = frozen_units(normals, (4, 3), "normals")
     if not positively_span(units):
         return 0.0
-    triples = [units[list(triple)] for triple in combinations(range(4), 3)]
     # (2), the minimum over signs being taken in `triple_sine`
-    return math.asin(min(abs(triple_sine(*triple)) for triple in triples))
+    return math.asin(min(abs(triple_sine(*units[triple])) for triple in TRIPLES))
 
 
 def count_spanning(normals: ArrayLike, least: float) -> int:
