@@ -24,7 +24,6 @@ Source: Sudsang & Ponce 1995, Definition 3 and Proposition 4; the closed form is
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -62,9 +61,8 @@ def span_angle(normals: ArrayLike) -> float:
     units = frozen_units(normals, (4, 3), "normals")
     if not positively_span(units):
         return 0.0
-    triples = [units[list(triple)] for triple in combinations(range(4), 3)]
     # (2), the minimum over signs being taken in `triple_sine`
-    return math.asin(min(abs(triple_sine(*triple)) for triple in triples))
+    return math.asin(min(abs(triple_sine(*units[triple])) for triple in TRIPLES))
 
 
 def count_spanning(normals: ArrayLike, least: float) -> int:
@@ -195,16 +193,6 @@ def triple_sine(one: Array, two: Array, three: Array) -> Array:
     return determinant / safe
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SpanningQuadruples:
-    """Face quadruples whose normals positively span at some least angle."""
-
-    indices: Indices
-    """Indices of the faces, (q, 4), ascending in each row, rows in lexicographic order."""
-    span_angles: Array
-    """theta* of each quadruple, (q,) [rad]."""
-
-
 class SpanningTable:
     """Spanning quadruples of directions, listed by the last of their directions."""
 
@@ -213,16 +201,13 @@ class SpanningTable:
         self.kernel = compiled(KERNEL)
         self.size, self.bits = 0, self.kernel.empty_table(len(normals))
 
-    def quadruples(self, start: int, end: int) -> SpanningQuadruples:
-        """List the quadruples whose last direction is one of start .. end - 1."""
+    def quadruples(self, start: int, end: int) -> Indices:
+        """List quadruples whose last direction is one of start .. end - 1, faces ascending."""
         self._extend(end)
         listed = np.concatenate([self._ending_in(newest) for newest in range(start, end)])
         # in lexicographic order
         places = end ** np.arange(3, -1, -1)
-        indices = np.sort(listed @ places)[:, None] // places % end
-        sines = np.empty(len(indices))
-        self.kernel.least_sines(self.units, indices, sines)
-        return SpanningQuadruples(indices, np.arcsin(sines))
+        return np.sort(listed @ places)[:, None] // places % end
 
     def count(self, newest: int) -> int:
         """Count the spanning quadruples whose last direction is the given one."""

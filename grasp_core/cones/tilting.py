@@ -32,8 +32,8 @@ Arrays have a row for each of q quadruples: normals, axes and directions are (q,
 angles `thetas` (q, 4) and half-angles (q,) [rad].
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.values import FINGERS
 
-KERNEL = "grasp_core.cones.tilting_kernel"
+KERNEL = "grasp_core.cones.spanning_kernel"
 CAPS = (0.3, 0.5, 0.7, 0.9)
 """Angles up to which axes may lean while they are balanced, in friction angles."""
 TOWARD = (0.5, 0.9)
@@ -67,8 +67,7 @@ CHUNK = 20_000
 """Number of quadruples that are searched at once, which needs some tens of megabytes."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TiltedCones:
+class TiltedCones(NamedTuple):
     """Force cones of q quadruples, four for each."""
 
     axes: Array
@@ -104,7 +103,7 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
 def widened(directions: Array, normals: Array, thetas: Array) -> TiltedCones:
     """Search for force cones with axes near given directions inside the friction cones."""
     axes = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-    return TiltedCones(*_improved(axes, normals, thetas))
+    return _improved(axes, normals, thetas)
 
 
 def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> TiltedCones:
@@ -125,7 +124,7 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
     return TiltedCones(best, half_angles)
 
 
-def _search(normals: Array, thetas: Array) -> tuple[Array, Array]:
+def _search(normals: Array, thetas: Array) -> TiltedCones:
     best, half_angles = normals.copy(), half_angle(normals, normals, thetas)
     for cap in CAPS:
         axes = _balanced(normals, cap * thetas)
@@ -187,14 +186,14 @@ def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
     return np.cos(turn) * centers + np.sin(turn) * aside
 
 
-def _improved(axes: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
+def _improved(axes: Array, normals: Array, thetas: Array) -> TiltedCones:
     # one seed for all quadruples: equal ones get equal moves, wherever they are listed
     moves = np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2))
     first, second = _aside(axes)
-    axes, reached = np.array(axes, order="C"), np.empty(len(axes))
+    cones = TiltedCones(np.array(axes, order="C"), np.empty(len(axes)))
     given = map(np.ascontiguousarray, (normals, thetas, np.stack([first, second])))
-    compiled(KERNEL).improve((axes, reached), *given, moves, np.array(PACE))
-    return axes, reached
+    compiled(KERNEL).improve(tuple(cones), *given, moves, np.array(PACE))
+    return cones
 
 
 def _aside(axes: Array) -> tuple[Array, Array]:

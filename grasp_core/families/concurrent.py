@@ -147,15 +147,6 @@ def cone_footprint(piece: FacePiece, cone: ForceCone, focus: Array, contact: Arr
     return piece.origin + flat @ piece.frame.T
 
 
-def concurrent_radius_bounds(reaches: Array, _: Array, half_angles: Array) -> Array:
-    """Bound the disc radii of concurrent grasps from above, (..., 1).
-
-    The bound is (5), as the least s_i is at most the weighted mean of all s_i.
-    """
-    bounds: Array = reaches * np.tan(half_angles)
-    return bounds[..., None]
-
-
 def _rows(
     pieces: Sequence[FacePiece], cones: Sequence[ForceCone], sides: Sides
 ) -> tuple[Array, Array]:

@@ -11,7 +11,6 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.families.concurrent import RADII, SMALLEST
-from grasp_core.families.corner_bounds_kernel import reaches
 from grasp_core.families.discs_kernel import (
     Program,
     bounded,
@@ -19,9 +18,10 @@ from grasp_core.families.discs_kernel import (
     facet_sines,
     largest_discs,
     optimum,
+    reaches,
     room_for,
 )
-from grasp_core.families.kernel_tables import (
+from grasp_core.families.placements import (
     LEFT,
     NONE,
     PLACED,

@@ -13,8 +13,8 @@ c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j 
 
     s_i + s_j = d.(c_j - c_i),                                                                (2)
 
-which the corners of the two faces bound. See `concurrent_radius_bounds` and `pencil_radius_bounds`
-for what reach and width mean for discs.
+which the corners of the two faces bound. See (5) of `concurrent` and `pencil_radius_bounds` for
+what reach and width mean for discs.
 
 Across. Let N be the unit vector across both axes of one pair of a pencil. It is across the line of
 the foci too, so both foci c have the same height h = N.c, and so have the disc centres q_i and q_j
@@ -46,11 +46,16 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
-from grasp_core.families.concurrent import concurrent_radius_bounds
-from grasp_core.families.constructions import PAIRINGS, Construction
-from grasp_core.families.kernel_tables import Attempts, Corners, FaceTable, face_table
 from grasp_core.families.pencil import pencil_radius_bounds
-from grasp_core.families.placements import LEAST_RADIUS
+from grasp_core.families.placements import (
+    LEAST_RADIUS,
+    PAIRINGS,
+    Attempts,
+    Corners,
+    FaceTable,
+    face_table,
+)
+from grasp_core.families.placing import Construction
 from grasp_core.families.regulus import regulus_bounds
 from grasp_core.kinds import Family
 from grasp_core.objects.face_pieces import Shapes
@@ -58,7 +63,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import FINGERS
 
-KERNEL = "grasp_core.families.corner_bounds_kernel"
+KERNEL = "grasp_core.families.discs_kernel"
 LEAST_SINE = 1e-6
 """Half angles between axes with a sine up to this are so small that they bound no width."""
 KERNELS: dict[Family, str] = {
@@ -97,8 +102,10 @@ def disc_limits(
 def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
     """Bound the discs from above where only the cones' half-angles are known, (q, 4)."""
     reaches = np.full(len(half_angles), extent)
-    concurrent = concurrent_radius_bounds(reaches, widths, half_angles)
-    return np.hstack([concurrent, pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)])
+    # (5) of `concurrent`: the least s_i is at most the weighted mean of all s_i
+    concurrent: Array = reaches * np.tan(half_angles)
+    pencil = pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)
+    return np.hstack([concurrent[:, None], pencil])
 
 
 def distances(corners: Corners) -> Array:

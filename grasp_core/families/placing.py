@@ -2,46 +2,172 @@
 
 Compiled code solves the programs of the concurrent and the pencil construction and checks its
 answers by their residuals; what it does not prove is left to the construction itself, one attempt
-at a time. Of several choices of cones and pieces the contacts with the largest discs count, moved
-to the true surface where faces are curved.
+at a time. Of several choices of cones and pieces the contacts with the largest discs count.
+
+The paper's three constructions have one interface here, `Construction`, which the planner uses.
+
+Contacts on curved patches move from the planes of the patches to the true surface.
+
+Solved: given a placement on the planes of patches, a placement with the same force cones on the
+triangles of the surface over the contacts, each within the region of its finger.
+
+Why they move. The planes were planned with friction cones that fit inside the cones of every
+triangle over them, and with contacts anywhere within `depth` of the planes. So a concurrent grasp's
+contacts on the surface can aim at the planned focus. Otherwise the construction is run again on the
+triangles. Either way the contacts are on the surface, and are certified with the true normals.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.declared import trusted
 from grasp_core.errors import SolverError
-from grasp_core.families.concurrent import BEFORE, BEHIND, MIXED_SIDES
-from grasp_core.families.constructions import DISC_CORNERS, MIXED, Construction, circle, regions_of
-from grasp_core.families.kernel_tables import (
+from grasp_core.families.concurrent import (
+    BEFORE,
+    BEHIND,
+    MIXED_SIDES,
+    cone_footprint,
+    place_concurrent,
+    place_on_mixed_sides,
+)
+from grasp_core.families.pencil import place_pencil
+from grasp_core.families.placements import (
+    LEAST_RADIUS,
     LEFT,
+    PAIRINGS,
     PLACED,
     Attempts,
     FaceTable,
+    FingerOrder,
     Footprints,
+    NoPlacement,
     Placed,
+    Placement,
+    balanced_forces,
     face_table,
     room_for,
 )
-from grasp_core.families.placements import LEAST_RADIUS, Placement
-from grasp_core.families.true_surface import on_true_surface
-from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
-from grasp_core.solvers.ties import surpassing
-from grasp_core.values import FINGERS, ContactRegion, FaceQuadruple, ForceCone, RegionKind, four
+from grasp_core.families.regulus import nearly_symmetric, place_regulus
+from grasp_core.geometry.polygons import clip, edge_rows, tidy
+from grasp_core.objects.face_pieces import (
+    FacePiece,
+    FaceShape,
+    Shapes,
+    choices_near,
+    inscribed_radius,
+    piece_of,
+)
+from grasp_core.solvers.ties import graded, surpassing
+from grasp_core.values import (
+    FINGERS,
+    ContactRegion,
+    FaceQuadruple,
+    Family,
+    ForceCone,
+    RegionKind,
+    four,
+)
+
+Region: TypeAlias = Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
+
+AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
+DISC_CORNERS = 64
+"""Number of points that are listed on the border of a disc."""
+
+
+@dataclass(frozen=True, slots=True)
+class Construction:
+    """The construction of one family, with the functions that the planner needs for it."""
+
+    family: Family
+    orders: tuple[FingerOrder, ...]
+    """Orders of the fingers on the same faces that give different grasps."""
+    place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
+    """Function that places contacts, given pieces, force cones and the least merit that counts."""
+    limits: slice | None
+    """Columns of `disc_limits`, one per finger order; None where no disc is claimed."""
+    admits: Callable[[Array, Array], NDArray[np.bool_]] | None
+    """Function that returns for which quadruples a program may be feasible, (q,), from normals in
+    finger order, (q, 4, 3), and half-angles, (q,) [rad]; None for all."""
+    region: Region  # function that makes the region of one finger, in the pieces' units
+
+    @property
+    def least(self) -> float:
+        """Return the merit that a placement must exceed to count."""
+        return LEAST_RADIUS if self.limits else -math.inf
+
+
+def _cone_region(
+    piece: FacePiece, cone: ForceCone, placed: Placement, finger: int
+) -> ContactRegion:
+    polygon = cone_footprint(piece, cone, placed.foci[0], placed.positions[finger])
+    E, b = edge_rows((polygon - piece.origin) @ piece.frame)
+    return ContactRegion("cone", polygon, inscribed_radius(E, b))
+
+
+def circle() -> Array:
+    """Return points on the border of a disc of radius one, (n, 2)."""
+    turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
+    return np.column_stack([np.cos(turns), np.sin(turns)])
+
+
+def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+    ring = circle() @ piece.frame.T
+    radius = float(placed.radii[finger])
+    return ContactRegion("disc", placed.positions[finger] + radius * ring, radius)
+
+
+def regions_of(
+    region: Region, pieces: Sequence[FacePiece], cones: Sequence[ForceCone], placed: Placement
+) -> tuple[ContactRegion, ...]:
+    """Make the regions of all fingers, in the pieces' units."""
+    return tuple(
+        region(piece, cone, placed, finger)
+        for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
+    )
+
+
+def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
+    """Make a region of one point, the contact itself."""
+    return ContactRegion("point", placed.positions[finger][None], 0.0)
+
+
+CONSTRUCTIONS: dict[Family, Construction] = {
+    "concurrent": Construction(
+        "concurrent", AS_LISTED, place_concurrent, slice(0, 1), None, _cone_region
+    ),
+    "pencil": Construction("pencil", PAIRINGS, place_pencil, slice(1, 4), None, _disc_region),
+    "regulus": Construction(
+        "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
+        nearly_symmetric, point_region,
+    ),
+}  # fmt: skip
+MIXED = replace(CONSTRUCTIONS["concurrent"], place=place_on_mixed_sides)
+"""Construction of concurrent grasps with the focus before some fingers and behind the others."""
+
 
 Ask: TypeAlias = tuple[FaceQuadruple, Sequence[ForceCone], float]
 """One attempt: faces in finger order, a force cone on each, and the least radius that counts."""
 MOST_CHOICES = 8
 """Most choices of pieces tried on faces that are not convex; the free method multiplies it by
 `max_face_parts`."""
+
+LEAST_FACET = 1e-5
+"""Least radius of the largest disc in a part of a triangle (object size one); smaller parts are
+left out."""
+ON_EDGE = 1e-12
+"""Distance outside an edge, in lengths and volumes of an object of size one, at which a line still
+meets both triangles beside the edge: a thousand rounding errors. The first of them that is large
+enough counts."""
 
 Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
 Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]]
@@ -277,3 +403,86 @@ def _placed_on(
     """Place contacts on convex pieces, with discs however small; None if it is impossible."""
     placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
     return placed if isinstance(placed, Placement) else None
+
+
+def on_true_surface(
+    shapes: Sequence[FaceShape],
+    pieces: tuple[FacePiece, ...],
+    cones: Sequence[ForceCone],
+    planned: Placement,
+    regions: Sequence[ContactRegion],
+    place: Callable[[tuple[FacePiece, ...]], Placement | None],
+) -> tuple[tuple[FacePiece, ...], Placement] | None:
+    """Move a placement to the true surface; None if no contacts there hold the same grasp."""
+    if all(shape.facets is None for shape in shapes):
+        return pieces, planned
+    along = [np.array([piece.normal for piece in pieces]), np.array([c.axis for c in cones])]
+    for directions in along:
+        given = zip(shapes, pieces, planned.positions, directions, regions, strict=True)
+        chosen = tuple(facet for each in given if (facet := _facet(*each)) is not None)
+        if len(chosen) < len(pieces):
+            continue
+        found = _aimed(chosen, cones, planned, directions) or place(chosen)
+        if found is not None:
+            return chosen, replace(found, radii=planned.radii, merit=planned.merit)
+    return None
+
+
+def _aimed(
+    facets: Sequence[FacePiece], cones: Sequence[ForceCone], planned: Placement, directions: Array
+) -> Placement | None:
+    """Aim from contacts above or below the planned ones at the planned focus; None on failure."""
+    if len(planned.foci) != 1:
+        return None
+    heights = [
+        float(facet.normal @ (facet.origin - at)) / float(facet.normal @ along)
+        for facet, at, along in zip(facets, planned.positions, directions, strict=True)
+    ]
+    positions = planned.positions + np.array(heights)[:, None] * directions
+    ways = planned.foci[0] - positions
+    axes = np.array([cone.axis for cone in cones])
+    inward = np.einsum("ki,ki->k", ways, axes)
+    cosines = np.abs(inward) / np.linalg.norm(ways, axis=1)
+    if (cosines < np.cos([cone.half_angle for cone in cones])).any() or not all(
+        facet.inset(at) >= -ON_EDGE for facet, at in zip(facets, positions, strict=True)
+    ):
+        return None
+    forces = balanced_forces(facets, np.sign(inward)[:, None] * ways)
+    return replace(planned, positions=positions, forces=forces)
+
+
+def _facet(
+    shape: FaceShape, piece: FacePiece, at: Array, along: Array, region: ContactRegion
+) -> FacePiece | None:
+    """Cut the surface triangle on the line through a point to a region, or return None."""
+    if shape.facets is None:
+        return piece
+    parts = (_part(piece, triangle, region) for triangle in _hit(shape.facets, at, along))
+    return next((part for part in parts if part is not None), None)
+
+
+def _part(piece: FacePiece, triangle: Array, region: ContactRegion) -> FacePiece | None:
+    """Return the part of a triangle that is over a region; None if it is too small."""
+    cross = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    facet = piece_of(piece.face, cross / np.linalg.norm(cross), triangle)
+    claimed = (region.polygon - piece.origin) @ piece.frame
+    E, b = edge_rows(claimed) if len(claimed) > 1 else (piece.E, piece.b)
+    rows = E @ piece.frame.T
+    inside = clip(facet.corners, rows @ facet.frame, b - rows @ (facet.origin - piece.origin))
+    inside = tidy(inside)
+    if len(inside) < 3:  # noqa: PLR2004 - not a polygon
+        return None
+    part = piece_of(piece.face, facet.normal, facet.origin + inside @ facet.frame.T)
+    return part if part.inradius > LEAST_FACET else None
+
+
+def _hit(triangles: Array, point: Array, along: Array) -> Array:
+    """Return the triangles that a line meets, those nearest to a given point first, (k, 3, 3)."""
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    sides = np.cross(edges, point - triangles) @ along
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    met = np.flatnonzero((sides >= -ON_EDGE).all(axis=1) & (normals @ along > 0.0))
+    heights: Array = ((triangles[met, 0] - point) * normals[met]).sum(axis=1)
+    heights = heights / (normals[met] @ along)
+    nearest_first = sorted(range(len(met)), key=graded(np.abs(heights)).__getitem__)
+    return triangles[met[nearest_first]]

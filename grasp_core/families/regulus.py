@@ -53,8 +53,15 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_facets
 from grasp_core.cones.spanning import angles_between
-from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms, face_table
-from grasp_core.families.placements import NoPlacement, Placement, balanced_forces, focus_direction
+from grasp_core.families.placements import (
+    Attempts,
+    FaceTable,
+    NoPlacement,
+    Placement,
+    balanced_forces,
+    face_table,
+    focus_direction,
+)
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import RESIDUAL, LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import nearest_optimum
@@ -229,11 +236,10 @@ def regulus_bounds(
     Gives the merits of the best choices, (a,): minus infinity where a proof excludes every choice,
     infinity where a choice was not decided. Then these choices, (a, 3), -1 where there is none.
     """
-    turns, shares = np.array(facet_turns(PYRAMID_SIDES)), np.array(SLOPES)
-    terms = RegulusTerms(turns, shares, LEAST_DEPTH, LEAST_INSET, LEAST_GAP, SAME_OFFSET, enough)
     bounds = np.empty(len(attempts.faces))
     chosen = np.empty((len(bounds), 3), dtype=np.int64)
-    compiled(KERNEL).regulus_bounds(table, attempts, terms, bounds, chosen)
+    turns = np.array(facet_turns(PYRAMID_SIDES))
+    compiled(KERNEL).regulus_bounds(table, attempts, turns, enough, bounds, chosen)
     return bounds, chosen
 
 

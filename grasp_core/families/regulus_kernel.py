@@ -15,7 +15,18 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import edges_of, facet_sines, measure, room_for, vertex_of
-from grasp_core.families.kernel_tables import Attempts, FaceTable, RegulusTerms
+from grasp_core.families.placements import Attempts, FaceTable
+from grasp_core.families.regulus import (
+    LEAST_DEPTH,
+    LEAST_GAP,
+    LEAST_INSET,
+    SAME_OFFSET,
+    SLOPES,
+    VARIABLES,
+    K,
+    P,
+    T,
+)
 from grasp_core.geometry.vectors_kernel import across, angle_between, cross, dotted, focus_direction
 from grasp_core.solvers.lp_kernel import (
     INFEASIBLE,
@@ -31,8 +42,8 @@ from grasp_core.values import FINGERS
 FLAT = 1e-12
 """Size of a facet's component along N below which the facet does not bound z / x: it allows every
 value or none."""
-VARIABLES, K, P, X, Z, T = 10, 3, 4, 5, 7, 9
-"""Number of variables, and the indices of k, p, x_i, z_i and t among them."""
+X, Z = 5, 7
+"""Indices of the first x_i and z_i among the variables."""
 ACCURACY, FARTHEST = 1e-11, 1e4
 """Error up to which multipliers give the objective, and the size |x|_1 of the variables up to which
 a proof of infeasibility must hold."""
@@ -59,9 +70,9 @@ class PairFrames(NamedTuple):
 
 
 @loop()
-def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerms) -> PairFrames:
+def pair_frames(faces: FaceTable, attempts: Attempts, a: int, turns: Array) -> PairFrames:
     """Compute the frames of one attempt; slopes of too asymmetric pairs are not usable."""
-    axes, slopes = attempts.axes[a], len(terms.shares)
+    axes, slopes = attempts.axes[a], len(SLOPES)
     u, normal = focus_direction(axes), np.empty(3)
     frames = PairFrames(
         u, np.empty((2, 3)), np.empty((2, 3)), np.empty((2, slopes)),
@@ -84,9 +95,9 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int, terms: RegulusTerm
             largest = min(largest, phi + attempts.half_angles[a])
         if largest <= least:
             continue
-        facets = _facets(faces, attempts, (a, pair), frames, terms.turns)
+        facets = _facets(faces, attempts, (a, pair), frames, turns)
         for s in range(slopes):
-            angle = least + terms.shares[s] * (largest - least)
+            angle = least + SLOPES[s] * (largest - least)
             frames.tau[pair, s] = resultant * np.tan(angle)
             frames.usable[pair, s] = _tightest(
                 facets, resultant, frames.tau[pair, s], frames.tight[pair, s]
@@ -152,35 +163,38 @@ class _Line(NamedTuple):
 
 @loop()
 def regulus_bounds(
-    faces: FaceTable, attempts: Attempts, terms: RegulusTerms, bounds: Array, chosen: Indices
+    faces: FaceTable,
+    attempts: Attempts,
+    turns: Array,
+    enough: float,
+    bounds: Array,
+    chosen: Indices,
 ) -> None:
-    """Bound the merit, minus the largest offset t, over slopes until one is good enough."""
+    """Bound the merit, minus the largest offset t, over slopes until one is above `enough`."""
     others = 1 + FINGERS * (4 + 1 + 1) + 4  # gap; offsets, depth, equality; bounds on z / x
     room = np.empty((VARIABLES + 2) * (others + FINGERS * faces.E.shape[1]))
-    slopes, vertex = len(terms.shares), vertex_of(VARIABLES)
+    slopes, vertex = len(SLOPES), vertex_of(VARIABLES)
     for a in range(len(bounds)):
-        frames = pair_frames(faces, attempts, a, terms)
+        frames = pair_frames(faces, attempts, a, turns)
         count = others + edges_of(faces, attempts, a)
         bounds[a], chosen[a] = -np.inf, NONE
         for i in range(slopes):
             for j in range(slopes):
-                if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] > terms.enough:
+                if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] > enough:
                     continue
                 rows = room_for(room, VARIABLES, count)
                 rows = Rows(rows.At, rows.b, rows.norms, FINGERS)
-                _fill(faces, attempts.faces[a], frames, (i, j), terms, rows)
-                gap = terms.gap / min(abs(frames.tau[0, i]), abs(frames.tau[1, j]))
-                worth = bounds[a] + terms.tie
-                best, side = _best_side(rows, gap, terms.tie, worth, vertex)
+                _fill(faces, attempts.faces[a], frames, (i, j), rows)
+                gap = LEAST_GAP / min(abs(frames.tau[0, i]), abs(frames.tau[1, j]))
+                worth = bounds[a] + SAME_OFFSET
+                best, side = _best_side(rows, gap, worth, vertex)
                 if best > worth:
                     bounds[a] = best
                     chosen[a, 0], chosen[a, 1], chosen[a, 2] = i, j, side
 
 
 @loop()
-def _best_side(
-    rows: Rows, gap: float, tie: float, worth: float, vertex: Vertex
-) -> tuple[float, int]:
+def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[float, int]:
     """Solve the programs for p > gap and p < -gap; return the better bound and its side."""
     either = _bounded(rows, worth, vertex)
     p = vertex.x[P]  # anything where `either` is infinite: the sides decide then, or nothing does
@@ -188,11 +202,11 @@ def _best_side(
         return either, PLUS
     rows.At[P, 0], rows.b[0] = -1.0, -gap
     plus = _bounded(rows, worth, vertex)
-    if plus >= either - tie:
+    if plus >= either - SAME_OFFSET:
         return plus, PLUS
     if p <= -gap:
         return either, MINUS
-    worth = max(worth, plus + tie)
+    worth = max(worth, plus + SAME_OFFSET)
     rows.At[P, 0] = 1.0
     minus = _bounded(rows, worth, vertex)
     return (minus, MINUS) if minus > worth else (plus, PLUS)
@@ -216,7 +230,6 @@ def _fill(
     quadruple: Indices,
     frames: PairFrames,
     slopes: tuple[int, int],
-    terms: RegulusTerms,
     rows: Rows,
 ) -> None:
     """Fill in all rows but the first, which is left for the gap (8); equalities come last."""
@@ -224,12 +237,12 @@ def _fill(
     rows.b[0] = 0.0
     for finger in range(FINGERS):
         face, line = quadruple[finger], _line(frames, slopes, finger)
-        row = _edge_rows(faces, face, line, terms.inset, rows, row)
+        row = _edge_rows(faces, face, line, rows, row)
         row = _offset_rows(faces, face, line, rows, row)
         n = faces.normals[face]
         # (7): the passing point is high enough over the face
         _add(line, n, (0.0, -1.0), rows, row)
-        rows.b[row] = -terms.depth
+        rows.b[row] = -LEAST_DEPTH
         # the contact lies in the plane of its face
         _add(line, n, (1.0, -1.0), rows, equality + finger)
         rows.b[equality + finger] = dotted(n, faces.origins[face])
@@ -244,14 +257,14 @@ def _fill(
 
 
 @loop()
-def _edge_rows(faces: FaceTable, face: int, line: _Line, inset: float, rows: Rows, row: int) -> int:
+def _edge_rows(faces: FaceTable, face: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
     edge, frame = np.empty(3), faces.frames[face]
     for e in range(faces.edges[face]):
         for j in range(3):
             edge[j] = frame[j, 0] * faces.E[face, e, 0] + frame[j, 1] * faces.E[face, e, 1]
         _add(line, edge, (1.0, -1.0), rows, row)
-        rows.b[row] = faces.b[face, e] - inset + dotted(edge, faces.origins[face])
+        rows.b[row] = faces.b[face, e] - LEAST_INSET + dotted(edge, faces.origins[face])
         row += 1
     return row
 

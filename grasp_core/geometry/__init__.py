@@ -1,5 +1,5 @@
-"""Where are points nearest to each other, inside, or connected?
+"""How do polygons lie in their plane?
 
-Plane polygons, triangles and points come in. Polygons, distances, nearest points and connected
-components go out; nothing here knows about grasps.
+Plane polygons come in. Areas, cuts, hulls and convex pieces go out, and products of vectors for
+kernels; nothing here knows about grasps.
 """

@@ -8,6 +8,7 @@ creep into one "face".
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import (
@@ -134,14 +135,19 @@ class _Triangles:
         return whole / length, weights @ self.corners[members].mean(axis=1) / weights.sum()
 
 
+def edges_of(corners: Indices) -> tuple[Indices, NDArray[np.bool_]]:
+    """Number the edge (k, k+1) of each triangle, and tell if it runs to a higher vertex, (3 t,)."""
+    tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    names = np.minimum(tail, head) * (int(corners.max()) + 1) + np.maximum(tail, head)
+    return np.unique(names, return_inverse=True)[1].ravel(), tail < head
+
+
 def triangle_neighbours(triangles: Indices) -> Indices:
     """Find the one triangle across each edge (k, k+1), (t, 3); -1 if there is none, or several."""
-    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    edges = np.sort(np.column_stack([tail, head]), axis=1)
-    _, place, uses = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    place, _ = edges_of(triangles)
     order = np.argsort(place, kind="stable")
-    paired = order[(uses == SIDES)[place[order]]].reshape(-1, SIDES)
-    across = np.full(len(tail), -1, dtype=np.int64)
+    paired = order[(np.bincount(place) == SIDES)[place[order]]].reshape(-1, SIDES)
+    across = np.full(len(place), -1, dtype=np.int64)
     across[paired[:, 0]], across[paired[:, 1]] = paired[:, 1] // 3, paired[:, 0] // 3
     return across.reshape(-1, 3)
 

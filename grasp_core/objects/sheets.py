@@ -25,10 +25,9 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.geometry.connectivity import components
 from grasp_core.objects.planar_faces import SIDES, triangle_neighbours
 from grasp_core.objects.shells import SMALL, Shells, left_out
-from grasp_core.objects.solid_checks import triangle_areas
+from grasp_core.objects.solid_checks import components, triangle_areas
 
 CERTAIN = 0.4
 """Least mean winding number on an open surface that is taken for outward: half a ball has 0.3."""
@@ -164,20 +163,15 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     heads, others = np.roll(corners, -1, axis=1), corners[across]
     same = (others == corners[..., None]) & (np.roll(others, -1, axis=2) == heads[..., None])
     against = same.any(axis=2) & (across >= 0)
-    turned, part = np.zeros(len(corners), dtype=np.bool_), np.full(len(corners), -1)
-    for seed in range(len(corners)):
-        if part[seed] >= 0:
-            continue
-        part[seed], front = seed, [seed]
-        while front:  # each triangle that connects with the seed is reached once
-            here = front.pop()
-            for side, other in enumerate(across[here].tolist()):
-                if other >= 0 and part[other] < 0:
-                    part[other], turned[other] = seed, turned[here] ^ against[here, side]
-                    front.append(other)
-    inner = across >= 0
-    if (inner & ((turned[:, None] ^ turned[across]) != against)).any():
+    # each triangle counts twice, as it is and turned; those that are wound alike are linked
+    inner, count = across >= 0, len(corners)
+    here, there, flip = np.nonzero(inner)[0], across[inner], count * against[inner]
+    links = np.column_stack([here, there + flip, here + count, there + count - flip])
+    one, other = components(2 * count, links.reshape(-1, 2)).reshape(2, count)
+    if (one == other).any():
         return None
+    # the first triangle of each part stands as it is
+    turned, part = other < one, np.minimum(one, other)
     size, swept = (
         np.bincount(part, weights=weight, minlength=len(corners))
         for weight in (areas, areas * turned)

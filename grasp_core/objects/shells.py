@@ -14,12 +14,12 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
-from grasp_core.geometry.connectivity import components
 from grasp_core.objects.booleans import Solid, intersection_volume, union
+from grasp_core.objects.planar_faces import edges_of
 from grasp_core.objects.solid_checks import (
     THINNEST,
     check_volume,
-    edges_of,
+    components,
     thin_share,
     triangle_areas,
 )

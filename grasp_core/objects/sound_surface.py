@@ -15,15 +15,14 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
-from grasp_core.geometry.connectivity import components
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import Solid, triangulate
-from grasp_core.objects.planar_faces import cut_at_repeats
+from grasp_core.objects.planar_faces import cut_at_repeats, edges_of
 from grasp_core.objects.sheets import check_bounds, outward_sheets, wound_alike
 from grasp_core.objects.shells import Shells, one_solid
 from grasp_core.objects.solid_checks import (
     balanced,
-    edges_of,
+    components,
     surface_fault,
     triangle_areas,
     welded,

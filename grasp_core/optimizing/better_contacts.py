@@ -23,8 +23,8 @@ from grasp_core.arrays import Array
 from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
-from grasp_core.families.constructions import point_region, regions_of
 from grasp_core.families.free import closed_at, of_general_type
+from grasp_core.families.placing import point_region, regions_of
 from grasp_core.geometry.polygons import SAME_CORNER
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces

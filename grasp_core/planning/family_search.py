@@ -24,11 +24,10 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import each_cones_positively_span
-from grasp_core.families.constructions import Construction
 from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.free import Absence
-from grasp_core.families.kernel_tables import Attempts
-from grasp_core.families.placing import Attempt, Settling
+from grasp_core.families.placements import Attempts
+from grasp_core.families.placing import Attempt, Construction, Settling
 from grasp_core.kinds import Method
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
@@ -121,38 +120,17 @@ class BestFirst:
     def _made(
         self, make: Callable[[int], WideQuadruples], place: int, worth: float, _: float
     ) -> Expanded:
+        """List a block, and yield one item for it; expanding that chooses cones for some rows."""
         wide, bounds = make(place).ranked(self.construction, worth)
-        yield from self._wide_rows(wide, coarse(bounds), (place,), 0)
 
-    def _wide_rows(
-        self, wide: WideQuadruples, best: Array, place: tuple[int, ...], start: int
-    ) -> Expanded:
-        """Yield one item for the rows from `start` on; expanding it chooses cones for some."""
-
-        def expand(worth: float, beyond: float) -> Expanded:
-            rows = _until(best, start, beyond, SMALLEST_TILT)
+        def chosen(rows: slice, worth: float) -> Expanded:
             coned, bounds = wide.coned(rows).ranked(self.construction)
             closer = coarse(np.asarray(bounds.max(axis=(1, 2), initial=-np.inf)))
             count = int((closer > worth).sum())
-            coned, at = coned.some(np.arange(count)), (*place, rows.start)
-            yield from self._coned_rows(coned, bounds[:count].copy(), closer[:count], at, 0)
-            yield from self._wide_rows(wide, best, place, rows.stop)
+            tighter = partial(self._tightened, coned.some(np.arange(count)), bounds[:count].copy())
+            yield from _rows(tighter, closer[:count], (place, rows.start), 0, SMALLEST_CHUNK)
 
-        if start < len(best):
-            yield Waiting((-float(best[start]), TABLE, place), expand)
-
-    def _coned_rows(
-        self, coned: ConedQuadruples, bounds: Array, best: Array, place: tuple[int, ...], start: int
-    ) -> Expanded:
-        """Yield one item for the rows from `start` on; expanding it tightens some bounds."""
-
-        def expand(worth: float, beyond: float) -> Expanded:
-            rows = _until(best, start, beyond, SMALLEST_CHUNK)
-            yield from self._tightened(coned, bounds, rows, worth)
-            yield from self._coned_rows(coned, bounds, best, place, rows.stop)
-
-        if start < len(best):
-            yield Waiting((-float(best[start]), TABLE, place), expand)
+        yield from _rows(chosen, coarse(bounds), (place,), 0, SMALLEST_TILT)
 
     def _tightened(
         self, coned: ConedQuadruples, bounds: Array, rows: slice, worth: float
@@ -185,11 +163,26 @@ class BestFirst:
             yield Waiting((-float(best[each]), QUADRUPLE, faces), None, make)
 
 
-def _until(best: Array, start: int, beyond: float, least: int) -> slice:
-    """Return the next rows to refine: those with bounds above `beyond`, within a chunk's size."""
-    larger = int(np.searchsorted(-best[start:], -beyond))
-    count = min(max(larger, least), LARGEST_CHUNK)
-    return slice(start, min(start + count, len(best)))
+def _rows(
+    refined: Callable[[slice, float], Expanded],
+    best: Array,
+    place: tuple[int, ...],
+    start: int,
+    least: int,
+) -> Expanded:
+    """Yield one item for a table's rows from `start` on; expanding it refines some of them.
+
+    These are the rows with bounds above that of the next item, within a chunk's size.
+    """
+
+    def expand(worth: float, beyond: float) -> Expanded:
+        larger = int(np.searchsorted(-best[start:], -beyond))
+        stop = min(start + min(max(larger, least), LARGEST_CHUNK), len(best))
+        yield from refined(slice(start, stop), worth)
+        yield from _rows(refined, best, place, stop, least)
+
+    if start < len(best):
+        yield Waiting((-float(best[start]), TABLE, place), expand)
 
 
 @dataclass(slots=True, eq=False)

@@ -16,17 +16,21 @@ import numpy as np
 
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import SolverError
-from grasp_core.families.constructions import (
+from grasp_core.families.free import RESTARTS, Absence, Undecided, close_patches, place_free
+from grasp_core.families.placements import Placement
+from grasp_core.families.placing import (
     CONSTRUCTIONS,
     MIXED,
+    MOST_CHOICES,
+    Attempt,
+    Cones,
     Construction,
+    Settling,
+    chosen_shapes,
+    on_true_surface,
     point_region,
     regions_of,
 )
-from grasp_core.families.free import RESTARTS, Absence, Undecided, close_patches, place_free
-from grasp_core.families.placements import Placement
-from grasp_core.families.placing import MOST_CHOICES, Attempt, Cones, Settling, chosen_shapes
-from grasp_core.families.true_surface import on_true_surface
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named

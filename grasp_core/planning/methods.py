@@ -7,7 +7,7 @@ from functools import partial
 from itertools import chain, islice
 from typing import TypeAlias
 
-from grasp_core.families.constructions import CONSTRUCTIONS
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.kinds import METHODS, Family, Method
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
@@ -17,7 +17,6 @@ from grasp_core.planning.parts import (
     Block,
     Elsewhere,
     Object,
-    each_found,
     in_standard_order,
     search_batches,
     search_blocks,
@@ -60,7 +59,7 @@ def run(
 ) -> Iterator[Certified]:
     """Yield each certified grasp in the order of the searches, on the standard object."""
     total, found = len(searches) * on.quadruples, 0
-    for done, grasps in _steps(Object(on, request), searches, elsewhere):
+    for done, grasps in _steps(Object(on, request, elsewhere), searches):
         found += len(grasps)
         if progress is not None:
             progress(done, total, found)
@@ -69,9 +68,7 @@ def run(
         progress(total, total, found)
 
 
-def _steps(
-    work: Object, searches: Searches, elsewhere: Elsewhere | None
-) -> Iterator[tuple[int, list[Certified]]]:
+def _steps(work: Object, searches: Searches) -> Iterator[tuple[int, list[Certified]]]:
     """Yield, for each quadruple tried, how many are finished at least, and its grasps.
 
     With a limit, only grasps that are among the best when they are found.
@@ -83,7 +80,7 @@ def _steps(
         for family in families
         if limit is None
     }
-    found = each_found(work, chain.from_iterable(parts.values()), elsewhere)
+    found = work.each_found(chain.from_iterable(parts.values()))
     for family in families:
         search = searches[family]
         if limit is None:
@@ -99,11 +96,11 @@ def _steps(
         search, held = searches["free"], _held(searches)
         if limit is not None:
             search.limit = max(limit - sum(kept_so_far), 0)
-        steps = search_batches(work, search, held, elsewhere)
+        steps = search_batches(work, search, held)
         yield from enumerate(_timed(steps, search), start=dealt_with + 1)
         _prune("free", search, on.quadruples)
         if work.request.complete:
-            for grasps in _timed(search_undecided(work, search, elsewhere), search):
+            for grasps in _timed(search_undecided(work, search), search):
                 yield dealt_with + on.quadruples, grasps
 
 

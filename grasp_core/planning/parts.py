@@ -16,8 +16,7 @@ from functools import cached_property, lru_cache, partial
 from itertools import chain, combinations, islice, tee
 from typing import TypeAlias
 
-from grasp_core.families.constructions import CONSTRUCTIONS
-from grasp_core.families.placing import chosen_shapes
+from grasp_core.families.placing import CONSTRUCTIONS, chosen_shapes
 from grasp_core.kinds import Family
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
@@ -80,6 +79,13 @@ class Object:
 
     on: Standard
     request: PlanRequest
+    elsewhere: Elsewhere | None = None
+
+    def each_found(self, parts: Iterable[Part]) -> Iterator[Found]:
+        """Yield what each part holds, in order."""
+        if self.elsewhere is None:
+            return map(self.found, parts)
+        return self.elsewhere(parts, self.found_at_once)
 
     def found(self, part: Part) -> Found:
         """Search one part; it is gone through while its grasps are taken."""
@@ -178,11 +184,6 @@ def finding_elsewhere(
         yield lambda parts, here: workers.in_order(find, parts, here=here)
 
 
-def each_found(work: Object, parts: Iterable[Part], elsewhere: Elsewhere | None) -> Iterator[Found]:
-    """Yield what each part holds, in order."""
-    return map(work.found, parts) if elsewhere is None else elsewhere(parts, work.found_at_once)
-
-
 def search_family(work: Object, family: Family, search: MethodSearch) -> Iterator[list[Certified]]:
     """Search all blocks until no upper bound exceeds the worst grasp kept; yield those kept.
 
@@ -196,8 +197,8 @@ def search_family(work: Object, family: Family, search: MethodSearch) -> Iterato
         yield search.keep_each(found)
 
 
-def search_blocks(found: Iterator[Found], search: MethodSearch) -> Iterator[list[Certified]]:
-    """Keep the grasps that blocks hold; yield those of each quadruple."""
+def search_blocks(found: Iterable[Found], search: MethodSearch) -> Iterator[list[Certified]]:
+    """Keep the grasps that parts hold; yield those of each quadruple."""
     for each in found:
         for grasps in each.grasps:
             yield search.keep_each(grasps)
@@ -205,17 +206,14 @@ def search_blocks(found: Iterator[Found], search: MethodSearch) -> Iterator[list
 
 
 def search_batches(
-    work: Object,
-    search: MethodSearch,
-    held: AbstractSet[FaceQuadruple],
-    elsewhere: Elsewhere | None,
+    work: Object, search: MethodSearch, held: AbstractSet[FaceQuadruple]
 ) -> Iterator[list[Certified]]:
     """Go through the quadruples that no family holds, until the limit; yield the grasps on each."""
     size = BATCH if search.limit is None else LIMITED_BATCH
     split = ((batch, without_grasp(work.on, batch, held)) for batch in batches(work.on, size))
     every, ahead = tee(split)
     parts = (Batch(to_try) for _, to_try in ahead)
-    for (batch, to_try), each in zip(every, each_found(work, parts, elsewhere), strict=True):
+    for (batch, to_try), each in zip(every, work.each_found(parts), strict=True):
         if search.full:
             return
         tried, grasps = set(to_try), iter(each.grasps)
@@ -225,17 +223,13 @@ def search_batches(
         search.take(each.gathered, each.seconds)
 
 
-def search_undecided(
-    work: Object, search: MethodSearch, elsewhere: Elsewhere | None
-) -> Iterator[list[Certified]]:
+def search_undecided(work: Object, search: MethodSearch) -> Iterator[list[Certified]]:
     """Go once more, with more parts, through the quadruples that were left undecided."""
     open_yet = tuple(search.gathered.undecided)
-    parts = (Batch((faces,), again=True) for faces in open_yet)
-    for faces, each in zip(open_yet, each_found(work, parts, elsewhere), strict=True):
+    found = work.each_found(Batch((faces,), again=True) for faces in open_yet)
+    for faces, each in zip(open_yet, found, strict=True):
         del search.gathered.undecided[faces]
-        for grasps in each.grasps:
-            yield search.keep_each(grasps)
-        search.take(each.gathered, each.seconds)
+        yield from search_blocks([each], search)
 
 
 def batches(on: Standard, size: int) -> Iterator[Sequence[FaceQuadruple]]:

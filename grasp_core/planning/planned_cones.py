@@ -28,8 +28,7 @@ from grasp_core.families.disc_bounds import (
     distances,
     widths_apart,
 )
-from grasp_core.families.kernel_tables import Corners
-from grasp_core.families.placements import LEAST_RADIUS, Placement
+from grasp_core.families.placements import LEAST_RADIUS, Corners, Placement
 from grasp_core.families.placing import Cones
 from grasp_core.objects.face_pieces import FacePiece, Shapes
 from grasp_core.objects.polyhedron import Polyhedron
@@ -86,8 +85,11 @@ class PlannedCones:
         widths = widths_apart(quads, self._distances, self._halves, leaning)
         return angle_limits(extent, widths, widest)
 
-    def chosen(self, quads: Indices) -> tuple[Array, Array]:
-        """Choose cones around normals and tilted: axes (q, 2, 4, 3), half-angles or 0 (q, 2)."""
+    def chosen(self, quads: Indices) -> tuple[Array, Array, Array]:
+        """Choose cones around normals and tilted: axes (q, 2, 4, 3), half-angles or 0 (q, 2).
+
+        Also gives upper bounds on the discs of both, (q, 2, 4), see `disc_limits`.
+        """
         normals, thetas = self.normals[quads], self._thetas[quads]
         axes = [normals, normals]
         half_angles = [_around(span_sines(normals), thetas), np.zeros(len(quads))]
@@ -95,15 +97,15 @@ class PlannedCones:
             leaning = tilted_cones(normals, thetas)
             axes[TILTED] = leaning.axes
             half_angles[TILTED] = BELOW_SPAN_ANGLE * leaning.half_angles
-        return np.stack(axes, axis=1), np.stack(half_angles, axis=1)
-
-    def limits_of(self, quads: Indices, axes: Array, half_angles: Array) -> Array:
-        """Return upper bounds on the discs for chosen cones, (q, 2, 4), see `disc_limits`."""
         limits = [
-            disc_limits(self._corners, self.normals, quads, axes[:, kind], half_angles[:, kind])
+            disc_limits(self._corners, self.normals, quads, axes[kind], half_angles[kind])
             for kind in range(1 + self.tilted)
         ]
-        return np.stack([limits[NORMAL], limits[-1]], axis=1)
+        return (
+            np.stack(axes, axis=1),
+            np.stack(half_angles, axis=1),
+            np.stack([limits[NORMAL], limits[-1]], axis=1),
+        )
 
     @cached_property
     def normals(self) -> Array:

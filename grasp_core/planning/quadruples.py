@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices, frozen_copy
 from grasp_core.cones.spanning import SpanningTable
 from grasp_core.declared import trusted
-from grasp_core.families.constructions import Construction
 from grasp_core.families.placements import LEAST_RADIUS
-from grasp_core.families.placing import Attempt, Cones
+from grasp_core.families.placing import Attempt, Cones, Construction
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.solvers.ties import coarse, graded
 from grasp_core.values import FINGERS, ForceCone, four
@@ -136,15 +135,8 @@ class WideQuadruples:
     def coned(self, rows: slice) -> ConedQuadruples:
         """Choose force cones for the face quadruples in the given rows."""
         faces = self.faces[rows]
-        axes, half_angles = self.cones.chosen(faces)
-        return ConedQuadruples(
-            faces=faces,
-            normals=self.cones.normals[faces],
-            axes=axes,
-            half_angles=half_angles,
-            limits=self.cones.limits_of(faces, axes, half_angles),
-            rooms=self.rooms[rows],
-        )
+        normals, rooms = self.cones.normals[faces], self.rooms[rows]
+        return ConedQuadruples(faces, normals, *self.cones.chosen(faces), rooms)
 
     def ranked(self, construction: Construction, worth: float) -> tuple["WideQuadruples", Array]:
         """Order the rows by the discs that their widest cones allow; drop those below `worth`.
@@ -206,7 +198,7 @@ def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
     firsts = [max(start, FINGERS - 1) for start, _ in pairs]
 
     def make(place: int) -> WideQuadruples:
-        return _quadruples(cones, order[table.quadruples(*pairs[place]).indices])
+        return _quadruples(cones, order[table.quadruples(*pairs[place])])
 
     return coarse(cones.rooms)[order][firsts], make
 

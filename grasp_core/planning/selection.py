@@ -11,10 +11,9 @@ from grasp_core.execution.best_squeeze import GAP, best_squeeze, searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.certify import Certified
+from grasp_core.planning.certify import Certified, LateFigures
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import FAMILIES, PlanRequest
-from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.values import Grasp
 
@@ -49,15 +48,32 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
     if request.rank_by == "friction-margin":
         return lambda found: critical_friction(found.placement.positions, found.normals), SAME_SHARE
     if request.rank_by == "ferrari-canny":
-        mu = request.friction
 
         def quality(found: Certified) -> float:
             positions, normals = found.placement.positions, found.normals
-            return -ferrari_canny(positions, normals, mu, torque_scale=1.0).lower
+            return -LateFigures(positions, normals, request.friction).ferrari_canny()[0]
 
         return quality, SAME_SHARE
+    loads, tip = any_direction(1.0), _tip_radius(body, request.finger)
+
+    def looseness(found: Certified) -> float:
+        """Return minus the mass that the best squeeze survives [kg]; zero where none holds.
+
+        The mass is certified in any orientation, in the linear model.
+        """
+        count = len(found.normals)
+        start = Grip(
+            body.radius * found.placement.positions, found.normals,
+            np.full(count, request.friction), np.zeros((count, 3)),
+            springs(STIFFNESS_N_PER_M, count), np.full(count, tip),
+        )  # fmt: skip
+        try:
+            return -searched(start, loads, PUSH_N).scale
+        except NoForcesError:
+            return 0.0
+
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
-    return _looseness(body, request), 2.0 * GAP
+    return looseness, 2.0 * GAP
 
 
 def _tip_radius(body: Polyhedron, finger: Finger | None) -> float:
@@ -88,29 +104,6 @@ def _in_order(
 ) -> list[Certified]:
     """Order grasps by a figure, the smallest first; equal ones stay in the order given."""
     return [found[place] for place in np.argsort(ranks(figures, same), kind="stable")]
-
-
-def _looseness(body: Polyhedron, request: PlanRequest) -> Callable[[Certified], float]:
-    """Return a measure of grasps: minus the mass that the best squeeze survives [kg].
-
-    The mass is certified in any orientation, in the linear model. A grasp that no squeeze holds
-    stably has the largest value, zero.
-    """
-    loads, tip = any_direction(1.0), _tip_radius(body, request.finger)
-
-    def measure(found: Certified) -> float:
-        count = len(found.normals)
-        start = Grip(
-            body.radius * found.placement.positions, found.normals,
-            np.full(count, request.friction), np.zeros((count, 3)),
-            springs(STIFFNESS_N_PER_M, count), np.full(count, tip),
-        )  # fmt: skip
-        try:
-            return -searched(start, loads, PUSH_N).scale
-        except NoForcesError:
-            return 0.0
-
-    return measure
 
 
 def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]:

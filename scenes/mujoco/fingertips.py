@@ -14,8 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.geometry.nearest_points import nearest_on_surface
-from grasp_core.objects.on_faces import ON_FACE, face_under
+from grasp_core.objects.on_faces import ON_FACE, face_under, nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 

@@ -23,9 +23,9 @@ from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import any_direction
 from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.frames import POSE
-from grasp_core.geometry.nearest_points import Surface
 from grasp_core.hands.collisions import clearances, tip_distances
 from grasp_core.hands.hand import Hand
+from grasp_core.objects.on_faces import Surface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS

@@ -22,7 +22,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.geometry.nearest_points import nearest_on_surface
+from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
 from scenes.mujoco.held import TOUCH, HeldLayout, rotations

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from grasp_core.cones.spanning import SpanningTable
-from grasp_core.families.constructions import PAIRINGS
+from grasp_core.families.placements import PAIRINGS
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
@@ -20,7 +20,7 @@ def paired_quadruples(name, theta, limit=None):
     """Pieces and normal-axis force cones of the quadruples that span at theta, in all pairings."""
     body = example_object(name)
     pieces = unit_pieces(body)
-    for faces in spanning_quadruples(body.normals, theta).indices[:limit]:
+    for faces in spanning_quadruples(body.normals, theta)[:limit]:
         for order in PAIRINGS:
             quad = [pieces[faces[finger]] for finger in order]
             yield quad, [ForceCone(piece.normal, theta) for piece in quad]

@@ -1,14 +1,13 @@
-"""Reference for the kernel of `corner_bounds_kernel`: its bounds (1) and (2) in NumPy."""
+"""Reference for the bounds by corners in `discs_kernel`: its bounds (1) and (2) in NumPy."""
 
 from itertools import combinations
 
 import numpy as np
 
 from grasp_core.cones.spanning import balancing_weights
-from grasp_core.families.concurrent import concurrent_radius_bounds
-from grasp_core.families.constructions import PAIRINGS
-from grasp_core.families.corner_bounds_kernel import SAME_AXIS
+from grasp_core.families.discs_kernel import SAME_AXIS
 from grasp_core.families.pencil import pencil_radius_bounds
+from grasp_core.families.placements import PAIRINGS
 from grasp_core.values import FINGERS
 
 
@@ -16,8 +15,8 @@ def disc_limits(corners, faces, axes, half_angles):
     """Upper bounds on the discs of many quadruples, (q, 4), from (1) and (2) alone."""
     points, angles = corners.points[faces], np.maximum(half_angles, 0.0)
     far, wide = reaches(points, axes), widths(points, axes)
-    concurrent = concurrent_radius_bounds(far, wide, angles)
-    return np.hstack([concurrent, pencil_radius_bounds(far, wide, angles, PAIRINGS)])
+    concurrent = far * np.tan(angles)
+    return np.hstack([concurrent[:, None], pencil_radius_bounds(far, wide, angles, PAIRINGS)])
 
 
 def reaches(corners, axes):

@@ -7,10 +7,9 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.cones.spanning import span_sines
-from grasp_core.families.constructions import CONSTRUCTIONS, PAIRINGS
 from grasp_core.families.disc_bounds import KERNELS, AttemptBounds, corners_of, disc_limits
-from grasp_core.families.kernel_tables import Attempts
-from grasp_core.families.placements import LEAST_RADIUS, Placement
+from grasp_core.families.placements import LEAST_RADIUS, PAIRINGS, Attempts, Placement
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
 from grasp_core.planning.quadruples import all_blocks
@@ -27,7 +26,7 @@ BODIES = ("random-14-1", "chamfered-box", "double-wedge-bar")
 def quadruples(body, seed=0):
     """Faces, axes beside their normals, and half-angles at which these span."""
     rng = np.random.default_rng(seed)
-    faces = spanning_quadruples(body.normals, 0.01).indices
+    faces = spanning_quadruples(body.normals, 0.01)
     axes = body.normals[faces] + 0.03 * rng.normal(size=(len(faces), 4, 3))
     axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
     sines = span_sines(axes)
@@ -77,7 +76,7 @@ def test_no_focus_is_farther_from_contacts_than_reach_and_widths_allow():
     """Random contacts and foci, against the definition of both bounds."""
     body, rng, tested = example_object("random-14-1"), np.random.default_rng(0), 0
     corners = corners_of(body).points
-    for faces in spanning_quadruples(body.normals, 0.01).indices[:60]:
+    for faces in spanning_quadruples(body.normals, 0.01)[:60]:
         axes, points = body.normals[faces], corners[faces]
         (reach,) = reference.reaches(points[None], axes[None])
         (widths,) = reference.widths(points[None], axes[None])

@@ -5,9 +5,9 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.cones.spanning import balancing_weights
-from grasp_core.families.constructions import AS_LISTED
 from grasp_core.families.pencil import CELL_A, CELL_B, pencil_radius_bounds, place_pencil
 from grasp_core.families.placements import Placement
+from grasp_core.families.placing import AS_LISTED
 from grasp_core.objects.face_pieces import unit_pieces
 from scenes.example_objects import example_object
 from tests.grasp_core.families.disc_borders import descended_margin, extremes, least_margin

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from grasp_core.families import placing
-from grasp_core.families.constructions import CONSTRUCTIONS, MIXED, regions_of
 from grasp_core.families.discs_kernel import optimum
-from grasp_core.families.kernel_tables import LEFT, NONE, PLACED
-from grasp_core.families.placements import LEAST_RADIUS, Placement
-from grasp_core.families.placing import ManyPlacements
+from grasp_core.families.placements import LEAST_RADIUS, LEFT, NONE, PLACED, Placement
+from grasp_core.families.placing import CONSTRUCTIONS, MIXED, ManyPlacements, regions_of
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, PlannedCones
 from grasp_core.planning.quadruples import all_blocks

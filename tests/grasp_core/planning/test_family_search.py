@@ -6,9 +6,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import SolverError
 from grasp_core.families import placements
-from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.families.disc_bounds import AttemptBounds
-from grasp_core.families.placing import ManyPlacements
+from grasp_core.families.placing import CONSTRUCTIONS, ManyPlacements
 from grasp_core.planning import family_search as promising_module
 from grasp_core.planning.family_search import SAME_MERIT, BestFirst
 from grasp_core.planning.methods import prepared

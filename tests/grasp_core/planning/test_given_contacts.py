@@ -7,8 +7,7 @@ import pytest
 import trimesh
 
 import grasp_core as gc
-from grasp_core.geometry.nearest_points import nearest_on_surface
-from grasp_core.objects.on_faces import check_on_faces, face_under
+from grasp_core.objects.on_faces import check_on_faces, face_under, nearest_on_surface
 from grasp_core.planning.given_contacts import LARGEST_LEAN, LARGEST_MOVE, grasp_of, seat
 from scenes.example_objects import example_object
 

@@ -77,15 +77,14 @@ def test_parts_that_another_process_finds_are_the_same(name, monkeypatch):
         pipe.seek(0)
         return unpacked(receive(pipe))
 
-    def elsewhere(work, parts, _):
+    def elsewhere(work, parts):
         given = pickle.dumps((body, work.request))
         for part in parts:
             seen.append(part)
             yield sent(found_elsewhere(given, sent(part)))
 
     here = gc.plan(body, 0.3)
-    for module in (methods, parts):
-        monkeypatch.setattr(module, "each_found", elsewhere)
+    monkeypatch.setattr(Object, "each_found", elsewhere)
     assert bits(gc.plan(body, 0.3)) == bits(here)
     assert {type(part).__name__ for part in seen} == {"Block", "Batch"}
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.families.constructions import CONSTRUCTIONS
 from grasp_core.families.placements import LEAST_RADIUS
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.kinds import METHODS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.objects.standard_order import standard

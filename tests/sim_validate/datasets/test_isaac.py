@@ -16,7 +16,7 @@ import trimesh
 
 import grasp_core as gc
 import sim_validate
-from grasp_core.geometry.nearest_points import nearest_on_surface
+from grasp_core.objects.on_faces import nearest_on_surface
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import SPLITS, DatasetConfig, SplitName
 from sim_validate.datasets.isaac import export, yaml_number

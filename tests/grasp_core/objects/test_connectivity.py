@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from grasp_core.geometry.connectivity import close_pairs, components
+from grasp_core.objects.solid_checks import close_pairs, components
 
 
 def judged(count, links):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.geometry.nearest_points import Surface, nearest_on_triangles
+from grasp_core.objects.on_faces import Surface, nearest_on_triangles
 from tests.grasp_core.curved import bumpy_ellipsoid
 
 ROUNDING = 2.0**-52
