@@ -55,7 +55,7 @@ def shell_lines():
 @pytest.mark.parametrize("line", shell_lines())
 def test_every_command_is_one(line, monkeypatch):
     asked = []
-    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
     words, _, code = line.partition("# exit code")
     wanted = Exit.USAGE if code.strip() == "2" else Exit.GOOD
     assert main(shlex.split(words)[1:]) == wanted

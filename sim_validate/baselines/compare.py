@@ -41,8 +41,8 @@ class Bands:
     least: float
     """Differences of critical frictions and wrench limits that never count; critical frictions are
     proved to 1e-7."""
-    displacement_m: float
-    rotation_rad: float
+    length_m: float
+    angle_rad: float
     grey: float
     """Relative distance between friction and critical friction within which a grasp may change its
     verdict."""
@@ -57,7 +57,7 @@ class Bands:
         """Return how far a number may be from what it was; motions by the units of their names."""
         unit = unit_of(name)
         if unit in ("m", "rad"):
-            return self.displacement_m if unit == "m" else self.rotation_rad
+            return self.length_m if unit == "m" else self.angle_rad
         share = self.predicted if how.analysed else self.simulated
         return share * abs(before) + (self.least + self.friction * how.friction)
 
@@ -206,13 +206,13 @@ WORDS = {
     Status.REGRESSED: "worse",
 }  # fmt: skip
 EXACT = Bands(
-    predicted=1e-9, simulated=1e-9, least=0.0, displacement_m=1e-7, rotation_rad=1e-6,
+    predicted=1e-9, simulated=1e-9, least=0.0, length_m=1e-7, angle_rad=1e-6,
     grey=0.0, exact=True,
 )  # fmt: skip
 """Bands for the same versions and rounding: the rounding of written numbers, and motions that are
 only the settling of contacts, of some 1e-8 m and 1e-6 rad, which say nothing about a grasp."""
 OTHER_PROCESSOR = Bands(
-    predicted=1e-6, simulated=5e-3, least=1e-7, displacement_m=1e-6, rotation_rad=1e-5,
+    predicted=1e-6, simulated=5e-3, least=1e-7, length_m=1e-6, angle_rad=1e-5,
     grey=1e-4, exact=True,
 )  # fmt: skip
 """Tolerances for the same versions with other rounding. With linear algebra for another processor,
@@ -220,7 +220,7 @@ or without compiled loops, no verdict of sixty grasps changed. Predicted limits 
 digits, critical frictions to 5e-9, motions of some 1e-8 m to .6 %, and results of bisection to two
 steps of .13 %."""
 OTHER_VERSIONS = Bands(
-    predicted=0.05, simulated=0.05, least=1e-7, displacement_m=2e-4, rotation_rad=radians(0.2),
+    predicted=0.05, simulated=0.05, least=1e-7, length_m=2e-4, angle_rad=radians(0.2),
     grey=0.02, exact=False,
 )  # fmt: skip
 OTHER_PART = replace(OTHER_VERSIONS, same_part=False)

@@ -35,6 +35,8 @@ SPAN = (
     "half-angle of the widest cones around the normals of which any choice of directions "
     "positively spans space; 0: none do, and the force cones lean"
 )
+TRIAL_FIGURES = tuple(each for each in figures(WrenchVerdict) if each.name != "outcome")
+"""Figures of a trial in the columns behind its outcome."""
 SAID_ABOVE = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
 """Figures of a verdict that the page says in other places."""
 FOCUS = "where lines of force meet, in the object's frame"
@@ -91,6 +93,7 @@ def grasp_page(
             "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
             "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
         },
+        trial_columns=[(each.shown.heading, each.meaning) for each in TRIAL_FIGURES],
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
         controls=[] if verdict is None else [_control(each) for each in verdict.controls],
         commands=list(_commands(run, grasp, verdict)),
@@ -168,7 +171,6 @@ def _certified(run: RunFolder, grasp: Grasp) -> str:
 
 def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
     size, limit, found = wrench_size(verdict, trial), trial.predicted_limit, trial.simulated_limit
-    moved = MICRO * trial.hold.displacement_m
     return {
         "name": trial.name,
         "wrench": ", ".join(f"{part + 0.0:.3g}" for part in trial.wrench),
@@ -178,7 +180,7 @@ def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
         "friction": number(trial.required_friction, 3),
         "outcome": trial.hold.outcome.value.replace("_", " "),
         "tone": GOOD if as_predicted(trial) else BAD,
-        "moved": NOTHING if math.isnan(moved) else number(moved, 2),
+        "figures": [each.cell(trial) for each in TRIAL_FIGURES],
     }
 
 

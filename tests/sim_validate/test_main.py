@@ -386,7 +386,7 @@ def test_help_on_a_command_shows_examples_that_can_be_typed(monkeypatch, capsys,
     shown = capsys.readouterr().out.partition("\nexamples:\n")[2].splitlines()
     assert [line.strip() for line in shown] == [f"graspproof {each}" for each in EXAMPLES[words]]
     asked = []
-    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
     for line in shown:
         assert main(shlex.split(line)[1:]) == Exit.GOOD
     assert len(asked) == len(shown) > 0

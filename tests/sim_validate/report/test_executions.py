@@ -262,7 +262,7 @@ def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
 )  # fmt: skip
 def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monkeypatch):
     asked = []
-    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
     executions = Executions(AboutObject("", "", ""), 0.35, True, settings, ())
     line = execute_command(executions, str(run / "grasps.json"), "c-0-1-2-7")
     assert main(shlex.split(line)[1:]) == Exit.GOOD

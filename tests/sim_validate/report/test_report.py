@@ -135,7 +135,7 @@ def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
 def test_its_commands_are_commands(small_run, small_report, monkeypatch):
     monkeypatch.chdir(small_run)
     asked = []
-    monkeypatch.setattr(commands, "execute", lambda command: asked.append(command) or Exit.GOOD)
+    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
     text = next((small_report / "grasps").iterdir()).read_text()
     (block,) = re.findall(r"<pre>(.*?)</pre>", text, re.DOTALL)
     lines = [line for line in block.splitlines() if line]
