@@ -116,7 +116,7 @@ def test_a_surface_without_flat_parts_is_refused_with_advice():
     turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     ring = 0.05 * np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])
     lens = trimesh.convex.convex_hull(np.vstack([ring, [[0, 0, 0.004], [0, 0, -0.004]]]))
-    with pytest.raises(gc.MeshError, match=r"only 2 patches.*patch-spread-deg") as refused:
+    with pytest.raises(gc.MeshError, match=r"only 2 patches.*patches.spread-deg") as refused:
         gc.Polyhedron.from_mesh(
             lens.vertices, lens.faces, faces="patches", patches=gc.PatchLimits(45.0, 0.1)
         )
