@@ -116,7 +116,7 @@ class Content(Lengths):
     """What a dataset is made of, whether its grasps are planned or given."""
 
     frictions: tuple[Friction, ...] = (0.5,)
-    """Coulomb coefficients; grasps of each object are planned and simulated at each of them."""
+    """Coulomb coefficients at each of which grasps are planned and simulated."""
     faces: FaceKind = "auto"
     """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface.
     """

@@ -349,8 +349,7 @@ class Analyze(Spoken):
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
     friction: FrictionOrZero | None = None
-    """Coulomb coefficient of contacts that have none of their own; if not given, the one in the
-    file."""
+    """Coulomb coefficient of contacts without one of their own; if not given, the file's."""
     torque_scale_m: Quantity | None = None
     """Length by which torques are divided to compare them with forces [m]; if not given, the one in
     the file."""

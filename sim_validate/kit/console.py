@@ -4,7 +4,6 @@ It also collects what long work gives, so that an interrupt loses nothing that i
 """
 
 import importlib
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -74,7 +73,7 @@ class Reporter:
     def text(self, text: str) -> None:
         """Print the text of the one JSON document of a command run with --json."""
         if self.json_only:
-            sys.stdout.write(text)
+            print(text, end="")  # noqa: T201 - the document itself; a closed stream takes nothing
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Print a table on the same stream as lines of results.

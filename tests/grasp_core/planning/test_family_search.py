@@ -24,7 +24,7 @@ CASES = {
     "with angles": (lambda: example_object("l-bracket"), {"friction": 0.5}),
     "the paper's cones": (lambda: example_object("random-14-1"), {"cones": "normal"}),
     "two on one face": (lambda: example_object("prism"), {"share_faces_m": 0.01}),
-    "clear of edges": (lambda: example_object("wedge"), {"clearance": 0.002}),
+    "clear of edges": (lambda: example_object("wedge"), {"edge_clearance_m": 0.002}),
     "within reach": (lambda: example_object("wedge"), {"finger": gc.Finger(0.004, 0.03)}),
     "curved": (curved_body, {"friction": 0.5}),
 }

@@ -29,7 +29,7 @@ SLOW = (
     ("pads", "physics", {"solref": [0.02, 1.0]}, GATE),
     ("pads", "physics", {"wind": [10.0, 0.0, 0.0], "density": 1000.0}, GATE),
     ("mesh", "physics", {"margin": 1e-3}, GATE),
-    ("pads", "fingers", {"mass_kg": 1e6}, GATE),
+    ("pads", "fingers", {"fingertip_mass_kg": 1e6}, GATE),
     ("pads", "fingers", {"stiffness_n_per_m": 10.0}, GATE),
     ("pads", "hold", {"gap_threshold": 1.0}, GATE),
     ("pads", "limit", {"ramp_threshold": 0.01}, GATE),
@@ -46,7 +46,7 @@ REST = (
     ("pads", "physics", {"margin": 1e-3}, GATE),
     ("mesh", "physics", {"ccd_iterations": 5}, GATE),
     ("mesh", "physics", {"ccd_tolerance": 0.01}, GATE),
-    ("pads", "fingers", {"mass_kg": 1e-6}, GATE),
+    ("pads", "fingers", {"fingertip_mass_kg": 1e-6}, GATE),
     ("pads", "fingers", {"stiffness_n_per_m": 1e6}, GATE),
     ("pads", "hold", {"total_threshold": 1e-6}, GATE),
     ("pads", "limit", {"ramp_threshold": 1e-9}, GATE),
@@ -98,7 +98,7 @@ def test_broken_settings_are_refused_before_a_grasp_is_simulated(surface, table,
     [*SLOW, *(pytest.param(*case, marks=MORE) for case in REST)],
 )
 def test_so_are_more_of_them(surface, table, numbers, kind):
-    assert type(refusal(surface, table, numbers, USUAL)) is kind
+    assert isinstance(refusal(surface, table, numbers, USUAL), kind)
 
 
 @pytest.mark.slow
