@@ -12,10 +12,10 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 65_625,
-    "modules of packages": 369,
-    "lines of tests": 48_022,
-    "lines of docs": 6_530,
+    "lines of packages": 62_993,
+    "modules of packages": 303,
+    "lines of tests": 48_677,
+    "lines of docs": 7_174,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
@@ -24,6 +24,8 @@ RISES = (
     "lines of tests, 47,928 to 47,947: they start alike where contacts differ by rounding",
     "lines of tests, 47,947 to 48,022: a test of settings, and each flag's number tried",
     "lines of docs, 6,508 to 6,530: how a setting is declared, what each required package does",
+    "lines of docs, 6,530 to 7,174: the tables of files are made from the classes of records",
+    "lines of tests, 48,022 to 48,677: damaged copies of every kind of file, and how fields are read",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
 
