@@ -107,7 +107,14 @@ def is_kept(module: str) -> bool:
         return True
     # below the copy's folder, or beside it where NUMBA_CACHE_DIR is set
     folder = copy.parent
-    return any(folder.parent.glob(f"{folder.name}*/**/{copy.stem}.*.nbi"))
+    names = (
+        name
+        for top in folder.parent.glob(f"{folder.name}*")
+        # a walk passes over folders that other processes remove meanwhile, and a glob does not
+        for _, _, inside in os.walk(top)
+        for name in inside
+    )
+    return any(name.startswith(f"{copy.stem}.") and name.endswith(".nbi") for name in names)
 
 
 @cache

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.compiled import compiled, copy_of, folders, loop, state_of
+from grasp_core.compiled import compiled, copy_of, folders, is_kept, loop, state_of
 from grasp_core.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -167,3 +167,20 @@ def test_the_chosen_folder_comes_first_and_the_users_before_the_module(monkeypat
         tmp_path / "chosen" / "graspproof", tmp_path / "cache" / "graspproof",
         Path("/a/__pycache__"),
     ]  # fmt: skip
+
+
+def test_folders_that_others_remove_meanwhile_do_not_matter(monkeypatch, tmp_path):
+    """Each process makes a folder of its own beside what is kept, and removes it."""
+    copy, gone, scan = tmp_path / "graspproof" / "own.py", "tmp_gone", os.scandir
+    (copy.parent / gone).mkdir(parents=True)
+    monkeypatch.setattr("grasp_core.compiled.copy_of", lambda *_: copy)
+
+    def scanned(path="."):
+        if Path(path).name == gone:
+            raise FileNotFoundError(2, "No such file or directory", str(path))
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", scanned)
+    assert not is_kept(KERNEL)
+    (copy.parent / "own.py.nbi").touch()
+    assert is_kept(KERNEL)
