@@ -217,5 +217,5 @@ def _absence(body: Polyhedron, request: PlanRequest, counts: PlanCounts, known: 
     return (
         f"{name}: {spanning}no {' or '.join(counts.families)} grasp was found, which is no proof "
         f"that there is none (discs below {LEAST_RADIUS:g} object radii do not count); the free "
-        "method may find others (--family free)"
+        "method may find others (--families free)"
     )

@@ -88,7 +88,7 @@ def _check_size(body: Polyhedron, request: PlanRequest) -> None:
         )
     needed = {
         "a limit (--limit)": request.limit is None,
-        "families without the free method (--family)": "free" in request.families,
+        "families without the free method (--families)": "free" in request.families,
         "radius to rank by (--rank-by)": request.rank_by != "radius",
         "no --share-faces-m": request.share_faces_m is not None,
     }

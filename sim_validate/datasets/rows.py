@@ -169,7 +169,7 @@ class GraspRow(Declared):
     """Least multiple of a trial's load at which a contact slips, predicted; null if none ever
     does."""
     simulated_first_slip: Annotated[Known, Asked(EXECUTED)] = None
-    """The same from simulated contact forces."""
+    """Least multiple of a trial's load that slips, from simulated contact forces."""
     executed_trials: Annotated[int | None, Asked(EXECUTED)] = None
     """Number of trials of the execution."""
     execution_mismatches: Annotated[int | None, Asked(EXECUTED)] = None

@@ -201,7 +201,7 @@ class Execution(Declared):
     def simulated_first_slip(
         self,
     ) -> Annotated[OrInfinity, Shown("in sim", MULTIPLE, compared=SIMULATED)]:
-        """The same in simulation; one also stands for a slip once the whole weight had come."""
+        """Least multiple of a load that slips in simulation; one also stands for a later slip."""
         return min((trial.simulated_first_slip for trial in self.trials), default=math.inf)
 
     @recorded

@@ -1,7 +1,9 @@
 """Flags of commands are the settings of the classes that functions take, each with its bounds."""
 
 import math
+import re
 from collections import Counter
+from pathlib import Path
 from typing import get_args, get_origin
 
 import pytest
@@ -13,6 +15,8 @@ from scenes.settings import PhysicsSettings
 from sim_validate.datasets.config import HandName
 from sim_validate.kit.flag_values import flags_of, parts_of
 from sim_validate.main import COMMANDS
+
+ROOT = Path(__file__).parents[2]
 
 
 def refuses(kind, value):
@@ -67,3 +71,29 @@ def test_torsion_has_no_values_that_mujoco_would_raise(value):
 
 def test_hands_of_datasets_are_the_built_in_ones():
     assert set(get_args(HandName)) == {"", *hand_names()}
+
+
+FLAG = re.compile(r"(?<![\w-])--[a-z][a-z_-]*(?:\.[a-z_-]+)?")
+OTHERS = {
+    "--grasp-bless",
+    "--mjcf",
+    "--nthreads",
+    "--noise",
+    "--patches",
+    "--config",
+    "--help",
+    "--version",
+}
+"""Flags of other programs, beginnings of groups, and those of every command."""
+
+
+def test_flags_that_messages_name_exist():
+    known = {f"--{flag.name}".replace("_", "-") for kind in COMMANDS.values()
+             for flag in flags_of(kind)}  # fmt: skip
+    named = 0
+    for package in ("grasp_core", "scenes", "sim_validate"):
+        for path in (ROOT / package).rglob("*.py"):
+            for flag in map(str, FLAG.findall(path.read_text())):
+                named += 1
+                assert flag.rstrip("-") in known | OTHERS, (path, flag)
+    assert named > 100

@@ -47,7 +47,7 @@ def get(value, place, rng):
 
 
 def tampered(value, place, change, rng):
-    """The same with `change` applied at a place, past constructors or not."""
+    """A value with `change` applied at a place, past constructors or not."""
     return _at(value, list(steps(place)), change, rng)
 
 
