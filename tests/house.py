@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 63_000,
     "modules of packages": 303,
-    "lines of tests": 48_722,
+    "lines of tests": 48_724,
     "lines of docs": 7_174,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -25,7 +25,7 @@ RISES = (
     "lines of tests, 47,947 to 48,022: a test of settings, and each flag's number tried",
     "lines of docs, 6,508 to 6,530: how a setting is declared, what each required package does",
     "lines of docs, 6,530 to 7,174: the tables of files are made from the classes of records",
-    "lines of tests, 48,022 to 48,722: damaged copies of each kind of file; fields",
+    "lines of tests, 48,022 to 48,724: damaged copies of each kind of file; fields",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
 

@@ -75,13 +75,15 @@ def test_hands_of_datasets_are_the_built_in_ones():
 
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z_-]*(?:\.[a-z_-]+)?")
 OTHERS = {
-    "--grasp-bless",
-    "--mjcf",
-    "--nthreads",
-    "--noise",
-    "--patches",
     "--config",
+    "--density-kg-m",
+    "--grasp-bless",
     "--help",
+    "--junitxml",
+    "--mjcf",
+    "--noise",
+    "--nthreads",
+    "--patches",
     "--version",
 }
 """Flags of other programs, beginnings of groups, and those of every command."""
