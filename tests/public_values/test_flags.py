@@ -73,7 +73,7 @@ def test_hands_of_datasets_are_the_built_in_ones():
     assert set(get_args(HandName)) == {"", *hand_names()}
 
 
-FLAG = re.compile(r"(?<![\w-])--[a-z][a-z_-]*(?:\.[a-z_-]+)?")
+FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9_-]*(?:\.[a-z0-9_-]+)?")
 OTHERS = {
     "--config",
     "--density-kg-m",
