@@ -162,7 +162,7 @@ last two are on elsewhere: they save time in large scenes, cost a seventh of it 
 change no bit of a motion."""
 
 
-Surface = Literal["pads", "mesh"]
+Surface = Literal["object", "pads"]
 Drive: TypeAlias = Literal["servo", "rigid"]
 
 
@@ -205,9 +205,9 @@ class ScaledScene(Settings):
 
     fingers: Fingertips = Fingertips()
     physics: Softness = HARD
-    surface: Annotated[Surface, CHOSEN] = "pads"
-    """What fingertips touch: flat pads at the contacts, which are exact on any object, or the mesh
-    of a convex object."""
+    surface: Annotated[Surface | None, CHOSEN] = None
+    """What fingertips touch: the object's own surface, or a flat pad at each contact; if not given,
+    pads where the faces are patches of a curved surface, else the object."""
 
 
 UPRIGHT = (0.0, 0.0, -1.0)

@@ -21,6 +21,7 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.hands.hand import PALM, Hand, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
 from scenes.mujoco.mjcf_text import Element, add_element, quaternion
+from scenes.mujoco.scene_parts import FREE, add_servo
 
 DENSITY_KG_M3 = 1000.0
 """Density of links: the one that MuJoCo takes itself."""
@@ -100,7 +101,7 @@ def add_hand(
     add_exclusions(add_element(root, "contact", {}), chains.hand)
     actuators = add_element(root, "actuator", {})
     for joint, limit in zip(chains.hand.joints, limits, strict=True):
-        add_servo(actuators, joint.name, stiffness, damping, limit)
+        add_servo(actuators, joint.name, stiffness, damping, (-limit, limit))
 
 
 def add_fingers(palm: Element, chains: Chains) -> None:
@@ -129,13 +130,11 @@ def _link(parent: Element, chains: Chains, link: Link, angle: float, *, is_last:
         {"name": link.name, "gravcomp": 0.0 if chains.weighs else 1.0,
          **placed(joint.position, turned)},
     )  # fmt: skip
-    add_element(
-        body, "joint",
-        {"name": joint.name, "type": "hinge", "axis": joint.axis, "pos": (0.0, 0.0, 0.0),
-         "limited": "true" if chains.stops else "false",
-         "range": (joint.lowest - angle, joint.highest - angle), "damping": 0.0, "stiffness": 0.0,
-         "armature": chains.armature_kg_m2, "frictionloss": 0.0},
-    )  # fmt: skip
+    hinge = {"name": joint.name, "type": "hinge", "axis": joint.axis,
+             "limited": "true" if chains.stops else "false",
+             "range": (joint.lowest - angle, joint.highest - angle),
+             "armature": chains.armature_kg_m2}  # fmt: skip
+    add_element(body, "joint", FREE | hinge)
     inertia = (mass * NOMINAL_M**2,) * 3
     nominal = {"pos": center, "mass": mass, "diaginertia": inertia}
     add_element(body, "inertial", chains.inertials.get(link.name, nominal))
@@ -180,17 +179,3 @@ def add_exclusions(contact: Element, hand: Hand) -> None:
         pairs |= {tuple(sorted(pair)) for pair in pairwise(chain)}
     for one, other in sorted(pairs):
         add_element(contact, "exclude", {"body1": one, "body2": other})
-
-
-def add_servo(
-    actuators: Element, joint: str, stiffness: float, damping: float, limit: float | None,
-    span: tuple[float, float] | None = None,
-) -> None:  # fmt: skip
-    """Add a servo with kp [N m/rad], kv [N m s/rad], a torque limit [N m] and a span [rad]."""
-    servo = {
-        "name": joint, "joint": joint, "kp": stiffness, "kv": damping,
-        "ctrllimited": "false" if span is None else "true", "ctrlrange": span or (0.0, 0.0),
-        "forcelimited": "false" if limit is None else "true",
-        "forcerange": (0.0, 0.0) if limit is None else (-limit, limit),
-    }  # fmt: skip
-    add_element(actuators, "position", servo)

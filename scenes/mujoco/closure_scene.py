@@ -1,10 +1,12 @@
-"""Writes a layout as MJCF text that is self-contained: every setting, and every digit.
+"""Makes scenes in which fingertips squeeze an object, and wrenches try to move it.
 
-This module writes the text itself. MuJoCo's own writer leaves out what equals a default (defaults
-change between releases) and rounds numbers. The object's mesh is only shown. Contact happens
-between each fingertip and its own pad: a box on the object whose top is flush with the face at the
-contact, and which only this fingertip can touch. So normals are exact on any object, convex or not.
-The mesh of a convex object can replace the pads, to check that the pads are flush with its surface.
+Texts are self-contained: every setting, and every digit. MuJoCo's own writer leaves out what equals
+a default (defaults change between releases) and rounds numbers.
+
+Fingertips touch the object's own surface, as convex solids (see `surface`). Where it is curved or
+scanned, and planned as nearly flat patches, a fingertip cannot touch the plane of a patch. There it
+touches a pad of its own: a box on the object whose top is that plane, and which only this fingertip
+can touch. Pads on an object with planar faces check one kind of scene by the other.
 
 Fingers are spheres on three slides along (normal, tangent, tangent), each with a position servo:
 `ctrl = f / kp` makes it push with force f at its zero position. Rigid fingers have neither.
@@ -12,6 +14,7 @@ Fingers are spheres on three slides along (normal, tangent, tangent), each with 
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import get_args
 
@@ -21,14 +24,21 @@ from grasp_core.arrays import to_digits
 from grasp_core.checked import instance, one_of, path_of
 from grasp_core.closure.contacts import listed_contacts
 from grasp_core.declared import InNotebooks
-from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.objects.on_faces import check_body
-from grasp_core.objects.polyhedron import Polyhedron, is_convex
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.layout import PAD_DEPTH, PAD_HALF_WIDTH, SQUEEZE, Layout, arrange
-from scenes.mujoco.mjcf_text import Element, SceneText, add_element, as_texts, document, quaternion
-from scenes.mujoco.physics import add_free_body, add_light, begin_scene
+from scenes.mujoco.mjcf_text import Element, SceneText, add_element, document, quaternion
+from scenes.mujoco.scene_parts import (
+    EXACT,
+    HOME,
+    TOUCHED,
+    add_fingertip,
+    add_object,
+    add_servo,
+    begin_scene,
+)
 from scenes.settings import FingerSettings, PhysicsSettings, Surface
 
 SCALED = (
@@ -44,7 +54,6 @@ class Scene(SceneText, InNotebooks):
 
     layout: Layout
     physics: PhysicsSettings
-    surface: Surface
 
 
 def build_scene(
@@ -54,7 +63,7 @@ def build_scene(
     *,
     fingers: FingerSettings | None = None,
     physics: PhysicsSettings | None = None,
-    surface: Surface = "pads",
+    surface: Surface | None = None,
 ) -> Scene:
     """Make a MuJoCo scene from an object and a grasp.
 
@@ -64,27 +73,24 @@ def build_scene(
         friction: Coulomb coefficient at every contact.
         fingers: How fingertips are built and driven.
         physics: Simulation settings.
-        surface: What fingertips touch; `mesh` is for convex objects.
+        surface: What fingertips touch, the object's own surface or pads at the contacts; None for
+            pads where the faces are patches of a curved surface, else for the object.
 
     Raises:
-        InputError: A number is out of range, or `surface` is `mesh` and the object is not convex.
+        InputError: A number is out of range.
     """
     check_body(body)
-    one_of(surface, get_args(Surface), "surface")
+    if surface is not None:
+        one_of(surface, get_args(Surface), "surface")
     for name, value, kind in (
         ("fingers", fingers, FingerSettings), ("physics", physics, PhysicsSettings)
     ):  # fmt: skip
         if value is not None:
             instance(value, kind, name)
-    if surface == "mesh" and not is_convex(body):
-        raise InputError(
-            f"surface must be 'pads' for an object that is not convex: {body.name} is not convex, "
-            "and MuJoCo would fill its hollows"
-        )
     contacts = grasp if isinstance(grasp, Grasp) else listed_contacts(grasp, "grasp")
     physics = physics or PhysicsSettings()
-    layout = arrange(body, contacts, friction, fingers, physics)
-    return Scene(to_text(layout, physics, surface), layout, physics, surface)
+    layout = arrange(body, contacts, friction, fingers, physics, surface)
+    return Scene(to_text(layout, physics), layout, physics)
 
 
 def write_scene(scene: SceneText, path: str | Path) -> Path:
@@ -97,118 +103,65 @@ def write_scene(scene: SceneText, path: str | Path) -> Path:
     return write_parts(path_of(path, "path"), [scene.xml.encode()])
 
 
-def to_text(layout: Layout, physics: PhysicsSettings, surface: Surface = "pads") -> str:
+def to_text(layout: Layout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a layout; equal layouts give equal texts."""
     root, world = opened(layout, physics, SCALED)
-    contact = as_texts(physics.contact())
-    add_object(world, layout, contact, surface)
-    for finger in range(len(layout.contacts)):
-        add_finger(world, layout, contact, finger)
-    if not layout.drive.rigid:
-        actuators = add_element(root, "actuator", {})
-        for finger in range(len(layout.contacts)):
-            add_servos(actuators, layout, finger, (0.0, layout.drive.max_normal_force_n))
+    touching, drive = {"friction": layout.rubbing, **physics.contact()}, layout.drive
+    slides = () if drive.rigid else AXES
+    for finger, pose in enumerate(zip(layout.tip_centers, layout.frames, strict=True)):
+        bits = {"conaffinity": layout.touch_bits(finger)}
+        tip = drive.tip_mass_kg, drive.radius_m
+        add_fingertip(world, f"finger{finger}", pose, slides, tip, touching | bits)
+    if not drive.rigid:
+        add_servos(root, layout, (0.0, drive.max_normal_force_n))
         _keyframes(root, layout)
     return document(root)
 
 
-def opened(layout: Layout, physics: PhysicsSettings, comment: str) -> tuple[Element, Element]:
-    """Begin a lit scene: return its root, with settings and the object's mesh, and its world."""
+def opened(
+    layout: Layout, physics: PhysicsSettings, comment: str, *, weightless: bool = False,
+) -> tuple[Element, Element]:  # fmt: skip
+    """Begin a scene: return its root and its world, with the object and what fingertips touch.
+
+    Where there is gravity, the object may be weightless.
+    """
     mesh = (layout.vertices, layout.triangles)
-    root, world = begin_scene(layout.name, comment, physics, layout.radius_m, mesh, flags={})
-    add_light(world, layout.radius_m)
+    root, world = begin_scene(
+        layout.name,
+        comment,
+        physics,
+        layout.radius_m,
+        mesh,
+        flags={} if layout.on_pads else EXACT,
+        solids=layout.solids,
+    )
+    touching = {"friction": layout.rubbing, **physics.contact()}
+    body = add_object(
+        world, (layout.object_kg, layout.inertia_kg_m2), touching, layout.solids,
+        center=layout.center, weightless=weightless,
+    )  # fmt: skip
+    if layout.on_pads:
+        width, depth = PAD_HALF_WIDTH * layout.radius_m, PAD_DEPTH * layout.radius_m
+        for finger, (point, frame) in enumerate(zip(layout.contacts, layout.frames, strict=True)):
+            outward = np.column_stack([frame[:, 2], frame[:, 1], -frame[:, 0]])
+            pad = {
+                "name": f"pad{finger}", "type": "box", "size": (width, width, 0.5 * depth),
+                "pos": point + 0.5 * depth * frame[:, 0], "quat": quaternion(outward),
+            }  # fmt: skip
+            pad["contype"] = layout.touch_bits(finger)
+            add_element(body, "geom", pad | TOUCHED | touching)
     return root, world
 
 
-def add_object(
-    world: Element, layout: Layout, contact: dict[str, str], surface: Surface = "pads", *,
-    weightless: bool = False,
-) -> None:  # fmt: skip
-    """Add the object with what fingertips touch; where there is gravity it may be weightless."""
-    lifted = {"gravcomp": 1.0} if weightless else {}
-    body = add_free_body(world, layout.object_kg, layout.inertia_kg_m2, layout.center, lifted)
-    hull = {"name": "object", "type": "mesh", "mesh": "object", "conaffinity": 0,
-            "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6), "mass": 0.0}  # fmt: skip
-    if surface == "mesh":
-        touched = {"contype": (1 << len(layout.contacts)) - 1}
-        friction = {"friction": layout.rubbing}
-        add_element(body, "geom", hull | touched | friction | contact)
-        return
-    add_element(body, "geom", hull | {"contype": 0})
-    width, depth = PAD_HALF_WIDTH * layout.radius_m, PAD_DEPTH * layout.radius_m
-    for finger, (point, frame) in enumerate(zip(layout.contacts, layout.frames, strict=True)):
-        outward = np.column_stack([frame[:, 2], frame[:, 1], -frame[:, 0]])
-        pad = {
-            "name": f"pad{finger}",
-            "type": "box",
-            "size": (width, width, 0.5 * depth),
-            "pos": point + 0.5 * depth * frame[:, 0],
-            "quat": quaternion(outward),
-            "contype": 1 << finger,
-            "conaffinity": 0,
-            "friction": layout.rubbing,
-            "mass": 0.0,
-            "group": 3,
-            "rgba": (0.9, 0.6, 0.2, 0.3),
-        }
-        add_element(body, "geom", pad | contact)
-
-
-def add_finger(
-    world: Element, layout: Layout, contact: dict[str, str], finger: int, *, lifted: bool = True
-) -> None:
-    """Add a fingertip on its slides."""
-    drive = layout.drive
-    pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.frames[finger])}
-    weight = {"gravcomp": 1.0} if lifted else {}
-    body = add_element(world, "body", {"name": f"finger{finger}"} | weight | pose)
-    slides = () if drive.rigid else tuple(zip(AXES, np.eye(3), strict=True))
-    for axis, direction in slides:
-        add_element(
-            body,
-            "joint",
-            {"name": f"finger{finger}_{axis}", "type": "slide", "axis": direction,
-             "pos": (0.0, 0.0, 0.0), "limited": "false", "damping": 0.0, "stiffness": 0.0,
-             "armature": 0.0, "frictionloss": 0.0},
+def add_servos(root: Element, layout: Layout, pushes: tuple[float, float] | None = None) -> None:
+    """Add the servos of fingertips' slides; pushes along the normals may have limits [N]."""
+    actuators, drive = add_element(root, "actuator", {}), layout.drive
+    for finger, axis in product(range(len(layout.contacts)), AXES):
+        limits = pushes if axis == AXES[0] else None
+        add_servo(
+            actuators, f"finger{finger}_{axis}", drive.stiffness_n_per_m, drive.damping_n_s_per_m,
+            limits,
         )  # fmt: skip
-    add_element(
-        body,
-        "inertial",
-        {"pos": (0.0, 0.0, 0.0), "mass": drive.tip_mass_kg,
-         "diaginertia": (0.4 * drive.tip_mass_kg * drive.radius_m**2,) * 3},
-    )  # fmt: skip
-    tip = {
-        "name": f"finger{finger}",
-        "type": "sphere",
-        "size": drive.radius_m,
-        "contype": 0,
-        "conaffinity": 1 << finger,
-        "friction": layout.rubbing,
-        "mass": 0.0,
-        "group": 0,
-        "rgba": (0.8, 0.25, 0.2, 1.0),
-    }
-    add_element(body, "geom", tip | contact)
-
-
-def add_servos(
-    actuators: Element, layout: Layout, finger: int, pushes: tuple[float, float] | None = None
-) -> None:
-    """Add the servos of a fingertip's slides; pushes along the normal may have limits [N]."""
-    drive = layout.drive
-    for axis in AXES:
-        name = f"finger{finger}_{axis}"
-        servo = {
-            "name": name,
-            "joint": name,
-            "kp": drive.stiffness_n_per_m,
-            "kv": drive.damping_n_s_per_m,
-            "ctrllimited": "false",
-            "forcelimited": "false",
-        }
-        if axis == "normal" and pushes is not None:
-            servo |= {"forcelimited": "true", "forcerange": pushes}
-        add_element(actuators, "position", servo)
 
 
 def _keyframes(root: Element, layout: Layout) -> None:
@@ -220,7 +173,7 @@ def _keyframes(root: Element, layout: Layout) -> None:
     normal force allows.
     """
     fingers = len(layout.contacts)
-    home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(3 * fingers)])
+    home = np.concatenate([HOME, np.zeros(3 * fingers)])
     away = home.copy()
     away[7:] = to_digits(np.einsum("kij,ki->kj", layout.frames, layout.approach)).ravel()
     push = layout.squeeze / layout.drive.stiffness_n_per_m

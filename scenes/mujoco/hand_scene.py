@@ -27,7 +27,6 @@ the motors cannot, and joints move by micrometres here.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -43,9 +42,9 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.chains_mjcf import Chains, add_hand
-from scenes.mujoco.closure_scene import Scene, add_object, opened
+from scenes.mujoco.closure_scene import Scene, opened
 from scenes.mujoco.layout import SQUEEZE, Layout, arrange
-from scenes.mujoco.mjcf_text import as_texts, document
+from scenes.mujoco.mjcf_text import document
 from scenes.settings import FingerSettings, PhysicsSettings
 
 TOUCH = 3e-6
@@ -198,34 +197,27 @@ def build_hand_scene(
     layout = hand_layout(hand, body, reach, friction, down)
     x, y, z = layout.gravity.tolist()
     used = replace(given, gravity=(x, y, z))
-    return HandScene(hand_text(layout, used), layout, used, "pads")
+    return HandScene(hand_text(layout, used), layout, used)
 
 
 def limited(scene: HandScene, limits: Array, friction: float) -> HandScene:
     """Return a scene with other torque limits and friction, but the same stiffness and commands."""
     motors = replace(scene.layout.motors, limits=limits)
     layout = replace(scene.layout, motors=motors, friction=friction)
-    return HandScene(hand_text(layout, scene.physics), layout, scene.physics, "pads")
+    return HandScene(hand_text(layout, scene.physics), layout, scene.physics)
 
 
 def hand_text(layout: HandLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a hand's layout; equal layouts give equal texts."""
-    root, world = opened(layout, physics, SCALED)
-    contact = as_texts(physics.contact())
-    add_object(world, layout, contact, weightless=bool(layout.gravity.any()))
-    tips = tuple(_tip(layout, number, contact) for number in range(len(layout.hand.fingers)))
-    chains = Chains(
-        layout.hand, layout.joints, layout.armature_kg_m2, tips, weighs=bool(layout.gravity.any())
-    )
+    weighs = bool(layout.gravity.any())
+    root, world = opened(layout, physics, SCALED, weightless=weighs)
+    touching = {"friction": layout.rubbing, **physics.contact()}
+    tips = [touching] * len(layout.hand.fingers)
+    for contact, finger in enumerate(layout.used_fingers):
+        tips[finger] = touching | {"conaffinity": layout.touch_bits(contact)}
+    chains = Chains(layout.hand, layout.joints, layout.armature_kg_m2, tuple(tips), weighs=weighs)
     add_hand(
         root, world, layout.palm_pose, chains, layout.motors.limits.tolist(),
         layout.servo_n_m_per_rad, layout.damping_n_m_s_per_rad,
     )  # fmt: skip
     return document(root)
-
-
-def _tip(layout: HandLayout, finger: int, contact: Mapping[str, object]) -> Mapping[str, object]:
-    """Return what a fingertip touches: the pad at its contact, if it has one."""
-    touching = [place for place, used in enumerate(layout.used_fingers) if used == finger]
-    pads = {"conaffinity": 1 << touching[0]} if touching else {}
-    return {"friction": layout.rubbing, **contact, **pads}

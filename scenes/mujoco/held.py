@@ -24,6 +24,7 @@ from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
+from scenes.mujoco.scene_parts import TOUCH
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import HeldSettings
 
@@ -53,9 +54,6 @@ def hinged(angles: Array) -> Array:
     return turn
 
 
-TOUCH = 1e-6
-"""Depth of fingertips in their faces at the start, in object radii. Meshes are stored in single
-precision by the simulator, and a fingertip that does not touch yet would arrive with speed."""
 ISOTROPIC = 1e-9
 """Relative difference of a spring's stiffnesses that counts as none."""
 
@@ -74,8 +72,9 @@ class HeldLayout:
     vertices: Array
     """Object mesh about its centre of mass, (n, 3) [m]."""
     triangles: Indices
-    solids: tuple[Array, ...]
-    """Corners of each convex solid that fingertips can touch, (n, 3) each [m]."""
+    solids: tuple[Array, ...] | None
+    """Corners of each convex solid that fingertips can touch, (n, 3) each [m]; None where they
+    touch the object's mesh itself."""
     radius_m: float
     object_kg: float
     inertia_kg_m2: Array

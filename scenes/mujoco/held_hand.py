@@ -42,7 +42,6 @@ from scenes.mujoco.chains_mjcf import Chains, add_hand
 from scenes.mujoco.hand_scene import mean_lever, touching
 from scenes.mujoco.held import HeldLayout, held_layout
 from scenes.mujoco.held_mjcf import (
-    FINGERTIPS,
     HeldScene,
     add_palm,
     add_start,
@@ -50,6 +49,7 @@ from scenes.mujoco.held_mjcf import (
     opened,
 )
 from scenes.mujoco.mjcf_text import document
+from scenes.mujoco.scene_parts import FINGERTIPS
 from scenes.settings import HeldSettings, PhysicsSettings
 
 EXECUTION = "an execution with the hand"

@@ -21,15 +21,24 @@ from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.held import HeldLayout, held_layout
-from scenes.mujoco.mjcf_text import Element, SceneText, add_element, document, quaternion
-from scenes.mujoco.physics import add_free_body, add_light, begin_scene
+from scenes.mujoco.mjcf_text import Element, SceneText, add_element, document
+from scenes.mujoco.scene_parts import (
+    EXACT,
+    FREE,
+    HOME,
+    ORIGIN,
+    TABLE,
+    add_fingertip,
+    add_object,
+    add_servo,
+    begin_scene,
+)
 from scenes.settings import HeldSettings, PhysicsSettings
 
 PALM_ARMATURE = 1e7
 """Armature of the palm's joints, relative to what the palm carries."""
 PALM_SHARE = 1e-3
 """Mass of the palm itself, relative to the object's: a moving body must have one."""
-FINGERTIPS, TABLE = 1, 2
 AWAY = 100.0
 """Distance of the table until it is needed, in object radii."""
 TRUE_MASS = (
@@ -58,10 +67,6 @@ CONTACT_GIVE = 2e-3
 contacts of light objects give the most, and their pushes would be off by as much."""
 LEAST_GIVE = 1e-4
 """Least part of a contact's impedance that gives: the simulator takes no less."""
-FLAGS = {"midphase": "disable", "island": "disable"}
-"""MuJoCo's search for pairs within two bodies misses contacts that are less deep than a
-ten-thousandth of the object, as all are here: objects on tables would fall, touch, and chatter. Its
-search for parts that do not touch each other costs time, and finds one part."""
 PALM = ("x", "y", "z", "about_x", "about_y", "about_z")
 """Endings of the names of the palm's slides and hinges, in the order of its joints."""
 
@@ -143,12 +148,14 @@ def build_held_scene(
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a held object; equal layouts give equal texts."""
     root, world = opened(layout, physics)
-    palm = add_palm(world, layout)
-    for finger in range(len(layout.contacts)):
-        _finger(palm, layout, physics, finger)
-    actuators = add_element(root, "actuator", {})
-    for finger in range(len(layout.contacts)):
-        _springs(actuators, layout, finger)
+    palm, actuators = add_palm(world, layout), add_element(root, "actuator", {})
+    for finger, pose in enumerate(zip(layout.tip_centers, layout.axes, strict=True)):
+        name, tip = f"finger{finger}", (layout.tip_mass_kg, float(layout.tip_radius_m[finger]))
+        touching = {"friction": (layout.friction[finger], 0.0, 0.0), **physics.contact()}
+        add_fingertip(palm, name, pose, SPRINGS, tip, touching)
+        springs = zip(SPRINGS, layout.stiffness[finger], layout.damping[finger], strict=True)
+        for spring, stiffness, damping in springs:
+            add_servo(actuators, f"{name}_{spring}", stiffness, damping)
     add_start(root, layout)
     return document(root)
 
@@ -157,19 +164,12 @@ def opened(layout: HeldLayout, physics: PhysicsSettings) -> tuple[Element, Eleme
     """Open a model with options, the object and the table; return it and its world."""
     mesh = (layout.vertices, layout.triangles)
     root, world = begin_scene(
-        layout.name, TRUE_MASS, physics, layout.radius_m, mesh, flags=FLAGS, solids=layout.solids
+        layout.name, TRUE_MASS, physics, layout.radius_m, mesh, flags=EXACT, solids=layout.solids
     )
-    add_light(world, layout.radius_m)
-    body, contact = add_free_body(world, layout.object_kg, layout.inertia_kg_m2), physics.contact()
-    smooth = {"conaffinity": 0, "friction": (0.0, 0.0, 0.0), "mass": 0.0, **contact}
-    hull = {"name": "object", "type": "mesh", "mesh": "object", "contype": TABLE, "group": 1,
-            "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
-    add_element(body, "geom", {**hull, **smooth})
-    for place in range(len(layout.solids)):
-        name = f"surface{place}"
-        solid = {"name": name, "type": "mesh", "mesh": name, "contype": FINGERTIPS, "group": 3,
-                 "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
-        add_element(body, "geom", {**solid, **smooth})
+    contact = physics.contact()
+    smooth = {"friction": (0.0, 0.0, 0.0), **contact}
+    mass = layout.object_kg, layout.inertia_kg_m2
+    add_object(world, mass, smooth, layout.solids, hull=TABLE)
     away = AWAY * layout.radius_m * np.array([0.0, 0.0, -1.0])
     table = add_element(world, "body", {"name": "table", "mocap": "true", "pos": away})
     plane = {"name": "table", "type": "plane", "size": (10.0 * layout.radius_m,) * 2 + (0.01,),
@@ -182,8 +182,7 @@ def opened(layout: HeldLayout, physics: PhysicsSettings) -> tuple[Element, Eleme
 def add_start(root: Element, layout: HeldLayout) -> None:
     """Add the keyframe of a squeezed object, with the commands that squeeze."""
     told = layout.commands(np.ones((1, 1)), None)[0]
-    home = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6)])
-    rest = np.concatenate([home, np.zeros(len(told))])
+    rest = np.concatenate([HOME, np.zeros(6 + len(told))])
     keys = add_element(root, "keyframe", {})
     add_element(keys, "key", {"name": "squeeze", "qpos": rest, "ctrl": told})
 
@@ -197,41 +196,13 @@ def palm_armature(layout: HeldLayout) -> Array:
 
 def add_palm(world: Element, layout: HeldLayout, name: str = "palm") -> Element:
     """Add the body that moves on slides and hinges, and return it."""
-    body = add_element(world, "body", {"name": name, "pos": (0.0, 0.0, 0.0), "gravcomp": 1.0})
+    body = add_element(world, "body", {"name": name, "pos": ORIGIN, "gravcomp": 1.0})
     for place, (way, armature) in enumerate(zip(PALM, palm_armature(layout), strict=True)):
         kind, axis = ("slide", "hinge")[place // 3], np.eye(3)[place % 3]
-        _joint(body, {"name": f"palm_{way}", "type": kind, "axis": axis, "armature": armature})
+        joint = {"name": f"palm_{way}", "type": kind, "axis": axis, "armature": armature}
+        add_element(body, "joint", FREE | joint)
     mass = PALM_SHARE * layout.object_kg
     inertia = (mass * layout.radius_m**2,) * 3
-    own = {"pos": (0.0, 0.0, 0.0), "mass": mass, "diaginertia": inertia}
+    own = {"pos": ORIGIN, "mass": mass, "diaginertia": inertia}
     add_element(body, "inertial", own)
     return body
-
-
-def _joint(body: Element, attributes: dict[str, object]) -> None:
-    plain = {"pos": (0.0, 0.0, 0.0), "limited": "false", "damping": 0.0, "stiffness": 0.0,
-             "armature": 0.0, "frictionloss": 0.0}  # fmt: skip
-    add_element(body, "joint", plain | attributes)
-
-
-def _finger(palm: Element, layout: HeldLayout, physics: PhysicsSettings, finger: int) -> None:
-    name, radius = f"finger{finger}", layout.tip_radius_m[finger]
-    pose = {"pos": layout.tip_centers[finger], "quat": quaternion(layout.axes[finger])}
-    body = add_element(palm, "body", {"name": name, "gravcomp": 1.0} | pose)
-    for spring, axis in zip(SPRINGS, np.eye(3), strict=True):
-        _joint(body, {"name": f"{name}_{spring}", "type": "slide", "axis": axis})
-    inertia = (0.4 * layout.tip_mass_kg * radius**2,) * 3
-    own = {"pos": (0.0, 0.0, 0.0), "mass": layout.tip_mass_kg, "diaginertia": inertia}
-    add_element(body, "inertial", own)
-    tip = {"name": name, "type": "sphere", "size": radius, "contype": 0,
-           "conaffinity": FINGERTIPS, "friction": (layout.friction[finger], 0.0, 0.0),
-           "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}  # fmt: skip
-    add_element(body, "geom", tip | physics.contact())
-
-
-def _springs(actuators: Element, layout: HeldLayout, finger: int) -> None:
-    for place, spring in enumerate(SPRINGS):
-        name = f"finger{finger}_{spring}"
-        own = {"kp": layout.stiffness[finger, place], "kv": layout.damping[finger, place]}
-        unlimited = {"ctrllimited": "false", "forcelimited": "false"}
-        add_element(actuators, "position", {"name": name, "joint": name} | own | unlimited)

@@ -26,7 +26,9 @@ from grasp_core.objects.on_faces import face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.settings import HARD, FingerSettings, Softness
+from scenes.mujoco.scene_parts import FINGERTIPS, TOUCH
+from scenes.mujoco.surface import touched_solids
+from scenes.settings import HARD, FingerSettings, Softness, Surface
 
 RESPONSE_TIME_S = 0.07
 """Square root of mass x grasp size / largest normal force [s]. It gives 1 kg for 10 N and 5 cm,
@@ -46,10 +48,10 @@ PAD_DEPTH = 0.1
 FLAT = 1e-6
 """Share of the largest moment of inertia that is added to all three. Coplanar contacts give moments
 at the very limit of what a body can have, and rounding must not pass that limit."""
-TOUCH = 1e-9
-"""Least depth of fingertips in their faces at the start, in grasp sizes: a ten-thousandth of the
-finer thresholds. At depth zero, rounding would decide which fingertips press in the first step, and
-the impact of the others one step later can tilt lightly held objects by 1e-4."""
+PAD_TOUCH = 1e-9
+"""Least depth of fingertips in pads at the start, in grasp sizes. At depth zero, rounding would
+decide which fingertips press in the first step, and the impact of the others one step later can
+tilt lightly held objects by 1e-4."""
 OPEN = -1e-6
 """Margin of closure below which contacts count as open without a proof. It is far beyond the errors
 of compiled code; the worst that could happen is a squeeze along the normals."""
@@ -104,6 +106,15 @@ class Layout(ByValue):
     approach: Array
     """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
     softness: Softness = HARD
+    on_pads: bool = True
+    """Whether each fingertip touches a pad at its contact, and not the object's own surface."""
+    solids: tuple[Array, ...] | None = ()
+    """Corners of each convex solid that fingertips touch, (n, 3) each [m]; None where they touch
+    the object's mesh itself."""
+
+    def touch_bits(self, finger: int) -> int:
+        """Return the bits of what a fingertip touches: the object's solids, or its own pad."""
+        return 1 << finger if self.on_pads else FINGERTIPS
 
     @property
     def rubbing(self) -> tuple[float, float, float]:
@@ -164,6 +175,7 @@ def arrange(
     friction: float,
     fingers: FingerSettings | None = None,
     softness: Softness = HARD,
+    surface: Surface | None = None,
 ) -> Layout:
     """Place object, fingertips and drives for a grasp.
 
@@ -181,6 +193,8 @@ def arrange(
     arms = to_digits(arms, body.radius)
     positions = arms + body.center_of_mass
     size = max(grasp_size(positions), LEAST_SIZE * body.radius)
+    on_pads = (body.patches is not None) if surface is None else surface == "pads"
+    touch = PAD_TOUCH * size if on_pads else TOUCH * body.radius
     largest = fingers.max_normal_force_n
     mass = largest * RESPONSE_TIME_S**2 / size
     return Layout(
@@ -199,15 +213,22 @@ def arrange(
             for face in (face_under(body, contact) for contact in contacts)
         ),
         friction=friction,
-        drive=_drive(body, positions, normals, fingers, size),
+        drive=_drive(body, positions, normals, fingers, size, touch),
         squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, softness),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
         softness=softness,
+        on_pads=on_pads,
+        solids=() if on_pads else touched_solids(body, arms, size),
     )
 
 
 def _drive(
-    body: Polyhedron, positions: Array, normals: Array, fingers: FingerSettings, size: float
+    body: Polyhedron,
+    positions: Array,
+    normals: Array,
+    fingers: FingerSettings,
+    size: float,
+    touch: float,
 ) -> FingerDrive:
     mass = fingers.fingertip_mass_kg or fingers.max_normal_force_n * RESPONSE_TIME_S**2 / size
     stiffness = fingers.stiffness_n_per_m or STIFFNESS * fingers.max_normal_force_n / size
@@ -224,7 +245,7 @@ def _drive(
         damping_n_s_per_m=2.0 * math.sqrt(stiffness * mass),
         max_normal_force_n=fingers.max_normal_force_n,
         rigid=fingers.drive == "rigid",
-        indentation_m=max(fingers.indentation, TOUCH) * size,
+        indentation_m=max(fingers.indentation * size, touch),
     )
 
 

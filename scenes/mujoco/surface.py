@@ -33,14 +33,14 @@ THIN = 1e-5
 """Width of a piece below which it is left out, in object radii; neighbours close the gap."""
 
 
-def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, ...]:
+def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, ...] | None:
     """Return the corners of each convex solid that fingertips may touch, (n, 3) each [m].
 
-    Takes `near` (k, 3) [m]; `reach` [m]. Gives corners from the centre of mass. A convex object is
-    its own only solid.
+    Takes `near` (k, 3) [m]; `reach` [m]. Gives corners from the centre of mass; None for a convex
+    object, which is such a solid itself.
     """
     if is_convex(body):
-        return (body.vertices - body.center_of_mass,)
+        return None
     triangles = body.vertices[body.triangles] - body.center_of_mass
     middles = triangles.mean(axis=1)
     widest = float(np.linalg.norm(triangles - middles[:, None], axis=2).max())

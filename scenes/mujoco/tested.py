@@ -35,15 +35,22 @@ from scenes.mujoco.chains_mjcf import (
     Chains,
     add_exclusions,
     add_fingers,
-    add_servo,
     hand_inertials,
     placed,
 )
-from scenes.mujoco.closure_scene import add_finger, add_servos
+from scenes.mujoco.closure_scene import AXES, add_servos
 from scenes.mujoco.hand_scene import hand_layout
 from scenes.mujoco.layout import SQUEEZE, arrange
-from scenes.mujoco.mjcf_text import Element, add_element, as_texts, document, quaternion
-from scenes.mujoco.physics import add_free_body, begin_scene
+from scenes.mujoco.mjcf_text import Element, add_element, document, quaternion
+from scenes.mujoco.scene_parts import (
+    EXACT,
+    FINGERTIPS,
+    HOME,
+    add_fingertip,
+    add_object,
+    add_servo,
+    begin_scene,
+)
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import FingerSettings, PhysicsSettings
 
@@ -51,7 +58,6 @@ COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "
     "Servos stand open at the start, and are told to close and to squeeze."
 )
-FINGERS = (1 << 20) - 1
 ORIGIN = np.zeros((1, 3))
 TIP_MASS_KG = 0.05
 """Mass of a fingertip with the part of its finger that moves with it."""
@@ -100,27 +106,19 @@ def begun(
 ) -> tuple[Element, Element]:  # fmt: skip
     """Begin a scene of an object with its surface: return its root and its world."""
     mesh = (to_digits(body.vertices - body.center_of_mass), body.triangles)
-    solids = [to_digits(each) for each in touched_solids(body, ORIGIN, 2.0 * body.radius)]
-    flags = {"midphase": "disable"}
+    found = touched_solids(body, ORIGIN, 2.0 * body.radius)
+    solids = None if found is None else [to_digits(each) for each in found]
     root, world = begin_scene(
-        body.name, COMMENT, physics, body.radius, mesh, flags=flags, solids=solids
+        body.name, COMMENT, physics, body.radius, mesh, flags=EXACT, solids=solids
     )
-    rubbing = as_texts({"friction": physics.rubbing(friction), **physics.contact()})
-    moving = add_free_body(world, *mass)
-    seen = {"name": "object", "type": "mesh", "mesh": "object", "contype": 0, "conaffinity": 0,
-            "mass": 0.0, "group": 1, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
-    add_element(moving, "geom", seen)
-    everything = {"contype": FINGERS | 1 << 20, "conaffinity": 0, "mass": 0.0, "group": 3,
-                  "rgba": (0.9, 0.6, 0.2, 0.3)}  # fmt: skip
-    for place in range(len(solids)):
-        named = {"name": f"surface{place}", "type": "mesh", "mesh": f"surface{place}"}
-        add_element(moving, "geom", named | everything | rubbing)
+    touching = {"friction": physics.rubbing(friction), **physics.contact()}
+    add_object(world, mass, touching, solids, bits=FINGERTIPS | SHAPES)
     return root, world
 
 
 def ended(root: Element, opened: Array, told: int = 0) -> str:
     """Add the keyframe `open` and write the scene."""
-    place = np.concatenate([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], opened])
+    place = np.concatenate([HOME, opened])
     key = {"name": "open", "qpos": place, "ctrl": opened[told:]}
     moved = {"mpos": opened[:3], "mquat": opened[3:told]} if told else {}
     add_element(add_element(root, "keyframe", {}), "key", key | moved)
@@ -139,10 +137,11 @@ def fingertip_scene(
     drive = replace(base.drive, tip_mass_kg=TIP_MASS_KG, damping_n_s_per_m=damping, rigid=False)
     layout = replace(base, drive=drive)
     root, world = begun(body, friction, (mass, inertia), physics)
-    contact, actuators = as_texts(physics.contact()), add_element(root, "actuator", {})
-    for finger in range(len(layout.contacts)):
-        add_finger(world, layout, contact, finger, lifted=False)
-        add_servos(actuators, layout, finger)
+    touching = {"friction": layout.rubbing, **physics.contact()}
+    for finger, pose in enumerate(zip(layout.tip_centers, layout.frames, strict=True)):
+        tip = TIP_MASS_KG, drive.radius_m
+        add_fingertip(world, f"finger{finger}", pose, AXES, tip, touching, lifted=False)
+    add_servos(root, layout)
     away = min(OPEN_M, OPEN_SIZES * layout.grasp_size_m)
     opened = np.tile([-away, 0.0, 0.0], len(layout.contacts))
     squeeze = layout.squeeze / SQUEEZE
@@ -235,7 +234,7 @@ def hand_scene(
     palm = add_element(hung, "body", {"name": PALM, **placed(at[:3, 3], at[:3, :3])})
     if free:
         add_element(palm, "inertial", weights[PALM])
-    touching = as_texts({"friction": physics.rubbing(friction)} | physics.contact())
+    touching = {"friction": physics.rubbing(friction), **physics.contact()}
     tips = tuple(_tip(root, each, touching) for each in hand.fingers)
     chains = Chains(
         replace(hand, fingers=tuple(map(_without_cover, hand.fingers))), np.zeros(len(hand.joints)),
@@ -248,7 +247,7 @@ def hand_scene(
     for number, joint in enumerate(hand.joints):  # commands on a weld end where joints do
         add_servo(
             actuators, joint.name, servos.stiffness_n_m_per_rad, servos.damping(physics.timestep),
-            None if limits is None else float(limits[number]),
+            None if limits is None else (-float(limits[number]), float(limits[number])),
             (joint.lowest, joint.highest) if free else None,
         )  # fmt: skip
     opened, shut, squeezing = np.hstack([roots, to_digits(postures.joints)])
@@ -284,7 +283,7 @@ def _welded(root: Element, world: Element, weld: Weld) -> Element:
     return body
 
 
-def _tip(root: Element, finger: HandFinger, touching: dict[str, str]) -> dict[str, object]:
+def _tip(root: Element, finger: HandFinger, touching: Mapping[str, object]) -> dict[str, object]:
     """Return what a fingertip is: a solid with its corners, a ball, or nothing under a shape."""
     corners = finger.tip.corners
     if corners is None:

@@ -477,7 +477,7 @@ def noisy_case(
         object_kg=case.mass * planned.layout.object_kg,
         inertia_kg_m2=case.mass * planned.layout.inertia_kg_m2,
     )
-    text = to_text(layout, planned.physics, planned.surface)
+    text = to_text(layout, planned.physics)
     scene = replace(planned, xml=text, layout=layout)
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, scene.layout.squeeze_forces, case.friction)

@@ -52,8 +52,9 @@ from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held import TOUCH, HeldLayout
+from scenes.mujoco.held import HeldLayout
 from scenes.mujoco.held_mjcf import AWAY, SAMPLE_S, HeldScene, build_held_scene, held_physics
+from scenes.mujoco.scene_parts import TOUCH
 from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
 from sim_validate.engine.gate import DEPTH, Check, Gate, angles, near, sized, touch_checks
 from sim_validate.execution import paths

@@ -25,8 +25,9 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
-from scenes.mujoco.held import TOUCH, HeldLayout, rotations
+from scenes.mujoco.held import HeldLayout, rotations
 from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.scene_parts import TOUCH
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Pose, Table, joined
 from sim_validate.execution.verdict import Skipped

@@ -19,7 +19,7 @@ from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import Friction, OrInfinity, Quantity
 from grasp_core.provenance import versions
 from grasp_core.solvers.ties import first_best
-from scenes.mujoco.physics import PhysicsSettings
+from scenes.settings import PhysicsSettings
 from sim_validate.kit.files import AboutObject
 from sim_validate.settings import ExecutionSettings, TrialKind
 

@@ -11,7 +11,8 @@ import grasp_core as gc
 import scenes
 from grasp_core.forces.contact_forces import even_forces
 from scenes.mujoco.held import gravity_of
-from scenes.mujoco.held_mjcf import FINGERTIPS, PALM, TABLE, held_physics, palm_armature
+from scenes.mujoco.held_mjcf import PALM, held_physics, palm_armature
+from scenes.mujoco.scene_parts import FINGERTIPS, TABLE
 
 OBJECTS = ("dodecahedron", "l-bracket")
 MASS = 0.4
@@ -59,8 +60,8 @@ def test_the_object_has_its_true_mass_and_inertia(built):
 
 def test_what_touches_what(built):
     """Fingertips touch the surface and the table the hull; nothing else touches."""
-    _, grip, _, model = built
-    pairs = set()
+    _, grip, scene, model = built
+    pairs, met = set(), "object" if scene.layout.solids is None else "surface"
     for one in range(model.ngeom):
         for other in range(one + 1, model.ngeom):
             if (model.geom_contype[one] & model.geom_conaffinity[other]) or (
@@ -68,7 +69,7 @@ def test_what_touches_what(built):
             ):
                 kinds = (model.geom(one).name, model.geom(other).name)
                 pairs.add(tuple(sorted(kind.rstrip("0123456789") for kind in kinds)))
-    assert pairs == {("finger", "surface"), ("object", "table")}
+    assert pairs == {("finger", met), ("object", "table")}
     assert FINGERTIPS & TABLE == 0
     for finger, friction in enumerate(grip.friction):
         assert model.geom(f"finger{finger}").friction[0] == friction

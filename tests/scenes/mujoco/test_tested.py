@@ -79,7 +79,7 @@ def test_a_hand_starts_open_and_all_its_links_can_touch_the_object():
     mujoco.mj_forward(model, data)
     met = model.geom_bodyid[data.contact.geom]
     assert not (met == model.body("object").id).any()
-    solid = model.geom("surface0").id
+    solid = model.geom("object").id
     touchable = [
         geom for geom in range(model.ngeom)
         if geom != solid and model.geom_conaffinity[geom] & model.geom_contype[solid]

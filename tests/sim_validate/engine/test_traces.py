@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import scenes
-from scenes.mujoco.layout import TOUCH
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine.bench import Health, Motion
 from sim_validate.engine.traces import (
@@ -76,7 +75,7 @@ def test_slips_and_gaps_are_those_of_the_contact_frames(layout):
     slides = np.zeros((4, 3))
     slides[0, 0], slides[1, 1], slides[2, 2] = -2e-5, 3e-5, 4e-5
     (found,) = traces([motion([pose(), pose(slides=slides)])], layout, [1])
-    touching = -TOUCH * layout.grasp_size_m
+    touching = -layout.drive.indentation_m
     np.testing.assert_allclose(found.gaps_m[0] - touching, [2e-5, 0.0, 0.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(found.slips_m[0], [0.0, 3e-5, 4e-5, 0.0], atol=1e-15)
     touched = layout.contacts[3] - touching * layout.frames[3, :, 0]
@@ -90,7 +89,7 @@ def test_fingers_that_move_with_the_object_do_not_slip(layout):
     slides = np.einsum("kij,ki->kj", layout.frames, there - layout.tip_centers)
     (found,) = traces([motion([pose(), pose(shift, R, slides, scale=1.1)])], layout, [1])
     assert found.slips_m.max() < 1e-14
-    assert np.abs(found.gaps_m + TOUCH * layout.grasp_size_m).max() < 1e-14
+    assert np.abs(found.gaps_m + layout.drive.indentation_m).max() < 1e-14
 
 
 def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):
@@ -104,7 +103,7 @@ def test_rigid_fingers_have_no_slides(layout):
     rigid = replace(layout, drive=replace(layout.drive, rigid=True))
     away = 1e-4 * layout.frames[0, :, 0]
     (found,) = traces([motion([pose()[:7], pose(away)[:7]])], rigid, [1])
-    assert found.gaps_m[0, 0] == pytest.approx(1e-4)
+    assert found.gaps_m[0, 0] == pytest.approx(1e-4 - layout.drive.indentation_m)
 
 
 def any_poses(count):
