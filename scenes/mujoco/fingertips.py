@@ -14,7 +14,12 @@ from itertools import combinations
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.objects.on_faces import ON_FACE, face_under, nearest_on_surface
+from grasp_core.objects.on_faces import (
+    ON_FACE,
+    face_under,
+    nearest_on_surface,
+    nearest_on_triangles,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 
@@ -52,10 +57,23 @@ def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -
         if _largest_apart(positions[[i, j]], normals[[i, j]]) < least
     ]
     found += [
-        f"fingertip {i} of radius {radius:.3g} m meets the object beside its contact"
+        f"fingertip {i} of radius {radius:.3g} m meets "
+        f"{_met(body, positions[i], normals[i], radius)} beside its contact"
         for i in np.flatnonzero(_largest_clear(body, positions, normals, radius) < least)
     ]
     return tuple(found)
+
+
+def _met(body: Polyhedron, position: Array, normal: Array, radius: float) -> str:
+    """Name the face that is nearest to the centre of a fingertip which the object overlaps."""
+    center = position - radius * normal
+    corners = body.vertices[body.triangles]
+    nearest = nearest_on_triangles(corners, center)
+    at = int(np.linalg.norm(nearest - center, axis=1).argmin())
+    inward = np.cross(corners[at, 2] - corners[at, 0], corners[at, 1] - corners[at, 0])
+    face = face_under(body, Contact(nearest[at], inward / np.linalg.norm(inward)))
+    places = [place for place, each in enumerate(body.faces) if each is face]
+    return f"face {places[0]}" if places else "the object"
 
 
 def _largest_apart(positions: Array, normals: Array) -> float:

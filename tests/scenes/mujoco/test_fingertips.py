@@ -50,6 +50,17 @@ def test_near_an_inner_corner_the_radius_is_the_distance_to_it():
         assert radius == pytest.approx(expected, rel=1e-5)
 
 
+def test_a_clash_names_the_face_behind_the_inner_corner():
+    body = scenes.example_object("l-bracket")
+    inner, point, normal = _inner_corner(body)
+    at = point + 0.05 * body.radius * inner
+    (found,) = clashes(body, at[None], normal[None], 0.1 * body.radius)
+    number = int(found.split("meets face ")[1].split()[0])
+    behind = body.faces[number]
+    assert abs(behind.normal @ normal) < 1e-9
+    assert behind.normal @ (point - behind.centroid) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_fingertip_that_shrinks_too_often_is_shown_to_be_clear_nowhere(monkeypatch):
     body = scenes.example_object("l-bracket")
     inner, point, normal = _inner_corner(body)
@@ -57,7 +68,7 @@ def test_a_fingertip_that_shrinks_too_often_is_shown_to_be_clear_nowhere(monkeyp
     assert fitting_radius(body, at, normal[None]) > 0.04 * body.radius
     monkeypatch.setattr(fingertips, "MAX_SHRINKING", 1)
     assert fitting_radius(body, at, normal[None]) == pytest.approx(1e-3 * body.radius)
-    assert "meets the object" in clashes(body, at, normal[None], radius)[0]
+    assert "meets face" in clashes(body, at, normal[None], radius)[0]
 
 
 def _inner_corner(body):
