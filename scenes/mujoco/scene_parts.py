@@ -28,10 +28,11 @@ EXACT = {"midphase": "disable", "island": "disable"}
 """Flags of scenes in which fingertips touch the object's own surface. MuJoCo's search for pairs
 within two bodies misses contacts that are less deep than a ten-thousandth of the object, as all are
 here. Its search for parts that do not touch each other costs time, and finds one part."""
-TOUCH = 1e-6
-"""Depth of fingertips in the object's surface at the start, in object radii. Meshes are stored in
-single precision by the simulator, and a fingertip that does not touch yet would arrive with
-speed."""
+TOUCH = 1e-7
+"""Depth of fingertips in the object's surface at the start, in object radii. The simulator stores
+meshes in single precision, which moves surfaces by up to 3e-8. A fingertip that does not touch yet
+would arrive with speed, and one that is much deeper is pushed out, which turns objects that two
+others hold and it hardly presses."""
 ORIGIN = (0.0, 0.0, 0.0)
 TOUCHED = {"conaffinity": 0, "mass": 0.0, "group": 3, "rgba": (0.9, 0.6, 0.2, 0.3)}
 """Attributes of a solid that fingertips touch; viewers do not show its group unless asked to."""

@@ -11,7 +11,7 @@ from scenes.mujoco.scene_parts import TOUCH
 from scenes.settings import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 
 OBJECTS = ("wedge", "icosahedron", "screwdriver")
-SINGLE = 2e-7
+SINGLE = 4e-8
 """Largest error of a mesh's coordinate, which the simulator holds in single precision, in radii."""
 
 
