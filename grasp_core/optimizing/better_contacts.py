@@ -24,7 +24,7 @@ from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.families.free import closed_at, of_general_type
-from grasp_core.families.placing import point_region, regions_of
+from grasp_core.families.placing import point_regions
 from grasp_core.geometry.polygons import SAME_CORNER
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
@@ -182,7 +182,8 @@ def certified(
         return None
     a, b, c, d = (piece.face for piece in pieces)
     cones = tuple(ForceCone(piece.normal, math.atan(friction)) for piece in pieces)
-    regions = regions_of(point_region, pieces, cones, placement)
-    candidate = Candidate(name, (a, b, c, d), "regulus", pieces, cones, placement, regions)
+    candidate = Candidate(
+        name, (a, b, c, d), "regulus", pieces, cones, placement, point_regions(placement)
+    )
     (found,) = certify_each([candidate], friction)
     return None if found is None else to_grasps(body, friction, [found])[0]

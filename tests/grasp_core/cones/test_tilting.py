@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -8,8 +9,7 @@ import grasp_core as gc
 from grasp_core.cones import tilting
 from grasp_core.cones.spanning import cones_positively_span, span_angle, span_sines
 from grasp_core.cones.tilting import tilted_cones, toward, widened
-from grasp_core.families.concurrent import BEFORE, BEHIND, cone_footprint, place_on_sides
-from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.families.placing import BEFORE, BEHIND, CONSTRUCTIONS, regions_of
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
@@ -82,14 +82,15 @@ def test_a_bore_is_held_from_inside_with_the_focus_behind_the_fingers():
             for n, s in zip(sides, (1, 1, -1, -1), strict=True)]  # fmt: skip
     found = widened(np.array([axes]), sides[None], np.full((1, 4), math.atan(friction)))
     cones = [ForceCone(axis, 0.99 * float(found.half_angles[0])) for axis in found.axes[0]]
-    assert isinstance(place_on_sides(chosen, cones, BEFORE, least=1e-3), NoPlacement)
-    placed = place_on_sides(chosen, cones, BEHIND, least=1e-3)
-    assert isinstance(placed, Placement)
-    regions = [cone_footprint(p, c, placed.foci[0], at)
-               for p, c, at in zip(chosen, cones, placed.positions, strict=True)]  # fmt: skip
+    before, behind = (
+        replace(CONSTRUCTIONS["concurrent"], patterns=sides[None]).place(chosen, cones, 1e-3)
+        for sides in (BEFORE, BEHIND)
+    )
+    assert before is None
+    (regions,) = regions_of("cone", [(chosen, cones, behind)])
     rng = np.random.default_rng(0)
     for _ in range(60):
-        points = [rng.dirichlet(np.full(len(r), 0.3)) @ r for r in regions]
+        points = [rng.dirichlet(np.full(len(r.polygon), 0.3)) @ r.polygon for r in regions]
         assert gc.force_closure(points, sides, friction).closed
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.families.regulus import LEAST_DEPTH
+from grasp_core.families.regulus_kernel import LEAST_DEPTH
 from sim_validate.closure.controls import Control, negative_controls, try_control
 from sim_validate.engine import schedules
 from sim_validate.engine.setup import Agenda, Setup
