@@ -52,10 +52,10 @@ from grasp_core.families.discs_kernel import (
     TURNS,
     Program,
     balance,
-    bounded,
     edges_of,
     empty_rows,
     facets,
+    largest_last,
     room_for_program,
 )
 from grasp_core.families.placements import Attempts, Corners, FaceTable, Footprints, Placed
@@ -70,7 +70,7 @@ FEWEST = 3
 """Fewest corners of a polygon."""
 
 
-@loop()
+@loop("numpy")
 def reach_limit(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> float:
     """Bound the discs by (5) if the focus is before or behind all fingers; else infinity."""
     if abs(sides.sum()) < FINGERS:
@@ -81,7 +81,7 @@ def reach_limit(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> f
     return (before if sides[0] > 0.0 else behind) * np.tan(attempts.half_angles[a])
 
 
-@loop()
+@loop("numpy")
 def concurrent_program(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> Program:
     """Build the program of one attempt for given sides (4) of its fingers."""
     quadruple, each = attempts.faces[a], len(TURNS)
@@ -102,7 +102,7 @@ def concurrent_program(faces: FaceTable, attempts: Attempts, a: int, sides: Arra
     return program
 
 
-@loop()
+@loop("numpy")
 def _aim_rows(
     faces: FaceTable,
     attempts: Attempts,
@@ -127,7 +127,7 @@ def _aim_rows(
         b[m] = -dotted(G[m], o) - float(faces.depths[face]) * abs(dotted(G[m], n))
 
 
-@loop()
+@loop("numpy")
 def take_concurrent(
     faces: FaceTable, attempts: Attempts, a: int, sides: Array, x: Array, placed: Placed
 ) -> None:
@@ -225,4 +225,4 @@ def _inscribed_radius(polygon: Array, count: int) -> float:
             return np.inf
         rows.At[0, k], rows.At[1, k], rows.At[2, k] = v / length, -u / length, 1.0
         rows.b[k] = rows.At[0, k] * polygon[k, 0] + rows.At[1, k] * polygon[k, 1]
-    return bounded(rows, -np.inf)
+    return largest_last(rows, -np.inf)

@@ -21,8 +21,7 @@ from grasp_core.compiled import loop
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, FaceTable
 from grasp_core.geometry.vectors_kernel import across, balancing_weights, dotted
-from grasp_core.solvers.lp import RESIDUAL
-from grasp_core.solvers.lp_kernel import LOST, OPTIMAL, Rows, Vertex, proved_bound, solve
+from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
 from grasp_core.solvers.nearest_point_kernel import solve as solve_nearest
 from grasp_core.solvers.ties import FEASIBLE, FOUND, SAME_VALUE
 from grasp_core.values import FINGERS
@@ -34,8 +33,6 @@ SPARE = FINGERS + 1
 ACCURACY = 1e-12
 """Error up to which multipliers give the objective: even if a focus is a thousand object radii
 away, the bound changes by less than the accuracy of a program's answer."""
-SINGULAR = 1e-13
-"""Pivot, in a matrix of order one, below which a vertex is left to other solvers."""
 
 
 class Program(NamedTuple):
@@ -53,13 +50,13 @@ class Program(NamedTuple):
     """By how much the variable `radii` exceeds the common radius; the later ones equal it."""
 
 
-@loop()
+@loop("numpy")
 def room_for_program(common: int, rows: int, radii: int, n: int, excess: float) -> Program:
     """Make a program of zeros."""
     return Program(np.zeros((rows + SPARE, n)), np.zeros(rows + SPARE), common, radii, excess)
 
 
-@loop()
+@loop("numpy")
 def edges_of(faces: FaceTable, quadruple: Indices) -> int:
     """Count the edges of four faces."""
     count = 0
@@ -68,7 +65,7 @@ def edges_of(faces: FaceTable, quadruple: Indices) -> int:
     return count
 
 
-@loop()
+@loop("numpy")
 def facets(axis: Array, half_angle: float, T: Array) -> Array:
     """Compute the normals g of `pyramid_facets` in `cones.pyramids`, for the usual pyramid."""
     first, second = across(axis, T)
@@ -81,7 +78,7 @@ def facets(axis: Array, half_angle: float, T: Array) -> Array:
     return g
 
 
-@loop()
+@loop("numpy")
 def balance(ways: Array, normals: Array, forces: Array) -> None:
     """Scale four positively spanning directions to forces whose sum is zero, (4, 3).
 
@@ -96,13 +93,13 @@ def balance(ways: Array, normals: Array, forces: Array) -> None:
             forces[finger, j] = weights[finger] * ways[finger, j] / pushes
 
 
-@loop()
+@loop("numpy")
 def empty_rows(n: int, count: int) -> Rows:
     """Make rows of zeros for a program of n variables."""
     return Rows(np.zeros((n, count)), np.empty(count), np.empty(count), 0)
 
 
-@loop()
+@loop("numpy")
 def of_equal_radii(program: Program) -> Rows:
     """Write a program over one common radius, the last variable."""
     A, b, count, radii, excess = program
@@ -116,24 +113,31 @@ def of_equal_radii(program: Program) -> Rows:
     return rows
 
 
-@loop()
-def bounded(rows: Rows, least: float) -> float:
-    """Compute an upper bound on the last variable; above `least` it is the tightest one."""
-    c, vertex = np.zeros(len(rows.At)), vertex_of(len(rows.At))
+@loop("numpy")
+def largest_last(rows: Rows, least: float) -> float:
+    """Bound the last variable from above, see `bounded`."""
+    c = np.zeros(len(rows.At))
     c[-1] = 1.0
+    return bounded(c, rows, least)
+
+
+@loop("numpy")
+def bounded(c: Array, rows: Rows, least: float) -> float:
+    """Compute an upper bound on c.x; above `least` it is the tightest one."""
+    vertex = vertex_of(len(c))
     measure(rows)
     status, _ = solve(c, rows, least, vertex)
     # checked here: a wrong answer of the solver costs tightness, never correctness
     return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
 
 
-@loop()
+@loop("numpy")
 def vertex_of(n: int) -> Vertex:
     """Make an empty vertex of a program with n variables."""
     return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
 
 
-@loop()
+@loop("numpy")
 def measure(rows: Rows) -> None:
     """Compute the norm of each row of a linear program; the solver divides violations by it."""
     rows.norms[:] = 0.0
@@ -147,11 +151,9 @@ def measure(rows: Rows) -> None:
 @loop("numpy")
 def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]:
     """Find the largest four equal discs, then enlarge each; return the end and the radius."""
-    first = bounded(of_equal_radii(program), least)
+    first = largest_last(of_equal_radii(program), least)
     if first < least:
         return NONE, first
-    if not first < np.inf:
-        return LEFT, first
     A, b, n = program.A, program.b, len(x)
     count, c = len(b) - SPARE, np.zeros(n)
     # the sum of the radii, where the smallest one stays nearly as large
@@ -160,109 +162,21 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
         c[r] = 1.0
         A[count + finger, r], b[count + finger] = -1.0, -first * (1.0 - KEPT)
         A[-1, r] = -1.0
-    status, second = optimum(c, A[:-1], b[:-1], x)
-    if status != PLACED:
-        return LEFT, first
-    b[-1] = -(second - SAME_VALUE * (1.0 + abs(second)))
-    return (PLACED if _nearest(A, b, x) else LEFT), first
-
-
-@loop("numpy")
-def optimum(c: Array, A: Array, b: Array, x: Array) -> tuple[int, float]:
-    """Maximise c.x subject to A x <= b, with the checks of `solvers.lp`.
-
-    Gives `PLACED` and the optimum, or `LEFT`.
-    """
-    count, n = A.shape
-    rows, vertex = empty_rows(n, count), vertex_of(n)
-    for k in range(count):
+    rows = empty_rows(n, len(b) - 1)
+    for k in range(len(b) - 1):
         rows.b[k] = b[k]
         for j in range(n):
             rows.At[j, k] = A[k, j]
-    measure(rows)
-    status, _ = solve(c, rows, -np.inf, vertex)
-    if status != OPTIMAL or not _at_vertex(c, A, b, vertex, x):
-        return LEFT, 0.0
-    return _checked(c, A, b, vertex.basis, x, vertex.y)
-
-
-@loop("numpy")
-def _at_vertex(c: Array, A: Array, b: Array, vertex: Vertex, x: Array) -> bool:
-    """Solve for the point and the multipliers of a basis; return False if it leans on the box."""
-    n, basis, y = len(x), vertex.basis, vertex.y
-    corner, turned = np.empty((n, n)), np.empty((n, n))
-    for j in range(n):
-        if basis[j] >= len(b):  # a side of the box in which the search begins
-            return False
-        x[j], y[j] = b[basis[j]], c[j]
-        for i in range(n):
-            corner[j, i] = turned[i, j] = A[basis[j], i]
-    return _solved(corner, x) and _solved(turned, y)
-
-
-@loop("numpy")
-def _checked(c: Array, A: Array, b: Array, basis: Indices, x: Array, y: Array) -> tuple[int, float]:
-    """Return `PLACED` and the value of an optimum if its residuals prove it, else `LEFT`."""
-    count, n = A.shape
-    scale, value, bound, worst, every = 1.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(n):
-        scale = max(scale, 1.0 + abs(x[j]))
-        value += c[j] * x[j]
-        bound += y[j] * b[basis[j]]
-    for k in range(count):
-        excess = _dot(A[k], x) - b[k]
-        worst, every = max(worst, excess), every + excess
-    for j in range(n):
-        left = c[j]
-        for i in range(n):
-            left -= y[i] * A[basis[i], j]
-        worst, every = max(worst, max(abs(left), -y[j])), every + left
-    worst, every = max(worst, abs(bound - value)), every + bound + value
-    # a sum shows whether any of them is not a number, which a comparison may not
-    proved = worst <= RESIDUAL * scale and abs(every) < np.inf
-    return (PLACED if proved else LEFT), value
-
-
-@loop("numpy")
-def _solved(matrix: Array, x: Array) -> bool:
-    """Solve matrix @ y = x in place by elimination; return False if the matrix is near singular."""
-    n = len(x)
-    for i in range(n):
-        _exchange(matrix, x, i)
-        if not abs(matrix[i, i]) > SINGULAR:
-            return False
-        for k in range(i + 1, n):
-            share = matrix[k, i] / matrix[i, i]
-            if share != 0.0:
-                x[k] -= share * x[i]
-                for j in range(i + 1, n):
-                    matrix[k, j] -= share * matrix[i, j]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            x[i] -= matrix[i, j] * x[j]
-        x[i] /= matrix[i, i]
-    return True
-
-
-@loop("numpy")
-def _exchange(matrix: Array, x: Array, i: int) -> None:
-    """Exchange row i for the row below with the largest entry in column i."""
-    n, pivot = len(x), i
-    for k in range(i + 1, n):
-        if abs(matrix[k, i]) > abs(matrix[pivot, i]):
-            pivot = k
-    if pivot != i:
-        x[i], x[pivot] = x[pivot], x[i]
-        for j in range(i, n):
-            matrix[i, j], matrix[pivot, j] = matrix[pivot, j], matrix[i, j]
+    second = bounded(c, rows, -np.inf)
+    b[-1] = -(second - SAME_VALUE * (1.0 + abs(second)))
+    # that there is such a point shows that both bounds are reached
+    proved = second < np.inf and _nearest(A, b, x)
+    return (PLACED if proved else LEFT), first
 
 
 @loop("numpy")
 def _nearest(A: Array, b: Array, x: Array) -> bool:
-    """Move an optimum to the one nearest to the origin; return False if that is not proved.
-
-    The last row of A x <= b keeps the value.
-    """
+    """Find the point of A x <= b nearest to the origin; return False if that is not proved."""
     count, n = A.shape
     size, d, largest = 0.0, np.empty((1, count)), 1.0
     for k in range(count):
@@ -276,12 +190,8 @@ def _nearest(A: Array, b: Array, x: Array) -> bool:
     unmet, excess = _unmet(A, d[0], near[0], u[0])
     for j in range(n):
         largest = max(largest, abs(near[0, j]))
-    if not unmet <= FOUND * largest:
-        return False
-    if excess * size <= FEASIBLE:
-        for j in range(n):
-            x[j] = size * near[0, j]
-    return True
+        x[j] = size * near[0, j]
+    return unmet <= FOUND * largest and excess * size <= FEASIBLE
 
 
 @loop("numpy")

@@ -61,7 +61,7 @@ ONE = 4
 """Place of the constant in functions of (x0, k)."""
 
 
-@loop()
+@loop("numpy")
 def pencil_program(faces: FaceTable, attempts: Attempts, a: int, signs: Array) -> Program:
     """Build the program of one attempt for one order of the foci, by signs of k u as in (4).
 
@@ -87,7 +87,7 @@ def pencil_program(faces: FaceTable, attempts: Attempts, a: int, signs: Array) -
     return program
 
 
-@loop()
+@loop("numpy")
 def _centers(
     faces: FaceTable, attempts: Attempts, place: tuple[int, Array], signs: Array
 ) -> tuple[Array, Array]:
@@ -108,7 +108,7 @@ def _centers(
     return s, y
 
 
-@loop()
+@loop("numpy")
 def _heights(d: Array, turned: Array, o: Array, found: Array) -> None:
     """Write the height d.(c - o) of a focus c = x0 + k (+-u) as a function of (x0, k, 1)."""
     for j in range(3):
@@ -116,7 +116,7 @@ def _heights(d: Array, turned: Array, o: Array, found: Array) -> None:
     found[K], found[ONE] = dotted(d, turned), -dotted(d, o)
 
 
-@loop()
+@loop("numpy")
 def _disc_rows(
     faces: FaceTable,
     attempts: Attempts,
@@ -145,7 +145,7 @@ def _disc_rows(
     return row
 
 
-@loop()
+@loop("numpy")
 def _near_rows(
     faces: FaceTable,
     attempts: Attempts,
@@ -171,7 +171,7 @@ def _near_rows(
     return row
 
 
-@loop()
+@loop("numpy")
 def take_pencil(
     faces: FaceTable, attempts: Attempts, a: int, signs: Array, x: Array, placed: Placed
 ) -> None:

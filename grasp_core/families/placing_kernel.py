@@ -13,7 +13,7 @@ from grasp_core.families.concurrent_kernel import (
     reach_limit,
     take_concurrent,
 )
-from grasp_core.families.discs_kernel import Program, bounded, largest_discs, of_equal_radii
+from grasp_core.families.discs_kernel import Program, largest_discs, largest_last, of_equal_radii
 from grasp_core.families.pencil_kernel import pencil_program, take_pencil
 from grasp_core.families.placements import LEFT, NONE, PLACED, Attempts, FaceTable, Placed
 from grasp_core.solvers.lp import RESIDUAL
@@ -21,7 +21,7 @@ from grasp_core.solvers.ties import SAME_SHARE
 from grasp_core.values import FINGERS
 
 
-@loop()
+@loop("numpy")
 def program_of(
     pencil: bool, faces: FaceTable, attempts: Attempts, a: int, pattern: Array
 ) -> Program:
@@ -31,7 +31,7 @@ def program_of(
     return concurrent_program(faces, attempts, a, pattern)
 
 
-@loop()
+@loop("numpy")
 def take(
     pencil: bool,
     faces: FaceTable,
@@ -52,7 +52,7 @@ def take(
     placed.ends[a], placed.merits[a] = PLACED, radius - RESIDUAL
 
 
-@loop()
+@loop("numpy")
 def place(
     pencil: bool,
     faces: FaceTable,
@@ -79,7 +79,7 @@ def place(
                 worth = placed.merits[a] + SAME_SHARE * abs(placed.merits[a])
 
 
-@loop()
+@loop("numpy")
 def bounds(
     pencil: bool,
     faces: FaceTable,
@@ -99,4 +99,4 @@ def bounds(
                     found[a] = max(found[a], limit)
                     continue
             program = program_of(pencil, faces, attempts, a, patterns[p])
-            found[a] = max(found[a], bounded(of_equal_radii(program), worth))
+            found[a] = max(found[a], largest_last(of_equal_radii(program), worth))

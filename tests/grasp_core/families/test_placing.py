@@ -5,8 +5,7 @@ import pytest
 
 from grasp_core.errors import SolverError
 from grasp_core.families import placing
-from grasp_core.families.discs_kernel import optimum
-from grasp_core.families.placements import LEAST_RADIUS, LEFT, PLACED, face_table
+from grasp_core.families.placements import LEAST_RADIUS, face_table
 from grasp_core.families.placing import CONSTRUCTIONS, MIXED, attempts_of, regions_of
 from grasp_core.objects.face_pieces import edge_rows, face_shapes, inscribed_radius
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, PlannedCones
@@ -156,15 +155,3 @@ def test_a_program_that_nobody_solves_is_said_to_fail(monkeypatch):
     monkeypatch.setattr(placing, "maximize_above", failing)
     with pytest.raises(SolverError, match="neither solved nor proved"):
         placed(CONSTRUCTIONS["concurrent"], pieces, listed[:1])
-
-
-def test_programs_in_compiled_code_end_as_they_should():
-    """A square: its corner, no bound at all, nothing feasible, NaN."""
-    A = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-    b, c, x = np.array([1.0, 2.0, 0.0, 0.0]), np.array([1.0, 1.0]), np.zeros(2)
-    assert optimum(c, A, b, x) == (PLACED, pytest.approx(3.0, abs=1e-12))
-    np.testing.assert_allclose(x, [1.0, 2.0], rtol=0.0, atol=1e-12)
-    assert optimum(c, A[2:].copy(), b[2:].copy(), x)[0] == LEFT
-    assert optimum(c, A, np.array([1.0, 2.0, -3.0, 0.0]), x)[0] == LEFT
-    assert optimum(c, A, np.array([1.0, np.nan, 0.0, 0.0]), x)[0] == LEFT
-    assert optimum(np.array([1.0, np.nan]), A, b, x)[0] == LEFT
