@@ -104,9 +104,9 @@ def of_equal_radii(program: Program) -> Rows:
     """Write a program over one common radius, the last variable."""
     A, b, count, radii, excess = program
     rows = empty_rows(radii + 1, count)
+    for j in range(radii):
+        rows.At[j] = A[:count, j]
     for k in range(count):
-        for j in range(radii):
-            rows.At[j, k] = A[k, j]
         for j in range(radii, A.shape[1]):
             rows.At[radii, k] += A[k, j]
         rows.b[k] = b[k] - excess * A[k, radii]
