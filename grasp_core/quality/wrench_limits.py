@@ -45,15 +45,18 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Amount, Array, Figure, Points, Shape, Wrench, cross, frozen
 from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contacts import (
+    LOCAL,
     WRENCH,
     contact_arrays,
     contact_frames,
     contact_frictions,
+    contact_torsions,
     grasp_map,
     in_frames,
+    torsion_lengths,
+    with_torques,
 )
-from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
-from grasp_core.closure.wrench_sets import WrenchSet, force_rows, with_torques
+from grasp_core.closure.wrench_sets import WrenchSet, force_rows
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.quality.motors import Motors, motors_for
