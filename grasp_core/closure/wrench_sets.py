@@ -288,14 +288,6 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     return into_cones(answer.x[:n], wrenches.friction), answer.z[start : start + m]
 
 
-def force_rows(friction: Array, width: int) -> tuple[Array, Array]:
-    """Return rows of programs over n local forces: normal parts, (k, n), and cones, (n, n)."""
-    n = width * len(friction)
-    sides = -np.eye(n)
-    sides[::width, ::width] = -np.diag(friction)
-    return np.eye(n)[::width], sides
-
-
 def into_cones(forces: Array, friction: Array) -> Array:
     """Move forces into the cones and scale them so that normal parts sum to one exactly."""
     each = forces.reshape(len(friction), -1).copy()
