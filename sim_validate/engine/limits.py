@@ -28,8 +28,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross, rounded, to_digits
-from grasp_core.closure.contacts import contact_frictions, normal_and_tangential, stacked
-from grasp_core.closure.soft_contacts import contact_torsions
+from grasp_core.closure.contacts import (
+    contact_frictions,
+    contact_torsions,
+    normal_and_tangential,
+    stacked,
+)
 from grasp_core.declared import Declared
 from grasp_core.errors import NoForcesError, SolverError, UndecidedError
 from grasp_core.forces.contact_forces import even_forces

@@ -18,8 +18,7 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.closure.contacts import contact_frictions
-from grasp_core.closure.soft_contacts import contact_torsions
+from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.settings import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
