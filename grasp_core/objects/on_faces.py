@@ -18,7 +18,6 @@ instead.
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
+from grasp_core.objects.triangles import areas_and_normals
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 
@@ -97,8 +97,7 @@ def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
         off = abs(float(face.normal @ (contact.position - face.centroid)))
         return off <= slack and float(np.abs(contact.normal - face.normal).max()) <= ON_FACE
     corners = body.vertices[body.triangles[face.facets][:, ::-1]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    _, normals = areas_and_normals(corners)
     heights = np.abs(np.einsum("fi,fi->f", normals, contact.position - corners[:, 0]))
     turned = np.abs(normals - contact.normal).max(axis=1)
     return any(
@@ -166,19 +165,15 @@ def _divided(a: Array, b: Array) -> Array:
 
 LEAN = math.cos(3e-3)
 """Cosine of the largest angle at which a normal and a triangle's normal agree: planar faces are
-flat to within `Flatness`, and files keep six digits."""
+flat to within `planar_faces.ANGLE`, and files keep six digits."""
 
 
 class Surface:
     """The surface of a closed triangle mesh whose triangles face outwards."""
 
     def __init__(self, vertices: Array, triangles: Indices) -> None:
-        self._corners: Any = vertices[triangles]
-        outward = np.cross(
-            self._corners[:, 1] - self._corners[:, 0], self._corners[:, 2] - self._corners[:, 0]
-        )
-        lengths = np.linalg.norm(outward, axis=1, keepdims=True)
-        self._inward = -outward / np.where(lengths > 0.0, lengths, 1.0)
+        self._corners = vertices[triangles]
+        self._inward = -areas_and_normals(self._corners)[1]
 
     def holds(self, point: Array, normal: Array | None, slack: float) -> bool:
         """Return whether a point is within `slack` of a triangle with such a normal, if given."""

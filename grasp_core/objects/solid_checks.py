@@ -1,4 +1,4 @@
-"""Welds the vertices of triangles, and checks that their edges close around a volume.
+"""Welds the vertices of triangles, and checks that solids enclose a volume without thin slits.
 
 Close vertices are linked and connected parts found with numpy, since importing scipy's graphs takes
 longer than planning a small object does. Its search tree is used only where points are dense.
@@ -12,7 +12,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.objects.booleans import Solid, intersection_volume
-from grasp_core.objects.planar_faces import SIDES, edges_of
+from grasp_core.objects.triangles import components, crosses_of
 
 WELD = 1e-8
 """Distance below which vertices are joined, relative to the extent: single precision in a file
@@ -45,52 +45,6 @@ def welded(
     return points, corners[whole], int((~whole).sum())
 
 
-def surface_fault(corners: Indices) -> MeshError | None:
-    """Return the fault by which triangles do not bound a solid, or None if they do.
-
-    They bound a solid if each edge belongs to two triangles that run along it in opposite
-    directions. Inconsistent orientation is reported first, since a surface with any other fault may
-    have usable parts.
-    """
-    place, forward = edges_of(corners)
-    uses, ahead = np.bincount(place), np.bincount(place, weights=forward)
-    same_side = int(((uses == SIDES) & (ahead != 1)).sum())
-    if same_side:
-        message = (
-            f"{same_side} edges have triangles of opposite orientation; wind all "
-            "triangles counter-clockwise seen from outside"
-        )
-        return MeshError(MeshRefusal.WINDING, message)
-    if (uses == 1).any():
-        message = (
-            f"{int((uses == 1).sum())} edges belong to one triangle only; close the surface, or "
-            "use its sound parts (--faces patches)"
-        )
-        return MeshError(MeshRefusal.OPEN, message)
-    if (uses != SIDES).any():
-        edge = int(np.argmax(uses != SIDES))
-        row, side = divmod(int(np.argmax(place == edge)), 3)
-        ends = sorted((int(corners[row, side]), int(corners[row, (side + 1) % 3])))
-        message = (
-            f"edge {ends} belongs to {uses[edge]} triangles"
-            ", expected two; separate the parts there, or use sound parts (--faces patches)"
-        )
-        return MeshError(MeshRefusal.NON_MANIFOLD, message)
-    return None
-
-
-def balanced(corners: Indices) -> bool:
-    """Return whether edges are run along as often in both directions: a volume is enclosed then."""
-    place, forward = edges_of(corners)
-    return not np.bincount(place, weights=np.where(forward, 1.0, -1.0)).any()
-
-
-def triangle_areas(points: Array, corners: Indices) -> Array:
-    """Compute the areas of triangles, (t,) [m^2]."""
-    a, b, c = (points[corners[:, corner]] for corner in range(3))
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-
-
 def check_volume(solid: Solid) -> None:
     """Refuse a solid that encloses almost no volume."""
     extent = float(np.ptp(solid.vertices, axis=0).max())
@@ -108,8 +62,7 @@ def thin_share(solid: Solid) -> float:
     """
     step = THIN * float(np.ptp(solid.vertices, axis=0).max())
     corners = solid.vertices[solid.triangles]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    seen = 0.25 * np.abs(crosses).sum(axis=0)
+    seen = 0.25 * np.abs(crosses_of(corners)).sum(axis=0)
     left = [
         solid.volume - intersection_volume(solid, solid.moved(step * axis)) for axis in np.eye(3)
     ]
@@ -159,26 +112,3 @@ def _pairs_of_tree(points: Array, reach: float) -> Indices:
             "per point; merge points that coincide first"
         )
     return np.asarray(tree.query_pairs(reach, output_type="ndarray"), dtype=np.int64)
-
-
-def components(count: int, links: Indices) -> Indices:
-    """Return for each item the least index among the items connected with it, (count,).
-
-    Items point to items of their set, in the end to the least one. In each round the item that a
-    linked one points to is made to point to the least one at the other ends, and then every item
-    to the end of its way. Rounds grow as the square of the logarithm of `count` at most, and there
-    are fifteen for a million items in a row of any order.
-
-    Source:
-        Liu and Tarjan, "Simple concurrent labeling algorithms for connected components", SOSA 2019.
-    """
-    least = np.arange(count)
-    apart = links
-    while len(apart):
-        low, high = np.sort(apart, axis=1).T
-        np.minimum.at(least, high, low)
-        while not np.array_equal(further := least[least], least):
-            least = further
-        apart = least[apart]
-        apart = apart[apart[:, 0] != apart[:, 1]]
-    return least

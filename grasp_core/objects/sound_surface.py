@@ -8,7 +8,7 @@ The volume that a hole may hide is bounded by that of half a ball: a cap of area
 width d is off by at most A d / 3 if the true surface stays within the half-ball over the hole.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,42 +17,17 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import Solid, triangulate
-from grasp_core.objects.planar_faces import cut_at_repeats, edges_of
-from grasp_core.objects.sheets import check_bounds, outward_sheets, wound_alike
-from grasp_core.objects.shells import Shells, one_solid
-from grasp_core.objects.solid_checks import (
-    balanced,
-    components,
-    surface_fault,
-    triangle_areas,
-    welded,
-)
-from grasp_core.objects.surface import Surface
+from grasp_core.objects.sheets import wound_alike
+from grasp_core.objects.shells import one_solid
+from grasp_core.objects.solid_checks import welded
+from grasp_core.objects.surface import SoundSurface, Surface
+from grasp_core.objects.triangles import Edges, components, triangle_areas
 
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""
 FLAT = 1e-9
 """Area of a loop in the plane that fits it, relative to its width squared, below which it is a
 crack between triangles that meet."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SoundSurface:
-    """Welded and consistently wound triangles, with what is known of them."""
-
-    points: Array  # vertices, (n, 3) [m]
-    corners: Indices  # vertex indices, (t, 3)
-    surface: Surface
-    fault: MeshError | None
-    """Why the triangles do not bound a solid with planar faces; None if they do."""
-
-    def outward(self, *, largest_part: bool) -> "SoundSurface":
-        """Return this surface with an open one oriented outwards; a closed one is so already."""
-        if self.surface.closed:
-            check_bounds(self.points, self.corners)
-            return self
-        found = outward_sheets(self.points, self.corners, largest_part=largest_part)
-        return _with_shells(self, found)
 
 
 def sound_surface(
@@ -68,7 +43,7 @@ def sound_surface(
     if known is None:
         points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
         surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
-        if surface_fault(corners):
+        if Edges.of(corners).fault():
             corners, surface = _capped(points, corners, surface)
     else:  # vertices that were kept apart may be equal, where a united solid touches itself
         points, corners, _ = welded(vertices, triangles, reach=-1.0)
@@ -77,12 +52,10 @@ def sound_surface(
             raise InputError(
                 f"caps must be numbers of triangles below {len(corners)}, got {known.caps.max()}"
             )
-    surface = replace(surface, closed=balanced(corners))
-    found = SoundSurface(points, corners, surface, surface_fault(corners))
-    if not surface.closed:
-        return found
-    whole = one_solid(points, corners, surface.caps, most=most_parts, largest_part=largest_part)
-    return _with_shells(found, whole)
+    # a volume is enclosed where edges are run along as often in both directions
+    closed = not Edges.of(corners).balance.any()
+    found = SoundSurface(points, corners, replace(surface, closed=closed))
+    return one_solid(found, most=most_parts, largest_part=largest_part) if closed else found
 
 
 def _joined(
@@ -91,7 +64,7 @@ def _joined(
     """Weld close vertices, and wind triangles like their neighbours; also say what was changed."""
     points, corners, dropped = welded(vertices, triangles)
     said = [f"dropped {dropped} triangles without area"] if dropped else []
-    fault = surface_fault(corners)
+    fault = Edges.of(corners).fault()
     if fault and fault.reason is MeshRefusal.WINDING:
         wound = wound_alike(corners, triangle_areas(points, corners))
         if wound is None:
@@ -102,14 +75,14 @@ def _joined(
             )
         corners, turned = wound
         said.append(f"triangles wound against their neighbours were turned, {turned.sum()} in all")
-        fault = surface_fault(corners)
+        fault = Edges.of(corners).fault()
     if fault and fault.reason is MeshRefusal.NON_MANIFOLD:
         apart = _welded_apart(vertices, triangles, most_parts)
         if apart is not None:
             points, corners = apart
     elif fault and flatness_m:
         closer, joined, _ = welded(points, corners, 0.5 * flatness_m)
-        if surface_fault(joined) is None:
+        if Edges.of(joined).fault() is None:
             points, corners = closer, joined
             said.append("vertices that rounding had moved apart were joined")
     return points, corners, said
@@ -128,23 +101,12 @@ def _welded_apart(vertices: Array, triangles: Indices, most: int) -> tuple[Array
     points, corners, count = list[Array](), list[Indices](), 0
     for part in range(int(label.max()) + 1):
         mine, local, _ = welded(vertices, triangles[label == part])
-        if surface_fault(local) is not None:
+        if Edges.of(local).fault() is not None:
             return None
         points.append(mine)
         corners.append(local + count)
         count += len(mine)
     return np.concatenate(points), np.concatenate(corners)
-
-
-def _with_shells(found: SoundSurface, made: Shells) -> SoundSurface:
-    surface = replace(
-        found.surface,
-        caps=made.caps,
-        dropped=max(found.surface.dropped, made.dropped),
-        repairs=(*found.surface.repairs, *made.said),
-    )
-    fault = surface_fault(made.corners) if found.surface.closed else found.fault
-    return SoundSurface(made.points, made.corners, surface, fault)
 
 
 def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices, Surface]:
@@ -184,7 +146,7 @@ class Caps(NamedTuple):
 
 def caps_of(points: Array, corners: Indices) -> Caps | None:
     """Close the holes of a surface; None if it has none, or its open edges do not form loops."""
-    loops = _loops(corners)
+    loops = Edges.of(corners).open_loops()
     if not loops:
         return None
     triangles = [_cap(points, loop) for loop in loops]
@@ -192,31 +154,6 @@ def caps_of(points: Array, corners: Indices) -> Caps | None:
     areas = np.array([triangle_areas(points, each).sum() for each in triangles])
     hole_of = np.repeat(np.arange(len(loops)), [len(each) for each in triangles])
     return Caps(np.concatenate(triangles), widths, hole_of, float(areas @ widths) / 3.0)
-
-
-def _loops(corners: Indices) -> list[list[int]] | None:
-    """Walk along the open edges against their triangles, so that caps are wound like these.
-
-    None if an edge that belongs to three or more triangles has more of them on one side. Otherwise
-    as many open edges end in each vertex as begin there, so that every walk returns.
-    """
-    tails, heads = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    place, forward = edges_of(corners)
-    uses = np.bincount(place)
-    balance = np.bincount(place, weights=np.where(forward, 1.0, -1.0))
-    if ((uses > 1) & (balance != 0)).any():
-        return None
-    leaving: dict[int, list[int]] = {}
-    for edge in np.flatnonzero(uses[place] == 1).tolist():
-        leaving.setdefault(int(heads[edge]), []).append(int(tails[edge]))
-    loops = list[list[int]]()
-    for start in list(leaving):
-        while leaving[start]:
-            walk = [start]
-            while (vertex := leaving[walk[-1]].pop()) != start:  # each step uses up an edge
-                walk.append(vertex)
-            loops += cut_at_repeats(walk)
-    return loops
 
 
 def _cap(points: Array, loop: list[int]) -> Indices:

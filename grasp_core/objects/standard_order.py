@@ -34,7 +34,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import clip, convex_hull, merge_into_convex_pieces, plane_frame
 from grasp_core.objects.booleans import inset_figure, triangulate
 from grasp_core.objects.face_pieces import Shapes, face_shapes
-from grasp_core.objects.planar_faces import Flatness, convex_pieces
+from grasp_core.objects.planar_faces import convex_pieces, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import graded
@@ -90,7 +90,7 @@ def standard(body: Polyhedron) -> Standard:
     _, image, frame = first
     order: list[int] = np.lexsort(_cells(image, frame).T[::-1]).tolist()
     extent = float(np.ptp(body.vertices, axis=0).max())
-    slack = Flatness.of(extent, body.surface.flatness_m).distance
+    slack = planar_slack(extent, body.surface.flatness_m)
     faces = tuple(_relisted(image.faces[face], image, frame, slack) for face in order)
     owners, body_in_order = tuple(range(len(faces))), replace(image, faces=faces)
     return Standard(body_in_order, tuple(order), mirrored=image is not body, owners=owners)

@@ -23,6 +23,7 @@ from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
+from grasp_core.objects.triangles import areas_and_normals
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import (
@@ -133,11 +134,10 @@ def flat_parts(body: Polyhedron) -> tuple[FlatPart, ...]:
             for piece in face.pieces
         )
     corners = body.vertices[body.triangles[:, ::-1]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
+    areas, normals = areas_and_normals(corners)
     return tuple(
-        FlatPart(index, normals[index] / lengths[index], corners[index])
-        for index in np.flatnonzero(lengths > 0.0).tolist()
+        FlatPart(index, normals[index], corners[index])
+        for index in np.flatnonzero(areas > 0.0).tolist()
     )
 
 
