@@ -103,10 +103,17 @@ def nearest_point(polygon: Array, point: Array) -> Array:
     E, b = edge_rows(polygon)
     if (E @ point <= b).all():
         return point
-    along = np.roll(polygon, -1, axis=0) - polygon
-    shares = ((point - polygon) * along).sum(axis=1) / (along**2).sum(axis=1)
-    feet = polygon + np.clip(shares, 0.0, 1.0)[:, None] * along
+    feet = nearest_on_segments(polygon, np.roll(polygon, -1, axis=0), point)
     return feet[first_best(-np.linalg.norm(feet - point, axis=1))]
+
+
+def nearest_on_segments(starts: Array, ends: Array, points: Array) -> Array:
+    """Return the points of segments nearest to given points, (..., d); segments may be points."""
+    along = ends - starts
+    squares = np.einsum("...i,...i->...", along, along)
+    shares = np.einsum("...i,...i->...", points - starts, along)
+    shares = np.clip(shares / np.where(squares > 0.0, squares, 1.0), 0.0, 1.0)
+    return starts + shares[..., None] * along
 
 
 def convex_hull(points: Array) -> Array:

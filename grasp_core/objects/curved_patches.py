@@ -35,6 +35,7 @@ from grasp_core.geometry.polygons import (
     area_and_centroid,
     clip,
     edge_rows,
+    nearest_on_segments,
     plane_frame,
     signed_area,
 )
@@ -247,10 +248,7 @@ def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float)
 
 def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
     """Return the points of segments nearest to a point, (m, 2), and their distances, (m,)."""
-    tails, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    squared = np.einsum("mi,mi->m", along, along)
-    share = np.einsum("mi,mi->m", point - tails, along) / np.where(squared > 0.0, squared, 1.0)
-    points = tails + np.clip(share, 0.0, 1.0)[:, None] * along
+    points = nearest_on_segments(segments[:, 0], segments[:, 1], point)
     return points, np.linalg.norm(points - point, axis=1)
 
 

@@ -157,11 +157,8 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     In each part that connects across edges of two triangles, the larger area keeps its winding.
     Gives the triangles, and which of them were turned.
     """
-    across = Edges.of(corners).neighbours()
-    # across these edges the neighbour runs along the edge in the same direction, (t, 3)
-    heads, others = np.roll(corners, -1, axis=1), corners[across]
-    same = (others == corners[..., None]) & (np.roll(others, -1, axis=2) == heads[..., None])
-    against = same.any(axis=2) & (across >= 0)
+    edges = Edges.of(corners)
+    across, against = edges.neighbours(), edges.against[edges.place].reshape(-1, 3)
     # each triangle counts twice, as it is and turned; those that are wound alike are linked
     inner, count = across >= 0, len(corners)
     here, there, flip = np.nonzero(inner)[0], across[inner], count * against[inner]

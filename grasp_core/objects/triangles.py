@@ -134,6 +134,11 @@ class Edges(NamedTuple):
         balance = np.bincount(place, weights=np.where(tail < head, 1.0, -1.0))
         return cls(corners, place, np.bincount(place), balance)
 
+    @property
+    def against(self) -> NDArray[np.bool_]:
+        """Which edges two triangles run along in the same direction, (e,)."""
+        return (self.uses == SIDES) & (self.balance != 0.0)
+
     def neighbours(self) -> Indices:
         """Find the one triangle across each edge, (t, 3); -1 if there is none, or several."""
         order = np.argsort(self.place, kind="stable")
@@ -156,7 +161,7 @@ class Edges(NamedTuple):
         directions. Inconsistent orientation is reported first, since a surface with any other fault
         may have usable parts.
         """
-        if same_side := int(((self.uses == SIDES) & (self.balance != 0.0)).sum()):
+        if same_side := int(self.against.sum()):
             message = (
                 f"{same_side} edges have triangles of opposite orientation; wind all "
                 "triangles counter-clockwise seen from outside"

@@ -19,7 +19,7 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import plane_frame
+from grasp_core.geometry.polygons import nearest_on_segments, plane_frame
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -191,7 +191,5 @@ def nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
     flat = point - float(normal @ (point - polygon[0])) * normal
     if within(flat, polygon, normal, 0.0):
         return flat
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    share = np.einsum("ki,ki->k", flat - polygon, edges) / np.einsum("ki,ki->k", edges, edges)
-    ends = polygon + np.clip(share, 0.0, 1.0)[:, None] * edges
-    return ends[first_best(-np.linalg.norm(ends - flat, axis=1))]
+    feet = nearest_on_segments(polygon, np.roll(polygon, -1, axis=0), flat)
+    return feet[first_best(-np.linalg.norm(feet - flat, axis=1))]
