@@ -108,16 +108,18 @@ def _groups(surface: Triangles, spread: float, depth: float, caps: Indices) -> l
     flatness: Array = np.einsum("ti,ti->t", smooth, normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
 
-    def first_plane(seed: int) -> Plane:
-        # on flat ground the average is the better normal, beside an edge the triangle's own
-        level = float(smooth[seed] @ normals[seed]) >= math.cos(0.5 * spread)
-        return (smooth if level else normals)[seed], surface.corners[seed].mean(axis=0)
-
     def fit(some: Indices, plane: Plane) -> NDArray[np.bool_]:
         normal, origin = plane
         upright = normals[some] @ normal >= math.cos(spread)
         heights = np.abs((surface.corners[some] - origin) @ normal).max(axis=1)
         return upright & (heights <= depth)
+
+    def first_plane(seed: int) -> Plane:
+        # on flat ground the average is the better normal, beside an edge the triangle's own
+        middle = surface.corners[seed].mean(axis=0)
+        level = float(smooth[seed] @ normals[seed]) >= math.cos(0.5 * spread)
+        near = bool(fit(np.array([seed]), (smooth[seed], middle))[0])  # a large triangle may not be
+        return (smooth if level and near else normals)[seed], middle
 
     groups = [
         _Group(members, normal, float(surface.areas[members].sum()))
