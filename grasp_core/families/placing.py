@@ -57,7 +57,7 @@ from grasp_core.families.placements import (
     room_for,
 )
 from grasp_core.families.regulus import nearly_symmetric, place_regulus
-from grasp_core.geometry.polygons import clip, edge_rows, tidy
+from grasp_core.geometry.polygons import circle, clip, edge_rows, tidy
 from grasp_core.objects.face_pieces import (
     FacePiece,
     FaceShape,
@@ -114,14 +114,8 @@ def _cone_region(
     return ContactRegion("cone", polygon, inscribed_radius(E, b))
 
 
-def circle() -> Array:
-    """Return points on the border of a disc of radius one, (n, 2)."""
-    turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
-    return np.column_stack([np.cos(turns), np.sin(turns)])
-
-
 def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int) -> ContactRegion:
-    ring = circle() @ piece.frame.T
+    ring = circle(DISC_CORNERS) @ piece.frame.T
     radius = float(placed.radii[finger])
     return ContactRegion("disc", placed.positions[finger] + radius * ring, radius)
 
@@ -248,7 +242,7 @@ class ManyPlacements:
     @cached_property
     def _rings(self) -> Array:
         """Border points of a disc of radius one on each face, about its centre, (f, n, 3)."""
-        return np.array([circle() @ frame.T for frame in self._table.frames])
+        return np.array([circle(DISC_CORNERS) @ frame.T for frame in self._table.frames])
 
 
 def _placement(placed: Placed, place: int, construction: Construction) -> Placement | None:

@@ -78,6 +78,18 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
     return polygon
 
 
+def circle(count: int) -> Array:
+    """Return points at equal distances on the circle of radius one, counter-clockwise, (n, 2)."""
+    turns = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([np.cos(turns), np.sin(turns)])
+
+
+def clip_to_disc(polygon: Array, center: Array, radius: float, sides: int) -> Array:
+    """Cut a convex polygon to a regular one around a disc."""
+    rows = circle(sides)
+    return clip(polygon, rows, rows @ center + radius)
+
+
 def tidy(polygon: Array) -> Array:
     """Remove corners from a polygon (k, 2) at unit size that coincide with the corner before."""
     return polygon[np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1) > SAME_CORNER]
@@ -268,9 +280,7 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
     """Return whether a polygon covers a disc in a border, but for `LEFT_OUT` of its own area."""
-    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    rows = np.column_stack([np.cos(turns), np.sin(turns)])
-    disc = clip(border.corners, rows, rows @ center + radius)
+    disc = clip_to_disc(border.corners, center, radius, SIDES)
     if len(disc) == 0:
         return radius == 0.0
     held = clip(disc, polygon.E, polygon.b)

@@ -35,7 +35,7 @@ from grasp_core.objects.planar_faces import (
     planar_slack,
 )
 from grasp_core.objects.sheets import check_bounds, outward_sheets
-from grasp_core.objects.solid_checks import check_volume
+from grasp_core.objects.shells import check_volume
 from grasp_core.objects.sound_surface import sound_surface
 from grasp_core.objects.surface import Face, SoundSurface, Surface
 from grasp_core.objects.triangles import Edges

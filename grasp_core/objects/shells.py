@@ -15,9 +15,8 @@ import numpy as np
 from grasp_core.arrays import Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.objects.booleans import Solid, intersection_volume, union
-from grasp_core.objects.solid_checks import THINNEST, check_volume, thin_share
 from grasp_core.objects.surface import SoundSurface
-from grasp_core.objects.triangles import Edges, triangle_areas
+from grasp_core.objects.triangles import Edges, crosses_of, triangle_areas
 
 OVERLAP = 1e-6
 """Volume shared by two parts, relative to the whole, above which they overlap; parts that only
@@ -27,6 +26,10 @@ SMALL = 0.01
 CLEAN = 1e-4
 """Largest share of the surface of a union that may be beside slits as thin as rounding; edges of
 sound unions show some 1e-6."""
+THINNEST = 1e-9
+"""Least volume of a solid, relative to the cube of the extent."""
+THIN = 4e-6
+"""Width of a slit, relative to the extent, which rounding in single precision may leave."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,3 +212,27 @@ def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
             if shared[host] > slack:
                 bodies[host] = bodies[host].joined(shell)
     return bodies
+
+
+def check_volume(solid: Solid) -> None:
+    """Refuse a solid that encloses almost no volume."""
+    extent = float(np.ptp(solid.vertices, axis=0).max())
+    if abs(solid.volume) < THINNEST * extent**3:
+        message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"
+        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
+
+
+def thin_share(solid: Solid) -> float:
+    """Return the share of the surface that is beside slits or walls thinner than `THIN`.
+
+    Solved: a solid that is moved by a step along an axis leaves a volume of the step times the area
+    that it shows along the axis, each wall counted, less what slits and walls thinner than the step
+    hide. The largest share of the three axes is returned.
+    """
+    step = THIN * float(np.ptp(solid.vertices, axis=0).max())
+    corners = solid.vertices[solid.triangles]
+    seen = 0.25 * np.abs(crosses_of(corners)).sum(axis=0)
+    left = [
+        solid.volume - intersection_volume(solid, solid.moved(step * axis)) for axis in np.eye(3)
+    ]
+    return float(np.abs(seen - np.array(left) / step).max() / seen.max())

@@ -6,10 +6,14 @@ used for its patches, once `sheets` has found which side is inside.
 
 The volume that a hole may hide is bounded by that of half a ball: a cap of area A across a hole of
 width d is off by at most A d / 3 if the true surface stays within the half-ball over the hole.
+
+Close vertices are linked and connected parts found with numpy, since importing scipy's graphs takes
+longer than planning a small object does. Its search tree is used only where points are dense.
 """
 
+import importlib
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +23,6 @@ from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import Solid, triangulate
 from grasp_core.objects.sheets import wound_alike
 from grasp_core.objects.shells import one_solid
-from grasp_core.objects.solid_checks import welded
 from grasp_core.objects.surface import SoundSurface, Surface
 from grasp_core.objects.triangles import Edges, components, triangle_areas
 
@@ -28,6 +31,9 @@ KNOWN = 0.02
 FLAT = 1e-9
 """Area of a loop in the plane that fits it, relative to its width squared, below which it is a
 crack between triangles that meet."""
+WELD = 1e-8
+"""Distance below which vertices are joined, relative to the extent: single precision in a file
+keeps 6e-8, and vertices that were equal before are equal to the last bit."""
 
 
 def sound_surface(
@@ -186,3 +192,70 @@ def _width(places: Array) -> float:
     if len(places) > 500:  # noqa: PLR2004 - the diagonal of the box is at most 1.8 times as long
         return float(np.linalg.norm(np.ptp(places, axis=0)))
     return float(np.linalg.norm(places[:, None] - places[None], axis=2).max())
+
+
+def welded(
+    points: Array, corners: Indices, reach: float | None = None
+) -> tuple[Array, Indices, int]:
+    """Join close vertices, drop unused ones and collapsed triangles; also count the latter."""
+    used, corners = np.unique(corners, return_inverse=True)
+    points, corners = points[used], corners.reshape(-1, 3)
+    if reach is None:
+        reach = WELD * float(np.ptp(points, axis=0).max())
+    try:
+        links = close_pairs(points, reach) if reach >= 0.0 else np.empty((0, 2), dtype=np.int64)
+    except InputError as error:
+        raise MeshError(MeshRefusal.LIMIT, str(error)) from error
+    label = components(len(points), links)
+    _, first, order = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    points, corners = points[np.sort(first)], rank[order][corners]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    if not whole.any():
+        raise MeshError(MeshRefusal.ZERO_VOLUME, "no triangle has an area; export a solid")
+    return points, corners[whole], int((~whole).sum())
+
+
+GENERAL = np.array([0.41421, 0.56714, 0.69315])
+"""Direction of the line on which points are projected, perpendicular to no face that parts usually
+have. It is shorter than one, so that projections are closer together than points."""
+CROWDED = 64
+"""Largest number of neighbours on the line that are compared with a point one by one."""
+MOST_LINKS = 100
+"""Largest number of links per point."""
+
+
+def close_pairs(points: Array, reach: float) -> Indices:
+    """List links between points within a distance of each other, as pairs of indices, (k, 2).
+
+    Close points have close projections on a line, so only neighbours there are compared. Equal
+    points are linked in a row, and only one of them is compared with other points.
+    """
+    shadows = ((points - points[0]) * GENERAL).sum(axis=1)
+    order = np.argsort(shadows, kind="stable")
+    equal = (points[order[1:]] == points[order[:-1]]).all(axis=1)
+    links = [np.column_stack([order[:-1], order[1:]])[equal]]
+    order = order[np.append(True, ~equal)]
+    for step in range(1, len(order)):
+        near = shadows[order[step:]] - shadows[order[:-step]] <= reach
+        if not near.any():
+            break
+        if step > CROWDED:
+            links.append(order[_pairs_of_tree(points[order], reach)])
+            break
+        pairs = np.column_stack([order[:-step][near], order[step:][near]])
+        apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+        links.append(pairs[apart <= reach])
+    return np.concatenate(links)
+
+
+def _pairs_of_tree(points: Array, reach: float) -> Indices:
+    spatial: Any = importlib.import_module("scipy.spatial")
+    tree = spatial.KDTree(points)
+    pairs = (int(tree.count_neighbors(tree, reach)) - len(points)) // 2
+    if pairs > MOST_LINKS * len(points):
+        raise InputError(
+            f"{pairs} pairs of points are within {reach:.3g} of each other, more than {MOST_LINKS} "
+            "per point; merge points that coincide first"
+        )
+    return np.asarray(tree.query_pairs(reach, output_type="ndarray"), dtype=np.int64)

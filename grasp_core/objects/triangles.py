@@ -123,7 +123,7 @@ class Edges(NamedTuple):
     corners: Indices  # vertex indices of the triangles, (t, 3)
     place: Indices  # number of the edge (k, k+1) of each triangle, (3 t,)
     uses: Indices  # number of triangles at each edge, (e,)
-    balance: Array  # how many more run along an edge to the higher vertex than back, (e,)
+    balance: Indices  # how many more run along an edge to the higher vertex than back, (e,)
 
     @classmethod
     def of(cls, corners: Indices) -> "Edges":
@@ -131,13 +131,14 @@ class Edges(NamedTuple):
         tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
         names = np.minimum(tail, head) * (int(corners.max()) + 1) + np.maximum(tail, head)
         place = np.unique(names, return_inverse=True)[1].ravel()
-        balance = np.bincount(place, weights=np.where(tail < head, 1.0, -1.0))
-        return cls(corners, place, np.bincount(place), balance)
+        uses = np.bincount(place)
+        ahead = np.bincount(place[tail < head], minlength=len(uses))
+        return cls(corners, place, uses, 2 * ahead - uses)
 
     @property
     def against(self) -> NDArray[np.bool_]:
         """Which edges two triangles run along in the same direction, (e,)."""
-        return (self.uses == SIDES) & (self.balance != 0.0)
+        return (self.uses == SIDES) & (self.balance != 0)
 
     def neighbours(self) -> Indices:
         """Find the one triangle across each edge, (t, 3); -1 if there is none, or several."""
@@ -190,7 +191,7 @@ class Edges(NamedTuple):
         None if an edge that belongs to three or more triangles has more of them on one side.
         Otherwise as many open edges end in each vertex as begin there, so that every walk returns.
         """
-        if ((self.uses > 1) & (self.balance != 0.0)).any():
+        if ((self.uses > 1) & (self.balance != 0)).any():
             return None
         tails, heads = self.corners.ravel(), np.roll(self.corners, -1, axis=1).ravel()
         leaving: dict[int, list[int]] = {}

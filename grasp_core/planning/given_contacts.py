@@ -19,7 +19,7 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import nearest_on_segments, plane_frame
+from grasp_core.geometry.polygons import circle, nearest_on_segments, plane_frame
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -171,10 +171,8 @@ def nearest_like(
 
 def _around(body: Polyhedron, part: FlatPart, contact: Contact) -> Face:
     """Make a round face around a contact on a triangle, in the triangle's plane."""
-    turns = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
     radius = SURROUNDINGS * body.radius
-    ring = radius * np.column_stack([np.cos(turns), np.sin(turns)])
-    polygon = contact.position + ring @ plane_frame(part.normal).T
+    polygon = contact.position + radius * circle(CORNERS) @ plane_frame(part.normal).T
     return Face(
         normal=part.normal,
         centroid=contact.position,
