@@ -240,16 +240,6 @@ class FlatPolygon:
         return bool((points @ self.E.T <= self.b + slack).all())
 
 
-def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon from points (k, 3) in the plane through zero, counter-clockwise.
-
-    Gives None if the points are off the plane, or not corners of a convex polygon in order.
-    """
-    if float(np.abs(arms @ normal).max()) > slack:
-        return None
-    return convex_polygon(arms @ plane_frame(normal), slack)
-
-
 def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
     """Make a polygon of corners (k, 2), repeats left out; None if not convex and in order."""
     corners = tidy(corners)

@@ -152,16 +152,17 @@ def _planar_groups(
 ) -> list[Indices] | None:
     if choices.faces == "patches":
         return None
-    most = MAX_FACES if choices.faces == "auto" else None
+    automatic = choices.faces == "auto"
+    most = MAX_FACES if automatic else choices.max_faces
     groups = coplanar_groups(
         found.points, found.corners, slack, blur=0.5 * blur, caps=found.surface.caps, most=most
     )
-    if most and len(groups) > most:
+    if automatic and len(groups) > most:
         return None
     if len(groups) > choices.max_faces:
         message = (
-            f"{len(groups)} planar faces exceed the limit of {choices.max_faces}; simplify "
-            "the mesh, or plan on nearly flat patches (--faces patches)"
+            f"the mesh has more planar faces than the limit of {choices.max_faces}; simplify the "
+            "mesh, or plan on nearly flat patches (--faces patches)"
         )
         raise MeshError(MeshRefusal.TOO_MANY, message)
     return groups

@@ -20,7 +20,6 @@ from grasp_core.geometry.polygons import (
     convex_polygon,
     edge_rows,
     has_inscribed_radius,
-    plane_frame,
 )
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
@@ -186,11 +185,6 @@ def piece_of(
     return FacePiece(
         face, normal, origin, frame, corners, E, b, inscribed_radius(E, b), spread, depth
     )
-
-
-def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
-    """Compute the radius of the largest disc in a convex polygon (k, 3), wound about the normal."""
-    return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
 
 
 def inscribed_radius(E: Array, b: Array) -> float:
