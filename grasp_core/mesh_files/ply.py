@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.mesh_files.polygons import Polygons
-from grasp_core.mesh_files.rounding import TextPoints
+from grasp_core.mesh_files.polygons import Polygons, TextPoints
 from grasp_core.mesh_files.texts import plain_text, whole, worded_lines
 
 TYPES = {

@@ -23,8 +23,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices, frozen, real_array
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mesh_files.limits import MeshChoices, MeshLimits, PatchLimits
-from grasp_core.mesh_files.polygons import check_corners, too_many
-from grasp_core.mesh_files.rounding import single_rounding
+from grasp_core.mesh_files.polygons import check_corners, single_rounding, too_many
 from grasp_core.objects.booleans import Solid, hull
 from grasp_core.objects.curved_patches import flat_patches
 from grasp_core.objects.planar_faces import (
