@@ -47,7 +47,7 @@ from grasp_core.families.placements import (
     room_for,
 )
 from grasp_core.families.regulus import nearly_symmetric, place_reguli
-from grasp_core.geometry.polygons import clip, edge_rows, tidy
+from grasp_core.geometry.polygons import circle, clip, edge_rows, tidy
 from grasp_core.objects.face_pieces import (
     FacePiece,
     FaceShape,
@@ -209,12 +209,6 @@ def largest_discs(program: Any, least: float) -> tuple[Array, float] | None:
     return x, first.value
 
 
-def circle() -> Array:
-    """Return points on the border of a disc of radius one, (n, 2)."""
-    turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
-    return np.column_stack([np.cos(turns), np.sin(turns)])
-
-
 def point_regions(placement: Placement) -> Regions:
     """Make regions of one point each, the contacts themselves."""
     return tuple(ContactRegion("point", at[None], 0.0) for at in placement.positions)
@@ -233,7 +227,7 @@ def regions_of(kind: RegionKind, planned: Sequence[Planned]) -> list[Regions]:
     if kind == "disc":
         frames = np.array([piece.frame for piece in pieces])[attempts.faces]
         radii = np.array([placement.radii for _, _, placement in planned])
-        rings = radii[..., None, None] * np.einsum("nt,afjt->afnj", circle(), frames)
+        rings = radii[..., None, None] * np.einsum("nt,afjt->afnj", circle(DISC_CORNERS), frames)
         cut = Footprints(positions[:, :, None] + rings, np.full(radii.shape, DISC_CORNERS), radii)
     else:
         foci = np.array([placement.foci[0] for _, _, placement in planned])

@@ -11,7 +11,6 @@ normals are used there, and the friction angle is reduced by the angle between s
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -156,8 +155,8 @@ def _pieces(
         corners = tidy(clip(whole.corners, whole.E, whole.b - clearance / unit.scale))
         if len(corners) < 3:  # noqa: PLR2004 - not a polygon
             return None
-        clear = piece_of(index, normal, whole.origin + corners @ whole.frame.T)
-        found.append(replace(clear, spread=face.spread, depth=face.depth / unit.scale))
+        places = whole.origin + corners @ whole.frame.T
+        found.append(piece_of(index, normal, places, face.spread, face.depth / unit.scale))
     return tuple(found)
 
 

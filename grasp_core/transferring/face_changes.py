@@ -38,7 +38,6 @@ positive outwards, because normals point into the part.
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -53,9 +52,7 @@ from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.planning.given_contacts import (
-    FlatPart,
     Nearest,
-    flat_parts,
     nearest_in,
     nearest_like,
 )
@@ -127,13 +124,7 @@ def place_of(
 ) -> Nearest | None:
     """Find the nearest point on a like face of a changed part, within reach; None if none is."""
     lean = rule.angle + SAME
-    return nearest_like(_parts(new), point, normal, lean=lean, reach=reach, margin=rule.same)
-
-
-@lru_cache(maxsize=8)
-def _parts(body: Polyhedron) -> tuple[FlatPart, ...]:
-    """List the parts of a surface once: they are searched for every contact."""
-    return flat_parts(body)
+    return nearest_like(new, point, normal, lean=lean, reach=reach, margin=rule.same)
 
 
 @dataclass(frozen=True, slots=True)

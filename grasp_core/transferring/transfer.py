@@ -312,7 +312,7 @@ class _Judge:
         turn = turn_of(normal, near.contact.normal)
         if place is None:
             return CarriedContact(finger, face, None, None, near.distance, turn)
-        return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
+        return CarriedContact(finger, face, place.face, place.contact, place.distance, turn)
 
     def _before(self, grasp: Grasp) -> GraspFigures:
         seated = Seated(self.old, grasp.faces, grasp.contacts, 0.0)

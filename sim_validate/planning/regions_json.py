@@ -16,10 +16,10 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError, about
 from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, RecordFile, recorded
-from grasp_core.geometry.polygons import FEWEST_CORNERS
+from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
 from grasp_core.grasp_tables import ById
 from grasp_core.kinds import Count, Family, Friction, NotNegative
-from grasp_core.objects.face_pieces import inscribed_disc_radius_of
+from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
@@ -258,7 +258,8 @@ def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRe
         )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
-            radius = scale * inscribed_disc_radius_of(polygon / scale, normal)
+            arms = polygon / scale - polygon[0] / scale
+            radius = scale * inscribed_radius(*edge_rows(arms @ plane_frame(normal)))
             return ContactRegion("certified", polygon, radius)
     except SolverError as error:
         raise InputError(
