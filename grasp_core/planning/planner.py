@@ -22,8 +22,7 @@ from grasp_core.kinds import METHODS, ConeKind, Method, RankBy
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard
-from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
-from grasp_core.planning.certify import to_grasps
+from grasp_core.planning.as_given import absence_as_given, faces_as_given, to_grasp
 from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
 from grasp_core.planning.parts import finding_elsewhere
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
@@ -131,7 +130,7 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
     check_request(body, request)
     on, searches = prepared(body, request)
     every = run(on, request, searches, None)
-    return (to_grasps(body, friction, [as_given(each, on)])[0] for each in every)
+    return (to_grasp(body, friction, each, on) for each in every)
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
@@ -143,7 +142,7 @@ def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Sea
     """Put together a plan from what the searches found, with the best grasps."""
     best = chosen(body, [search.best for search in searches.values()], request)
     start = time.process_time()
-    grasps = to_grasps(body, request.friction, [as_given(found, on) for found in best])
+    grasps = tuple(to_grasp(body, request.friction, found, on) for found in best)
     each = (time.process_time() - start) / max(len(best), 1)
     for method, count in Counter[Method](found.method for found in best).items():
         searches[method].seconds += count * each
@@ -157,7 +156,7 @@ def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Sea
     given = partial(faces_as_given, on=on)
     return Plan(
         body=body,
-        grasps=tuple(grasps),
+        grasps=grasps,
         friction=request.friction,
         theta=kept_angle(request.theta),
         seed=request.seed,
