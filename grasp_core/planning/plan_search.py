@@ -25,7 +25,7 @@ from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
 from grasp_core.planning.free_search import found_on
 from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
-from grasp_core.planning.reach import Finger, Reach, reach
+from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.request import PlanRequest
 from grasp_core.planning.result import Outcomes
 from grasp_core.processes import Processes
@@ -92,7 +92,7 @@ class PlanSearch:
     ) -> "PlanSearch":
         """Put an object into standard order, with faces cut as requested, and set up its search."""
         on = in_standard_order(body, request)
-        reached = partial(_reach, on.body, request.finger)
+        reached = partial(_reached, on.body, request.finger)
         methods: dict[Method, MethodSearch] = {
             method: MethodSearch(method, request.searched, reached)
             for method in METHODS
@@ -250,12 +250,13 @@ def in_standard_order(body: Polyhedron, request: PlanRequest) -> Standard:
     return on
 
 
-def _reach(body: Polyhedron, finger: Finger | None, found: Certified) -> Reach:
-    """How fingers get to the contacts; nothing is sought where no finger is given."""
+def _reached(body: Polyhedron, finger: Finger | None, found: Certified) -> Certified | str:
+    """Return a grasp with its fingers' ways out, if they are sought, or why it is out of reach."""
     if finger is None:
-        return Reach(None)
+        return found
     positions = body.center_of_mass + body.radius * found.placement.positions
-    return reach(body, found.faces, positions, found.normals, finger)
+    ways = reach(body, found.faces, positions, found.normals, finger)
+    return ways if isinstance(ways, str) else replace(found, ways_out=ways)
 
 
 def found_elsewhere(given: bytes, part: Part) -> Found:
@@ -273,7 +274,7 @@ def _search_of(given: bytes) -> PlanSearch:
     return PlanSearch.of(*pickle.loads(given))  # noqa: S301
 
 
-def _unasked(_: Certified) -> Reach:
+def _unasked(_: Certified) -> str:
     raise AssertionError("parts of a search keep no grasps")
 
 

@@ -50,29 +50,22 @@ class Finger(Settings):
     """Length of the free line on which the finger comes [m]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reach:
-    """Directions in which fingers reach their contacts, or the reason why they cannot."""
-
-    directions: Array | None
-    """Unit vectors from each tip along its rod, (k, 3); None if none were sought or found."""
-    reason: str = ""
-    """Why the fingers cannot get to their contacts; empty where they can or none was sought."""
-
-
 def reach(
     body: Polyhedron, faces: FaceQuadruple, positions: Array, normals: Array, finger: Finger
-) -> Reach:
-    """Find straight lines on which all fingers reach their contacts without a collision."""
+) -> Array | str:
+    """Find straight lines on which all fingers reach their contacts without a collision.
+
+    Gives unit vectors from each tip along its rod, (k, 3), or the reason why there are none.
+    """
     slack = TOUCHING * body.radius
     tips = positions - finger.radius_m * normals
     for i, j in combinations(range(len(tips)), 2):
         if np.linalg.norm(tips[i] - tips[j]) < 2.0 * finger.radius_m - slack:
-            return Reach(None, f"fingertips {i} and {j} overlap")
+            return f"fingertips {i} and {j} overlap"
     surroundings = [_Surroundings.of(body, face) for face in faces]
     for place, (others, tip) in enumerate(zip(surroundings, tips, strict=True)):
         if others.distance(tip, tip, finger.radius_m) < finger.radius_m - slack:
-            return Reach(None, f"fingertip {place} meets the object beside its contact")
+            return f"fingertip {place} meets the object beside its contact"
     free: list[list[Array]] = []
     for most in (1, None):  # most fingers come along their normals
         free = [
@@ -85,11 +78,11 @@ def reach(
             for others, tip, normal in zip(surroundings, tips, normals, strict=True)
         ]
         if all(free) and (chosen := _apart(tips, free, finger, slack)) is not None:
-            return Reach(chosen)
+            return chosen
     blocked = [place for place, ways in enumerate(free) if not ways]
     if blocked:
-        return Reach(None, f"finger {blocked[0]} has no free line to its contact")
-    return Reach(None, "the fingers' lines cross")
+        return f"finger {blocked[0]} has no free line to its contact"
+    return "the fingers' lines cross"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -332,9 +332,9 @@ class _Judge:
         if self.finger is None:
             return grasp
         ways = reach(self.new, grasp.faces, grasp.positions, grasp.normals, self.finger)
-        if ways.directions is None:
-            return f"out of reach: {ways.reason}"
-        return replace(grasp, approach_directions=-ways.directions)
+        if isinstance(ways, str):
+            return f"out of reach: {ways}"
+        return replace(grasp, approach_directions=-ways)
 
 
 def judged(
