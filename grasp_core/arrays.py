@@ -14,9 +14,8 @@ from typing import Annotated, Any, TypeAlias, TypeGuard, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.checked import LARGEST_FRICTION, MOST_COUNT, shown
 from grasp_core.errors import InputError
-from grasp_core.kinds import Range, UnfitError
+from grasp_core.kinds import LARGEST_FRICTION, MOST_COUNT, Range, UnfitError, shown
 
 Array: TypeAlias = NDArray[np.float64]
 """Float array of any shape; the docstring of each value or argument gives its shape."""

@@ -21,9 +21,8 @@ from functools import cache
 from textwrap import shorten
 from typing import Annotated, Any, NamedTuple, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from grasp_core.checked import shown
 from grasp_core.errors import InputError
-from grasp_core.kinds import Take, UnfitError, takes, words
+from grasp_core.kinds import FieldError, Take, UnfitError, misfit, shown, takes
 
 HASHED = (str, int, bool)
 """Classes of the fields that a hash is made from."""
@@ -41,21 +40,6 @@ Draw = Callable[[Any], str | None]
 """A function that returns the HTML of a value, or None where it has no picture of it."""
 _DRAWN_WITH: list[Draw] = []
 """The function that was handed over, or none."""
-
-
-class FieldError(InputError):
-    """Error for a field of the wrong type or size; `name` is that of the field."""
-
-    owner: type | None = None
-    """Class of the field."""
-
-    def __init__(self, name: str, fault: str) -> None:
-        super().__init__(name, fault)
-        self.name, self.fault = name, fault
-
-    def __str__(self) -> str:
-        """Return the name of the field and what is wrong with it: 'must be .., got ..'."""
-        return f"{self.name} {self.fault}"
 
 
 class Plan(NamedTuple):
@@ -127,18 +111,12 @@ def check(value: object) -> None:
         try:
             plain = take(given)
         except UnfitError as fault:
-            said = str(fault) or f"must be {words(types(kind)[name])}, got {shown_of(given)}"
-            error = FieldError(name, said)
+            error = misfit(types(kind)[name], given, name, fault)
             error.owner = kind
             raise error from None
         if plain is not given:
             object.__setattr__(value, name, plain)
     check_letters(value)
-
-
-def shown_of(value: Any) -> str:
-    """Write a wrong value for a message."""
-    return shown(str(value) if hasattr(value, "__fspath__") else value)
 
 
 def check_letters(value: object) -> None:

@@ -7,9 +7,8 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, cast, get_ar
 
 import numpy as np
 
-from grasp_core.checked import function, number, one_of, several, shown
 from grasp_core.errors import InputError
-from grasp_core.kinds import Method
+from grasp_core.kinds import Method, function, number, one_of, several, shown
 from grasp_core.values import Grasp
 
 SHOWN_IDS = 5

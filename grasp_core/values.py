@@ -12,13 +12,23 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Shape, UnitVector
-from grasp_core.checked import LARGEST, number, shown
-from grasp_core.declared import Declared, FieldError, counted, summary, vector
+from grasp_core.declared import Declared, counted, summary, vector
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import Key, recorded
 from grasp_core.frames import poses_along
-from grasp_core.kinds import Family, NotNegative, Null, Number, Range, Signed
+from grasp_core.kinds import (
+    LARGEST,
+    Family,
+    FieldError,
+    NotNegative,
+    Null,
+    Number,
+    Range,
+    Signed,
+    number,
+    shown,
+)
 
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[Number, Number, Number, Number]

@@ -31,7 +31,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import WRENCH, contact_arrays, normal_and_tangential, unit_size
 from grasp_core.closure.decision import KERNEL, deepest_forces
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
@@ -40,6 +39,7 @@ from grasp_core.closure.proofs import CHECK_SLACK, RANK, proves_closure
 from grasp_core.closure.soft_closure import friction_interval
 from grasp_core.closure.soft_contacts import SoftContacts, contact_torsions
 from grasp_core.compiled import compiled
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.values import Contact, Grasp
 
 NO_FORCE = 1e-100

@@ -50,7 +50,6 @@ from grasp_core.arrays import (
     cross,
     of_order_one,
 )
-from grasp_core.checked import LARGEST
 from grasp_core.closure import proofs, soft_closure, soft_contacts
 from grasp_core.closure.contacts import (
     contact_arrays,
@@ -64,7 +63,7 @@ from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
 from grasp_core.declared import Declared, trusted
 from grasp_core.errors import UndecidedError
-from grasp_core.kinds import Range
+from grasp_core.kinds import LARGEST, Range
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6

@@ -31,7 +31,6 @@ from typing import Annotated, TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import (
     FEWEST,
     WRENCH,
@@ -40,7 +39,7 @@ from grasp_core.closure.contacts import (
     unit_size,
 )
 from grasp_core.declared import Declared
-from grasp_core.kinds import Range
+from grasp_core.kinds import LARGEST_FRICTION, Range
 
 Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]

@@ -31,7 +31,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure import friction_search
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.decision import (
@@ -52,6 +51,7 @@ from grasp_core.closure.soft_contacts import (
     supports,
 )
 from grasp_core.errors import SolverError
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.solvers.conic import ConicProgram, minimize
 
 INFLATED = (1e-9, 1e-8)

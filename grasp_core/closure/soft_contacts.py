@@ -43,10 +43,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_each
-from grasp_core.checked import LARGEST
 from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map, in_frames, unit_size
 from grasp_core.closure.proofs import CHECK_SLACK, RANK
 from grasp_core.errors import InputError
+from grasp_core.kinds import LARGEST
 
 LOCAL = 4
 """Number of local coordinates (2) of a soft contact."""

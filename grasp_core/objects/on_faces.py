@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
-from grasp_core.checked import instance
 from grasp_core.errors import InputError
+from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import first_best

@@ -20,12 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.families.placing import point_region, regions_of
 from grasp_core.geometry.polygons import SAME_CORNER
+from grasp_core.kinds import SMALLEST, Friction, Seed, number, value_of
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
@@ -97,8 +97,8 @@ def optimize_contacts(
         SolverError: A program's answer failed its check.
     """
     check_on_faces(body, grasp)
-    coefficient(friction)
-    seed = seed_of(seed)
+    value_of(Friction, friction, "friction")
+    seed = value_of(Seed, seed, "seed")
     if finger_radius is not None:
         where = ", the object's radius in m, or None"
         number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)

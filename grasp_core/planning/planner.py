@@ -15,11 +15,10 @@ from contextlib import nullcontext
 from functools import partial
 from typing import cast
 
-from grasp_core.checked import function, whole
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
-from grasp_core.kinds import METHODS, ConeKind, Method, RankBy
+from grasp_core.kinds import METHODS, ConeKind, Count, Method, RankBy, function, value_of
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.as_given import absence_as_given, faces_as_given, to_grasp
@@ -97,7 +96,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     check_request(body, request)
     if progress is not None:
         function(progress, "progress")
-    others = worth_starting(body, request, whole(jobs, "jobs", least=1))
+    others = worth_starting(body, request, value_of(Count, jobs, "jobs"))
     with local_processes(others) if others else nullcontext() as workers:
         search = PlanSearch.of(body, request, workers)
         for _ in search.run(progress):

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import get_args
 
 from grasp_core.arrays import UNIT_SLACK
-from grasp_core.checked import SMALLEST, number
 from grasp_core.errors import InputError
-from grasp_core.kinds import METHODS, Family, Method
+from grasp_core.kinds import METHODS, SMALLEST, Family, Method, number
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron

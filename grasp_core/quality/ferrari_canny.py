@@ -34,11 +34,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Figure, Shape
-from grasp_core.checked import number
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared, trusted
+from grasp_core.kinds import number
 from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.values import Contact, Grasp
 

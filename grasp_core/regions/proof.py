@@ -63,7 +63,6 @@ from grasp_core.arrays import (
     are_units,
     is_array,
 )
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
@@ -76,7 +75,7 @@ from grasp_core.geometry.polygons import (
     holds_disc,
     plane_frame,
 )
-from grasp_core.kinds import Quantity, Range
+from grasp_core.kinds import LARGEST_FRICTION, Quantity, Range
 from grasp_core.values import FINGERS, ContactRegion
 
 TWIST = 6

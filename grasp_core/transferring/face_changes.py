@@ -44,11 +44,10 @@ from typing import Annotated
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import instance, number
 from grasp_core.declared import Declared, counted
 from grasp_core.errors import InputError
 from grasp_core.files.records import Key
-from grasp_core.kinds import FaceTurn, Vector
+from grasp_core.kinds import FaceTurn, Vector, instance, number, value_of
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -59,7 +58,6 @@ from grasp_core.planning.given_contacts import (
     nearest_in,
     nearest_like,
 )
-from grasp_core.settings import value_of
 from grasp_core.transferring.settings import Carrying
 
 SHARE_OF_SIZE = 0.05

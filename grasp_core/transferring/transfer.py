@@ -35,7 +35,6 @@ from typing import Annotated, Literal, TypeAlias, get_args
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, instance, several
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, counted, summary
@@ -43,7 +42,7 @@ from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
 from grasp_core.files.records import UNRECORDED, Key, recorded
-from grasp_core.kinds import Friction, Null, OrInfinity
+from grasp_core.kinds import Friction, Null, OrInfinity, instance, several, value_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS
@@ -243,7 +242,7 @@ def transfer(
     """
     for body, name in ((old, "old"), (new, "new")):
         check_planar(body, name)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     if finger is not None:
         instance(finger, Finger, "finger")
     rule = likeness(old, distance, angle_deg)

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.errors import (
@@ -25,6 +24,7 @@ from grasp_core.errors import (
     UnfaithfulError,
 )
 from grasp_core.geometry.polygons import plane_frame
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat

@@ -22,16 +22,7 @@ from grasp_core.files.records import (
     record_of,
     recorded,
 )
-from grasp_core.kinds import (
-    Count,
-    Direction,
-    Many,
-    Measured,
-    OrInfinity,
-    Quantity,
-    Seed,
-    Vector,
-)
+from grasp_core.kinds import Count, Direction, Many, Measured, OrInfinity, Quantity, Seed, Vector
 from tests.damaged import check_refused, damaged, optional_keys, value_at
 
 
