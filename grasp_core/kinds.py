@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
@@ -203,6 +204,7 @@ Measured = Annotated[float, Null(math.nan)]
 """A number that is NaN where a simulation diverged; null in files."""
 
 
+@lru_cache(maxsize=1024)
 def takes(kind: Any, *, exact: bool = False) -> Take:
     """Return the function that takes values of a kind: lists as tuples, numbers as Python's.
 
