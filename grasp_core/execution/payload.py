@@ -41,7 +41,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Amount, Array, Indices, Triangles, is_indices
+from grasp_core.arrays import Amount, Array, Indices, Triangles, is_array
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
@@ -108,7 +108,7 @@ def least_distance(corners: Array) -> float:
 
 def ball_in(points: Array, triangles: Any) -> float:
     """Return the radius of the ball that triangles show by (2) to be in a hull, or -inf."""
-    if not (is_indices(triangles, None, 3) and len(triangles)):
+    if not (is_array(triangles, None, 3, whole=True) and len(triangles)):
         return -np.inf
     if triangles.min() < 0 or triangles.max() >= len(points) or not _is_closed(triangles):
         return -np.inf

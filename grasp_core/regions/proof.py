@@ -59,8 +59,6 @@ from grasp_core.arrays import (
     Polygon,
     Shape,
     Wrench,
-    are_frictions,
-    are_units,
     is_array,
 )
 from grasp_core.closure.force_closure import ClosureCertificate
@@ -138,7 +136,8 @@ class TwistCover(Declared):
         if not self.is_sound():
             return False
         k = self.forces.shape[1]
-        if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
+        units = is_array(normals, k, 3, units=True, slack=SLACK)
+        if not (units and is_array(friction, k, least=0.0, most=LARGEST_FRICTION)):
             return False
         placed = isinstance(regions, list | tuple) and len(regions) == k
         placed = placed and all(is_array(each, None, 3) and len(each) > 0 for each in regions)
