@@ -46,7 +46,7 @@ def check_planar(body: Polyhedron, asking: str) -> None:
     if body.patches is not None:
         raise InputError(
             f"{asking}: expected an object with planar faces, got {body.name} with curved ones; "
-            "take a mesh with fewer, planar faces"
+            "read it with faces='planar', or take a mesh with fewer, planar faces"
         )
 
 

@@ -56,7 +56,7 @@ class Seated:
     body: Polyhedron  # the object; a curved one with four more faces, one around each contact
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
-    moved_m: float  # largest distance of a contact from where it was given [m]
+    moved_m: float = 0.0  # largest distance of a contact from where it was given [m]
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:

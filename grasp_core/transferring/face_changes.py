@@ -45,9 +45,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, cross
 from grasp_core.declared import Declared, counted
-from grasp_core.errors import InputError
 from grasp_core.files.records import Key
-from grasp_core.kinds import FaceTurn, Vector, instance, number, value_of
+from grasp_core.kinds import FaceTurn, Vector, number, value_of
 from grasp_core.objects.on_faces import ON_FACE
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
@@ -108,16 +107,6 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
         math.radians(value_of(FaceTurn, angle_deg, "angle_deg")),
         SAME * old.radius,
     )
-
-
-def check_planar(body: Polyhedron, name: str) -> None:
-    """Refuse a value that is no part, or a part whose faces are patches of a curved surface."""
-    instance(body, Polyhedron, name, "gc.load_polyhedron reads one from a mesh file")
-    if body.patches is not None:
-        raise InputError(
-            f"{name} must have exact planar faces, but {body.name} was read as patches of a curved "
-            "surface; read it with faces='planar', or plan on the changed part anew"
-        )
 
 
 def place_of(

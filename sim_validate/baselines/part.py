@@ -14,6 +14,7 @@ from pathlib import Path
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
@@ -21,7 +22,6 @@ from grasp_core.transferring.face_changes import (
     FaceChange,
     added_faces,
     changes_in_words,
-    check_planar,
     face_changes,
     likeness,
 )

@@ -11,13 +11,13 @@ from grasp_core.errors import InputError
 from grasp_core.files.records import FLAT, RecordFile
 from grasp_core.files.text_files import write_text
 from grasp_core.mesh_files.limits import MeshChoices
+from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import extended
-from grasp_core.transferring.face_changes import check_planar
 from grasp_core.transferring.transfer import (
     CHANGES,
     SURE_GROWTH,
