@@ -31,13 +31,7 @@ from typing import Annotated, TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
-from grasp_core.closure.contacts import (
-    FEWEST,
-    WRENCH,
-    grasp_map,
-    normal_and_tangential,
-    unit_size,
-)
+from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
 from grasp_core.declared import Declared
 from grasp_core.kinds import LARGEST_FRICTION, Range
 

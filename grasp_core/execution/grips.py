@@ -47,15 +47,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import (
-    Array,
-    Frictions,
-    Shape,
-    UnitVectors,
-    frozen,
-    frozen_each,
-    real_array,
-)
+from grasp_core.arrays import Array, Frictions, Shape, UnitVectors, frozen, frozen_each, real_array
 from grasp_core.closure.contacts import (
     FEWEST,
     WRENCH,

@@ -34,20 +34,9 @@ from grasp_core.kinds import Count, Friction, Gap, Seed, TimeLimit, function, nu
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
-from grasp_core.optimizing.grounds import (
-    SEARCH_DIGITS,
-    TWISTS,
-    exact_maps,
-    first_nodes,
-    grounds_of,
-)
+from grasp_core.optimizing.grounds import SEARCH_DIGITS, TWISTS, exact_maps, first_nodes, grounds_of
 from grasp_core.optimizing.incumbents import begin, climbed, piece_at
-from grasp_core.optimizing.search import (
-    EXACT_GAP,
-    Searching,
-    Steps,
-    Stop,
-)
+from grasp_core.optimizing.search import EXACT_GAP, Searching, Steps, Stop
 from grasp_core.optimizing.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.planning.certify import named
 from grasp_core.quality.ferrari_canny import FerrariCanny

@@ -51,16 +51,7 @@ from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import (
-    Amount,
-    Array,
-    Indices,
-    Point,
-    Polygon,
-    Shape,
-    Wrench,
-    is_array,
-)
+from grasp_core.arrays import Amount, Array, Indices, Point, Polygon, Shape, Wrench, is_array
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError

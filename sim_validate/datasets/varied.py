@@ -17,12 +17,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.errors import (
-    InputError,
-    SolverError,
-    UndecidedError,
-    UnfaithfulError,
-)
+from grasp_core.errors import InputError, SolverError, UndecidedError, UnfaithfulError
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.objects.on_faces import within

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.arrays import (
-    frozen,
-    is_array,
-    to_digits,
-)
+from grasp_core.arrays import frozen, is_array, to_digits
 from scenes.example_objects import example_object
 from tests.tampering.changes import forged
 
