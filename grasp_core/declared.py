@@ -173,10 +173,8 @@ def trusted(kind: type[Item], /, **given: Any) -> Item:
 
 def altered(value: Item, /, **given: Any) -> Item:
     """Copy a frozen value with some other fields, which were checked before, unchecked."""
-    made, put = object.__new__(type(value)), object.__setattr__
-    for name in cast("Any", value).__dataclass_fields__:
-        put(made, name, given[name] if name in given else getattr(value, name))
-    return made
+    own = {name: getattr(value, name) for name in cast("Any", value).__dataclass_fields__}
+    return trusted(type(value), **own | given)
 
 
 def kept(value: object, name: str) -> Any:

@@ -18,7 +18,6 @@ from grasp_core.figures import Shown
 from grasp_core.files.records import Key, recorded
 from grasp_core.frames import poses_along
 from grasp_core.kinds import (
-    LARGEST,
     Family,
     FieldError,
     NotNegative,
@@ -26,8 +25,8 @@ from grasp_core.kinds import (
     Number,
     Range,
     Signed,
-    number,
     shown,
+    value_of,
 )
 
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
@@ -199,7 +198,7 @@ class Grasp(Declared):
         Raises:
             InputError: The distance is not a number from 0 up.
         """
-        number(standoff_m, "standoff_m", least=0.0, most=LARGEST)
+        value_of(NotNegative, standoff_m, "standoff_m")
         ways = self.normals if self.approach_directions is None else self.approach_directions
         return poses_along(self.positions - standoff_m * ways, ways)
 
