@@ -308,7 +308,7 @@ class _Judge:
         turn = turn_of(normal, near.contact.normal)
         if place is None:
             return CarriedContact(finger, face, None, None, near.distance, turn)
-        return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
+        return CarriedContact(finger, face, place.face, place.contact, place.distance, turn)
 
     def _lost(self, lost: CarriedContact) -> str:
         near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
