@@ -188,12 +188,11 @@ class Plan(Declared, ById[Grasp], InNotebooks):
         """
         listed = (family,) if isinstance(family, str) else family
         families = None if listed is None else value_of(tuple[Method, ...], listed, "family")
+        most = max_critical_friction
         for name, bound in (
-            ("min_radius_m", min_radius_m),
-            ("min_closure_margin", min_closure_margin),
-            ("max_critical_friction", max_critical_friction),
-            ("min_ferrari_canny_n", min_ferrari_canny_n),
-        ):
+            ("min_radius_m", min_radius_m), ("min_closure_margin", min_closure_margin),
+            ("max_critical_friction", most), ("min_ferrari_canny_n", min_ferrari_canny_n),
+        ):  # fmt: skip
             if bound is not None:
                 number(bound, name)
         if where is not None:
@@ -206,10 +205,7 @@ class Plan(Declared, ById[Grasp], InNotebooks):
                 (families is None or not own.isdisjoint(families))
                 and (min_radius_m is None or grasp.radius >= min_radius_m)
                 and (min_closure_margin is None or grasp.closure_margin >= min_closure_margin)
-                and (
-                    max_critical_friction is None
-                    or grasp.critical_friction <= max_critical_friction
-                )
+                and (most is None or grasp.critical_friction <= most)
                 and (min_ferrari_canny_n is None or grasp.ferrari_canny[0] >= min_ferrari_canny_n)
                 and (where is None or bool(where(grasp)))
             )
