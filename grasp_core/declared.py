@@ -70,9 +70,10 @@ class ByValue:
         return hash((type(self).__name__, *kinds))
 
     def __repr__(self) -> str:
-        """Return a line with the figures that are short; longer fields are only counted."""
+        """Return at most `MOST` characters with the figures that are short, and sizes of others."""
         told = (field.name for field in fields(cast("Any", self)) if field.repr)
-        return short(type(self).__name__, {name: getattr(self, name) for name in told})
+        parts = (f"{name}={_size(getattr(self, name))}" for name in told)
+        return shorten(f"{type(self).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
 
 
 class Declared(ByValue):
@@ -225,12 +226,6 @@ def summary(kind: str, *said: str, **figures: object) -> str:
     """Write `Kind(words, name=figure, ..)`, like a constructor call but not meant as code."""
     parts = [*said, *(f"{name}={_figure(value)}" for name, value in figures.items())]
     return f"{kind}({', '.join(parts)})"
-
-
-def short(kind: str, figures: Mapping[str, object]) -> str:
-    """Write `Kind(name=figure, ..)` in at most `MOST` characters, longer things by their size."""
-    parts = [f"{name}={_size(value)}" for name, value in figures.items()]
-    return shorten(f"{kind}({', '.join(parts)})", MOST, placeholder=" ...)")
 
 
 def _size(value: Any) -> str:
