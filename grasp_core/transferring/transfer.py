@@ -31,7 +31,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, count
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -49,7 +49,7 @@ from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS
 from grasp_core.objects.face_pieces import piece_of
 from grasp_core.objects.on_faces import check_on_faces, check_planar
-from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
+from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.planning.given_contacts import Seated, grasp_of
 from grasp_core.planning.reach import Finger, reach
@@ -387,33 +387,16 @@ SAME_LENGTH = 1e-6
 """Largest relative difference of two lengths that differ by rounding and joined vertices only."""
 
 
-def load_changed_part(
-    path: Path,
-    old: Polyhedron,
-    unit: str,
-    limits: MeshLimits = DEFAULT_LIMITS,
-    *,
-    scale: float = 1.0,
-) -> Polyhedron:
-    """Read a changed part from its mesh file, with exact planar faces.
+def as_read(old: Polyhedron) -> dict[str, Any]:
+    """Return the keywords of `load_polyhedron` that read a changed part as the old one was read.
 
-    A centre of mass that was given for the old part is kept; otherwise it is that of uniform
-    density.
+    Faces are planar. A centre of mass that was given is kept; else it is that of uniform density.
     """
-    return load_polyhedron(
-        path,
-        unit=unit,
-        scale=scale,
-        faces="planar",
-        largest_part=old.surface.dropped > SMALL,
-        center_of_mass=given_center(old),
-        limits=limits,
-    )
-
-
-def given_center(body: Polyhedron) -> Array | None:
-    """Return the centre of mass of a part if it was given and is not that of uniform density."""
-    return body.center_of_mass if body.surface.center_given else None
+    return {
+        "faces": "planar",
+        "largest_part": old.surface.dropped > SMALL,
+        "center_of_mass": old.center_of_mass if old.surface.center_given else None,
+    }
 
 
 def growth(old: Polyhedron, new: Polyhedron) -> float:
