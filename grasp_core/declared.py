@@ -42,7 +42,7 @@ _DRAWN_WITH: list[Draw] = []
 """The function that was handed over, or none."""
 
 
-class Plan(NamedTuple):
+class Checks(NamedTuple):
     """How the fields of a class are checked."""
 
     takers: tuple[tuple[str, Take], ...]
@@ -91,7 +91,7 @@ class Declared(ByValue):
     def is_sound(self) -> bool:
         """Return whether every field is as the constructor would keep it, whoever set it."""
         try:
-            for name, take in plan(type(self), exact=True).takers:
+            for name, take in checks_of(type(self), exact=True).takers:
                 take(getattr(self, name))
             check_letters(self)
             self._check_together()
@@ -107,7 +107,7 @@ class Declared(ByValue):
 def check(value: object) -> None:
     """Check all fields of a dataclass against their kinds, and keep them in plain form."""
     kind = type(value)
-    for name, take in plan(kind).takers:
+    for name, take in checks_of(kind).takers:
         given = getattr(value, name)
         try:
             plain = take(given)
@@ -123,7 +123,7 @@ def check(value: object) -> None:
 def check_letters(value: object) -> None:
     """Refuse arrays whose lengths differ where their shapes say the same letter."""
     sizes: dict[str, tuple[int, str]] = {}
-    for name, shape in plan(type(value)).lettered:
+    for name, shape in checks_of(type(value)).lettered:
         array = getattr(value, name)
         for letter, size in zip(shape, getattr(array, "shape", ()), strict=False):
             if isinstance(letter, str):
@@ -141,7 +141,7 @@ def types(kind: type) -> Mapping[str, Any]:
 
 
 @cache
-def plan(kind: type, *, exact: bool = False) -> Plan:
+def checks_of(kind: type, *, exact: bool = False) -> Checks:
     """Return how the fields of a class are checked."""
     takers = tuple((name, takes(each, exact=exact)) for name, each in types(kind).items())
     shapes = ((name, getattr(rule, "shape", ()))
@@ -149,7 +149,7 @@ def plan(kind: type, *, exact: bool = False) -> Plan:
     lettered = tuple(
         (name, shape) for name, shape in shapes if any(isinstance(n, str) for n in shape)
     )
-    return Plan(takers, lettered)
+    return Checks(takers, lettered)
 
 
 def rules(kind: Any) -> tuple[Any, ...]:

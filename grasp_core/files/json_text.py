@@ -43,7 +43,7 @@ def object_of(
     text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
 ) -> dict[str, Any]:
     """Return the object that a JSON text holds."""
-    found = value_of(text, nulls=nulls)
+    found = json_of(text, nulls=nulls)
     if not isinstance(found, dict):
         raise InputError(f"{_with_article(wanted)} must hold one JSON object, got {shown(found)}")
     record = cast("dict[str, Any]", found)
@@ -53,7 +53,7 @@ def object_of(
     return record
 
 
-def value_of(text: str, *, nulls: bool = True) -> Any:
+def json_of(text: str, *, nulls: bool = True) -> Any:
     """Return the value that a JSON text holds."""
     try:
         found = json.loads(text, object_pairs_hook=_without_twins)
