@@ -13,8 +13,8 @@ from typing import Any, get_args
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
-from grasp_core.declared import FieldError
 from grasp_core.errors import GraspError, InputError
+from grasp_core.kinds import FieldError
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.flags import Baseline
 from sim_validate.datasets import flags as dataset_flags

@@ -23,9 +23,9 @@ from grasp_core.arrays import (
     frozen_units,
     real_array,
 )
-from grasp_core.checked import LARGEST, LARGEST_FRICTION, instance, several, shown
 from grasp_core.errors import InputError
 from grasp_core.frames import plane_tangents
+from grasp_core.kinds import LARGEST, LARGEST_FRICTION, instance, several, shown
 from grasp_core.values import FINGERS, Contact, Grasp
 
 FEWEST = 2

@@ -31,7 +31,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import (
     WRENCH,
     contact_arrays,
@@ -50,6 +49,7 @@ from grasp_core.closure.friction_search import (
 )
 from grasp_core.closure.proofs import CHECK_SLACK, ContactCones, proves_closure
 from grasp_core.compiled import compiled
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.values import Contact, Grasp
 
 NO_FORCE = 1e-100

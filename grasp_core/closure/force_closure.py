@@ -49,7 +49,6 @@ from grasp_core.arrays import (
     Wrench,
     of_order_one,
 )
-from grasp_core.checked import LARGEST
 from grasp_core.closure.contacts import (
     are_torsions,
     contact_arrays,
@@ -65,7 +64,7 @@ from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.proofs import ContactCones, margin_ceiling, proved_margin
 from grasp_core.declared import Declared, trusted
 from grasp_core.errors import UndecidedError
-from grasp_core.kinds import Range
+from grasp_core.kinds import LARGEST, Range
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6

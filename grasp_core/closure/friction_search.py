@@ -42,7 +42,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.contacts import WRENCH, grasp_map, normal_and_tangential, unit_size
 from grasp_core.closure.decision import Answer, decide, margin_program, null_space
 from grasp_core.closure.friction_interval import (
@@ -62,6 +61,7 @@ from grasp_core.closure.proofs import (
     proves_closure,
 )
 from grasp_core.errors import SolverError
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 
 LARGEST_VARIABLE = 1e4

@@ -29,7 +29,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Frictions, Shape, frozen
-from grasp_core.checked import one_of, positive, shown
 from grasp_core.closure.contacts import (
     LOCAL,
     WRENCH,
@@ -45,6 +44,7 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.declared import Declared, trusted
 from grasp_core.errors import InputError
+from grasp_core.kinds import Quantity, one_of, shown, value_of
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Contact, Grasp
@@ -70,7 +70,7 @@ much where torques are over a thousandth of the scale (see `measures`)."""
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
     """Compute levers of contacts about a centre, divided by the torque scale."""
-    scale = positive(torque_scale, "torque_scale")
+    scale = value_of(Quantity, torque_scale, "torque_scale")
     spread = np.ptp(points, axis=0)
     check_spread(spread)
     apart = points - points.mean(axis=0)

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.checked import instance, positive
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
@@ -36,6 +35,7 @@ from grasp_core.execution.squeeze_certificate import (
     Survival,
     no_scale,
 )
+from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
@@ -100,7 +100,7 @@ def best_squeeze(
     """
     start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
     instance(loads, LoadSet, "loads", "gc.any_direction makes one")
-    most = None if max_push_n is None else positive(max_push_n, "max_push_n")
+    most = None if max_push_n is None else value_of(Quantity, max_push_n, "max_push_n")
     return searched(start, loads, most, motors)
 
 

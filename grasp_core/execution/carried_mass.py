@@ -86,14 +86,13 @@ from grasp_core.arrays import (
     cross,
     of_order_one,
 )
-from grasp_core.checked import SMALLEST, number
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.declared import Declared, summary
 from grasp_core.execution.grips import Bounded
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.execution.payload import FIRST, ball_in, nearest_facet, outward
-from grasp_core.kinds import Quantity, Range
+from grasp_core.kinds import SMALLEST, Quantity, Range, number
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import HELD, WrenchBody
 from grasp_core.solvers.ties import first_best

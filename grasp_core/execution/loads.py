@@ -47,11 +47,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, Shape, frozen
-from grasp_core.checked import LARGEST, SMALLEST, number, positive
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
+from grasp_core.kinds import LARGEST, SMALLEST, Quantity, number, value_of
 from grasp_core.solvers.ties import first_best
 
 GRAVITY_M_PER_S2 = 9.80665
@@ -104,7 +104,7 @@ def any_direction(
     Raises:
         InputError: A number is out of range, or there is nothing that has any direction.
     """
-    mass = positive(mass_kg, "mass_kg")
+    mass = value_of(Quantity, mass_kg, "mass_kg")
     most = number(acceleration_m_per_s2, "acceleration_m_per_s2", least=0.0, most=LARGEST)
     offset, axes = np.zeros(WRENCH), np.zeros((WRENCH, 3))
     if gravity is None:

@@ -41,8 +41,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Amount, Array, Indices, Triangles, is_indices
-from grasp_core.checked import positive
+from grasp_core.arrays import Amount, Array, Indices, Triangles, is_array
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
@@ -50,7 +49,7 @@ from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.kinds import Range
+from grasp_core.kinds import Quantity, Range, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.quality.wrench_limits import WrenchBody, WrenchLimit, limit_of
@@ -109,7 +108,7 @@ def least_distance(corners: Array) -> float:
 
 def ball_in(points: Array, triangles: Any) -> float:
     """Return the radius of the ball that triangles show by (2) to be in a hull, or -inf."""
-    if not (is_indices(triangles, None, 3) and len(triangles)):
+    if not (is_array(triangles, None, 3, whole=True) and len(triangles)):
         return -np.inf
     if triangles.min() < 0 or triangles.max() >= len(points) or not _is_closed(triangles):
         return -np.inf
@@ -224,7 +223,7 @@ def payload(
         SolverError: A program's answer failed its check.
     """
     start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
-    most = positive(max_push_n, "max_push_n")
+    most = value_of(Quantity, max_push_n, "max_push_n")
     loaded = np.flatnonzero(motors_for(motors, len(start.friction)).gravity)
     if loaded.size:
         raise InputError(

@@ -34,7 +34,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
-from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
 from grasp_core.closure.contacts import (
     contact_arrays,
     contact_frames,
@@ -48,6 +47,7 @@ from grasp_core.closure.proofs import ContactCones
 from grasp_core.closure.wrench_sets import contact_program
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 from grasp_core.errors import InputError, NoForcesError, SolverError
+from grasp_core.kinds import LARGEST, SMALLEST, number, one_of, several, shown
 from grasp_core.solvers import conic, qp
 from grasp_core.solvers.conic import ConicProgram
 from grasp_core.solvers.qp import PROXQP, QuadraticProgram, check_solver, least_distance

@@ -56,7 +56,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import UNIT_SLACK, Array, Shape, cross
-from grasp_core.checked import LARGEST, switch
 from grasp_core.closure.contacts import WRENCH, contact_frictions, cross_matrix
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
@@ -65,7 +64,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach, Stance, direction, stance_of
-from grasp_core.kinds import Quantity
+from grasp_core.kinds import LARGEST, Quantity, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
@@ -95,7 +94,7 @@ def hand_motors(
             has no mass that gravity needs, or a motor cannot carry the links.
     """
     stance = stance_of(hand, reach)
-    switch(any_orientation, "any_orientation")
+    value_of(bool, any_orientation, "any_orientation")
     way = None if down is None else direction(down, "down")
     found, levers, limits = _joints(hand, stance)
     if any_orientation:

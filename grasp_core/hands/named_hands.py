@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.checked import shown, text
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.kinds import shown, value_of
 
 Row = tuple[float, ...]
 Rows = tuple[Row, ...]
@@ -293,7 +293,7 @@ def load_hand(name: str) -> Hand:
     Raises:
         InputError: There is no such hand.
     """
-    if text(name, "name") not in HANDS:
+    if value_of(str, name, "name") not in HANDS:
         raise InputError(
             f"name must be that of a built-in hand, {' or '.join(HANDS)}, got {shown(name)}; "
             "scenes.load_hand(path, fingertips=...) reads files"

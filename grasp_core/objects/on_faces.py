@@ -22,9 +22,9 @@ from functools import lru_cache
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
-from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import nearest_on_segments
+from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.objects.triangles import areas_and_normals
@@ -47,7 +47,7 @@ def check_planar(body: Polyhedron, asking: str) -> None:
     if body.patches is not None:
         raise InputError(
             f"{asking}: expected an object with planar faces, got {body.name} with curved ones; "
-            "take a mesh with fewer, planar faces"
+            "read it with faces='planar', or take a mesh with fewer, planar faces"
         )
 
 

@@ -11,9 +11,8 @@ from typing import Annotated, Literal
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, Point, Polygon, Shape, UnitVector
-from grasp_core.checked import LARGEST
 from grasp_core.declared import Declared, counted, summary
-from grasp_core.kinds import NotNegative, Number, Range
+from grasp_core.kinds import LARGEST, NotNegative, Number, Range
 from grasp_core.values import RIGHT_ANGLE
 
 Places = Annotated[Indices, Shape(None, whole=True)]

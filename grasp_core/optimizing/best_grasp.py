@@ -26,34 +26,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Amount, Array
-from grasp_core.checked import coefficient, function, number, seed_of, whole
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Gap, TimeLimit
+from grasp_core.kinds import Count, Friction, Gap, Seed, TimeLimit, function, number, value_of
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
-from grasp_core.optimizing.grounds import (
-    SEARCH_DIGITS,
-    TWISTS,
-    exact_maps,
-    first_nodes,
-    grounds_of,
-)
+from grasp_core.optimizing.grounds import SEARCH_DIGITS, TWISTS, exact_maps, first_nodes, grounds_of
 from grasp_core.optimizing.incumbents import begin, climbed, piece_at
-from grasp_core.optimizing.search import (
-    EXACT_GAP,
-    Searching,
-    Steps,
-    Stop,
-)
+from grasp_core.optimizing.search import EXACT_GAP, Searching, Steps, Stop
 from grasp_core.optimizing.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.planning.certify import named
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import Measure, MeasureName, ResistedLoads, measured_set
-from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits, first_best, on_grid, surpassing
 from grasp_core.values import FINGERS, Grasp, four
 
@@ -398,10 +385,10 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         SolverError: A program's answer failed its check.
     """
     check_planar(body, "best_grasp")
-    friction, seed = coefficient(friction), seed_of(seed)
+    friction, seed = value_of(Friction, friction, "friction"), value_of(Seed, seed, "seed")
     value_of(Gap, gap, "gap")
     loads = Measure.of(measure, wrenches, body.radius)
-    jobs = min(whole(jobs, "jobs", least=1), MOST_JOBS)
+    jobs = min(value_of(Count, jobs, "jobs"), MOST_JOBS)
     if progress is not None:
         function(progress, "progress")
     if time_limit_s is not None:

@@ -17,15 +17,15 @@ borders.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen_each
-from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Cases
+from grasp_core.kinds import LARGEST, Cases, Friction, Range, number, several, value_of
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
@@ -35,7 +35,6 @@ from grasp_core.optimizing.grounds import Grounds, first_nodes, grounds_on
 from grasp_core.optimizing.search import Searching, Stop
 from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
 from grasp_core.quality.measures import FERRARI_CANNY
-from grasp_core.settings import value_of
 from grasp_core.solvers.ties import few_digits
 from grasp_core.values import FINGERS, FaceQuadruple
 
@@ -103,7 +102,7 @@ def quality_ceiling(
         SolverError: A program's answer failed its check.
     """
     check_planar(body, "quality_ceiling")
-    friction = coefficient(friction)
+    friction = value_of(Friction, friction, "friction")
     number(known, "known", least=0.0, most=LARGEST)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
     value_of(Cases, parts, "parts")
@@ -119,8 +118,8 @@ def quality_ceiling(
 
 
 def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Grounds, Indices]:
-    each = partial(whole, name="faces", most=len(body.faces) - 1)
-    given = several(faces, each, "faces", "indices")
+    each = partial(value_of, Annotated[int, Range(least=0, most=len(body.faces) - 1)], name="faces")
+    given: tuple[int, ...] = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
         raise InputError(f"faces must be {FINGERS} indices of faces, got {len(given)}")
     by_face = pieces_by_face(body)

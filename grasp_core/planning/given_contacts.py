@@ -8,10 +8,8 @@ patches need not cover it.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +19,8 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import circle, nearest_on_segments, plane_frame
-from grasp_core.objects.on_faces import within
+from grasp_core.geometry.polygons import circle, plane_frame
+from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.objects.triangles import areas_and_normals
@@ -59,17 +57,18 @@ class Seated:
     body: Polyhedron  # the object; a curved one with four more faces, one around each contact
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
-    moved_m: float  # largest distance of a contact from where it was given [m]
+    moved_m: float = 0.0  # largest distance of a contact from where it was given [m]
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
     """Move four contacts to the nearest faces of an object with fitting normals."""
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
+    facets = facets_of(body)
     found = list[Nearest]()
     reach, margin = LARGEST_MOVE * body.radius, NEARER * body.radius
     for finger, (point, normal) in enumerate(zip(points, inward, strict=True)):
-        nearest = nearest_like(body, point, normal, lean=LARGEST_LEAN, reach=reach, margin=margin)
+        nearest = nearest_like(facets, point, normal, lean=LARGEST_LEAN, reach=reach, margin=margin)
         if nearest is None:
             raise InputError(
                 f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
@@ -78,7 +77,7 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
         found.append(nearest)
     faces = four(each.face for each in found)
     if body.patches is not None:
-        around = [_around(body, each) for each in found]
+        around = [_around(body, each.face, each.contact) for each in found]
         faces = four(len(body.faces) + finger for finger in range(FINGERS))
         body = replace(body, faces=(*body.faces, *around))
     contacts = four(each.contact for each in found)
@@ -117,30 +116,40 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
     )
 
 
-class FlatParts(NamedTuple):
-    """The flat convex parts of a surface: pieces of faces, or triangles of a curved surface."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Facets:
+    """Triangles that make up a surface: of the convex pieces of faces, or of a curved mesh."""
 
-    faces: Indices  # indices of the faces, or of the triangles where the object is curved, (p,)
-    normals: Array  # unit vectors into the object, (p, 3)
-    polygons: Sequence[Array]  # counter-clockwise about the normals, (k, 3) each [m]
+    faces: Indices  # index of the face, or of the triangle where the object is curved, (t,)
+    normals: Array  # unit vectors into the object, (t, 3)
+    corners: Array  # counter-clockwise about the normals, (t, 3, 3) [m]
 
 
 @lru_cache(maxsize=8)
-def flat_parts(body: Polyhedron) -> FlatParts:
-    """List the flat convex parts that make up an object's surface; kept, as many contacts ask."""
+def facets_of(body: Polyhedron) -> Facets:
+    """List the triangles of an object's surface; kept, as they are searched for every contact."""
     if body.patches is None:
-        faces = np.repeat(np.arange(len(body.faces)), [len(face.pieces) for face in body.faces])
-        pieces = [piece for face in body.faces for piece in face.pieces]
-        return FlatParts(faces, body.normals[faces], pieces)
+        fans = [fan(face) for face in body.faces]
+        faces = np.repeat(np.arange(len(fans)), [len(each) for each in fans])
+        return Facets(faces, body.normals[faces], np.concatenate(fans))
     corners = body.vertices[body.triangles[:, ::-1]]
     areas, normals = areas_and_normals(corners)
-    solid = np.flatnonzero(areas > 0.0)
-    return FlatParts(solid, normals[solid], list(corners[solid]))
+    (kept,) = np.nonzero(areas > 0.0)
+    return Facets(kept, normals[kept], corners[kept])
+
+
+def fan(face: Face) -> Array:
+    """Split the convex pieces of a face into triangles about their first corners, (t, 3, 3)."""
+    fans = (
+        np.stack([np.broadcast_to(piece[0], piece[2:].shape), piece[1:-1], piece[2:]], axis=1)
+        for piece in face.pieces
+    )
+    return np.concatenate([np.empty((0, 3, 3)), *fans])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """The point of a surface that is nearest to a given one, among parts with a like normal."""
+    """The point of a surface that is nearest to a given one, among facets with a like normal."""
 
     face: int  # index of the face, or of the triangle where the object is curved
     contact: Contact
@@ -148,26 +157,23 @@ class Nearest:
 
 
 def nearest_like(
-    body: Polyhedron, point: Array, normal: Array, *, lean: float, reach: float, margin: float
+    facets: Facets, point: Array, normal: Array, *, lean: float, reach: float, margin: float
 ) -> Nearest | None:
-    """Find the point nearest to a given one on parts that lean little; None beyond reach."""
-    parts = flat_parts(body)
-    firsts = np.array([polygon[0] for polygon in parts.polygons])
-    heights = np.einsum("ti,ti->t", parts.normals, point - firsts)
-    likely = np.flatnonzero((parts.normals @ normal >= math.cos(lean)) & (np.abs(heights) <= reach))
-    best: Nearest | None = None
-    for index in likely.tolist():
-        own = parts.normals[index]
-        at = nearest_in(parts.polygons[index], own, point)
-        distance = float(np.linalg.norm(at - point))
-        if distance <= reach and (best is None or distance < best.distance - margin):
-            best = Nearest(int(parts.faces[index]), Contact(at, own), distance)
-    return best
+    """Find the point nearest to a given one on facets that lean little; None beyond reach."""
+    heights = np.abs(np.einsum("ti,ti->t", facets.normals, point - facets.corners[:, 0]))
+    (likely,) = np.nonzero((facets.normals @ normal >= math.cos(lean)) & (heights <= reach))
+    at = nearest_on_triangles(facets.corners[likely], point)
+    distances = np.linalg.norm(at - point, axis=1)
+    if not (distances <= reach).any():
+        return None
+    best = first_best(np.where(distances <= reach, -distances, -np.inf), margin)
+    index = likely[best]
+    contact = Contact(at[best], facets.normals[index])
+    return Nearest(int(facets.faces[index]), contact, float(distances[best]))
 
 
-def _around(body: Polyhedron, found: Nearest) -> Face:
+def _around(body: Polyhedron, triangle: int, contact: Contact) -> Face:
     """Make a round face around a contact on a triangle, in the triangle's plane."""
-    contact = found.contact
     radius = SURROUNDINGS * body.radius
     polygon = contact.position + radius * circle(CORNERS) @ plane_frame(contact.normal).T
     return Face(
@@ -177,14 +183,5 @@ def _around(body: Polyhedron, found: Nearest) -> Face:
         polygon=polygon,
         holes=(),
         pieces=(polygon,),
-        facets=np.array([found.face]),
+        facets=np.array([triangle]),
     )
-
-
-def nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
-    """Compute the point of a convex polygon that is nearest to a given point, (3,) [m]."""
-    flat = point - float(normal @ (point - polygon[0])) * normal
-    if within(flat, polygon, normal, 0.0):
-        return flat
-    feet = nearest_on_segments(polygon, np.roll(polygon, -1, axis=0), flat)
-    return feet[first_best(-np.linalg.norm(feet - flat, axis=1))]

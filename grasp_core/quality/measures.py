@@ -56,11 +56,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, Figure, Shape, frozen
-from grasp_core.checked import LARGEST, SMALLEST, one_of
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program, into_cones
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
+from grasp_core.kinds import LARGEST, SMALLEST, one_of
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
     GAP,

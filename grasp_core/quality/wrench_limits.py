@@ -43,7 +43,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Amount, Array, Figure, Points, Shape, Wrench, cross, frozen
-from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contacts import (
     LOCAL,
     WRENCH,
@@ -59,6 +58,7 @@ from grasp_core.closure.contacts import (
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
+from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import minimize
 from grasp_core.solvers.ties import first_best, smallest_first
@@ -105,7 +105,7 @@ class WrenchBody:
         motors: Motors | None = None, torsions: Array | None = None,
     ) -> None:  # fmt: skip
         """Set up the conic program; its last column will hold the wrench in question."""
-        self.max_normal_force = positive(max_normal_force, "max_normal_force")
+        self.max_normal_force = value_of(Quantity, max_normal_force, "max_normal_force")
         self.count = k = len(arms)
         self.motors = motors_for(motors, k)
         # at the contacts' own middle and at unit size all numbers are of order one

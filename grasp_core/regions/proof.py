@@ -51,19 +51,7 @@ from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import (
-    Amount,
-    Array,
-    Indices,
-    Point,
-    Polygon,
-    Shape,
-    Wrench,
-    are_frictions,
-    are_units,
-    is_array,
-)
-from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.arrays import Amount, Array, Indices, Point, Polygon, Shape, Wrench, is_array
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
@@ -76,7 +64,7 @@ from grasp_core.geometry.polygons import (
     holds_disc,
     plane_frame,
 )
-from grasp_core.kinds import Quantity, Range
+from grasp_core.kinds import LARGEST_FRICTION, Quantity, Range
 from grasp_core.values import FINGERS, ContactRegion
 
 TWIST = 6
@@ -139,7 +127,8 @@ class TwistCover(Declared):
         if not self.is_sound():
             return False
         k = self.forces.shape[1]
-        if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
+        units = is_array(normals, k, 3, units=True, slack=SLACK)
+        if not (units and is_array(friction, k, least=0.0, most=LARGEST_FRICTION)):
             return False
         placed = isinstance(regions, list | tuple) and len(regions) == k
         placed = placed and all(is_array(each, None, 3) and len(each) > 0 for each in regions)

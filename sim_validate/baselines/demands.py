@@ -5,14 +5,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Range, Share
+from grasp_core.kinds import LARGEST_FRICTION, Range, Share, value_of
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.records.grasps_json import load_grasps
-from grasp_core.settings import CHOSEN, Settings, for_users, named, value_of
+from grasp_core.settings import CHOSEN, Settings, for_users, named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines.check import not_survived, unstable

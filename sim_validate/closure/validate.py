@@ -32,9 +32,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, function, instance, several, whole
 from grasp_core.closure.contacts import contact_frames, stacked
 from grasp_core.errors import InputError, UndecidedError
+from grasp_core.kinds import Count, Friction, function, instance, several, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces, within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
@@ -250,7 +250,7 @@ def verdict_of(job: Job) -> Verdict:
     """Validate one grasp."""
     body, grasp, friction, setup = job.body, job.grasp, job.friction, job.setup
     check_on_faces(body, grasp)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     critical = setup.critical_friction(grasp)
     closed = friction > critical
     if not (closed and setup.closure(grasp, friction).closed):
@@ -294,11 +294,11 @@ def validate_all(
         UnfaithfulError: The simulator fails its checks with these settings.
     """
     check_body(body)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     kind = partial(instance, kind=Grasp, name="grasps")
     listed = several(grasps, kind, "grasps", "Grasp values")
     agenda, setup = asked_for(agenda, setup)
-    whole(jobs, "jobs", least=1)
+    value_of(Count, jobs, "jobs")
     if progress is not None:
         function(progress, "progress")
     tasks = [Job(body, grasp, friction, agenda, setup) for grasp in listed]

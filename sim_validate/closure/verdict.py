@@ -14,13 +14,12 @@ from typing import Annotated, Any, Self
 import numpy as np
 
 from grasp_core.arrays import Array, Shape, Wrench
-from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared, InNotebooks
 from grasp_core.figures import Compared, Shown, figure, less, more, scalars
 from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
 from grasp_core.grasp_tables import ById, frame_of
-from grasp_core.kinds import Friction, Many, Measured, OrInfinity
+from grasp_core.kinds import Friction, Many, Measured, OrInfinity, path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact

@@ -12,13 +12,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
-from grasp_core.checked import shown
-from grasp_core.declared import Declared, FieldError
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import RecordFile, from_record, record_of, recorded
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import Number, Range
+from grasp_core.kinds import FieldError, Number, Range, shown
 from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.rows import Tables, dataset_tables, groups_asked
 from sim_validate.kit.files import require_inside

@@ -15,10 +15,10 @@ from itertools import groupby, islice
 from pathlib import Path
 from typing import Any
 
-from grasp_core.checked import one_of, path_of
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import from_record, record_of
+from grasp_core.kinds import one_of, path_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash

@@ -19,7 +19,7 @@ from types import MappingProxyType
 
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError, about
-from grasp_core.files.json_text import value_of
+from grasp_core.files.json_text import json_of
 from grasp_core.files.text_files import read_text
 from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
@@ -76,7 +76,7 @@ def given_text(given: Sequence[GivenGrasp]) -> str:
 def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
     """Parse contacts to judge from the text of a contacts file."""
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
-    stated = value_of(text)
+    stated = json_of(text)
     planned = "schema" in stated  # graspproof planned these, and they may be judged at any friction
     remedy = "friction: remove it from the contacts file, because a dataset has its own frictions"
     if not planned and "friction" in stated:

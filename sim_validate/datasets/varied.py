@@ -15,16 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import LARGEST_FRICTION
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.errors import (
-    InputError,
-    SolverError,
-    UndecidedError,
-    UnfaithfulError,
-)
+from grasp_core.errors import InputError, SolverError, UndecidedError, UnfaithfulError
 from grasp_core.geometry.polygons import plane_frame
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat
@@ -107,7 +102,7 @@ def variants(
             ratio = _ratio(kind, draws(seed, grasp.id, kind, number))
             varied = _short(ratio * grasp.critical_friction)
             if LEAST_FRICTION <= varied <= LARGEST_FRICTION:
-                at = Seated(body, grasp.faces, grasp.contacts, 0.0)
+                at = Seated(body, grasp.faces, grasp.contacts)
                 yield from _decided(kind, number, at, varied, np.zeros(FINGERS), UNMOVED)
     for number in range(asked.moved_out):
         yield from _moved(body, grasp, friction, number, draws(seed, grasp.id, "moved_out", number))
@@ -150,7 +145,7 @@ def _moved(
     if all(each is None for each in exits):
         return
     try:
-        at = Seated(body, grasp.faces, four(contacts), 0.0)
+        at = Seated(body, grasp.faces, four(contacts))
         if body.patches is not None:  # the surface departs from the plane of its patch
             points = [contact.position for contact in contacts]
             at = seat(body, points, [contact.normal for contact in contacts])
@@ -257,7 +252,7 @@ class Varying:
             return
         lost_kg = executed.least_predicted_loss * executed.execution.mass_kg
         alone, kind = replace(verdict, controls=()), "mass_near"
-        at = Seated(body, grasp.faces, grasp.contacts, 0.0)
+        at = Seated(body, grasp.faces, grasp.contacts)
         for number in range(self.asked.mass_near):
             rng = draws(self.agenda.seed, grasp.id, kind, number)
             mass_kg = _short(_ratio(kind, rng) * lost_kg)

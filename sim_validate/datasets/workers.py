@@ -30,11 +30,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
-from grasp_core.checked import shown
-from grasp_core.declared import FieldError
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import read_bytes
+from grasp_core.kinds import FieldError, shown
 from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.make_unit import Made, made_of
 from sim_validate.datasets.parquet import parquet_bytes

@@ -18,18 +18,18 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.checked import instance, one_of, switch, whole
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
+from grasp_core.kinds import Range, instance, one_of, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
@@ -218,8 +218,8 @@ def execution_of(
     threads: int, enough: bool,
 ) -> Execution:  # fmt: skip
     """Choose the squeeze, simulate its trials, and find what would be enough if they are lost."""
-    whole(threads, "threads", least=1, most=MOST_THREADS)
-    switch(enough, "enough")
+    value_of(Annotated[int, Range(least=1, most=MOST_THREADS)], threads, "threads")
+    value_of(bool, enough, "enough")
     try:
         best = choose(settings, None)
     except NoForcesError as error:

@@ -43,10 +43,10 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import SMALLEST
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.kinds import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact

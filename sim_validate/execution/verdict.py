@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 from grasp_core.arrays import Array, Shape
-from grasp_core.checked import path_of
-from grasp_core.declared import Declared, FieldError
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more, scalars
 from grasp_core.files.records import FLAT, UNRECORDED, Key, RecordFile, recorded
 from grasp_core.grasp_tables import ById, frame_of
-from grasp_core.kinds import Friction, OrInfinity, Quantity
+from grasp_core.kinds import FieldError, Friction, OrInfinity, Quantity, path_of
 from grasp_core.provenance import versions
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.physics import PhysicsSettings

@@ -13,11 +13,10 @@ from typing import Annotated
 import numpy as np
 
 from grasp_core.arrays import Array, Shape, rounded, to_digits
-from grasp_core.checked import SMALLEST
 from grasp_core.declared import Declared
 from grasp_core.figures import Shown
 from grasp_core.files.records import Key
-from grasp_core.kinds import Friction
+from grasp_core.kinds import SMALLEST, Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import WrenchLimit, limit_of

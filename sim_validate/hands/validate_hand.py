@@ -12,7 +12,6 @@ from typing import Annotated
 
 import numpy as np
 
-from grasp_core.checked import instance
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
@@ -20,7 +19,7 @@ from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
-from grasp_core.kinds import Friction, Quantity
+from grasp_core.kinds import Friction, Quantity, instance
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, limited
 from scenes.settings import FingerSettings

@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from grasp_core.checked import MOST_COUNT
 from grasp_core.kinds import (
+    MOST_COUNT,
     Cases,
     Count,
     Direction,

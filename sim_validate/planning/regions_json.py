@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Shape, frozen, frozen_indices, frozen_units
-from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError, about
@@ -18,7 +17,7 @@ from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
 from grasp_core.grasp_tables import ById
-from grasp_core.kinds import Count, Family, Friction, NotNegative
+from grasp_core.kinds import Count, Family, Friction, NotNegative, path_of
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions

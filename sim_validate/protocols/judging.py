@@ -14,9 +14,9 @@ from functools import partial
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, instance, one_of
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
+from grasp_core.kinds import Friction, instance, one_of, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
@@ -66,7 +66,7 @@ def judge_by(
     """
     found = _protocol(protocol)
     check_body(body)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
     contacts = given_contacts(body, grasp)
     given = grasp if isinstance(grasp, Grasp) else contacts
@@ -121,7 +121,7 @@ def judge_hand_by(
     found = _protocol(protocol)
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
     file = hand_file(hand)
     stiffness = file.servo_n_m_per_rad if found.own_servos else None

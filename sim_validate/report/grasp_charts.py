@@ -17,10 +17,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.checked import positive
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.errors import InputError
+from grasp_core.kinds import Quantity, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
@@ -122,7 +122,7 @@ def margins(
 ) -> tuple[Array, Array]:
     """Compute the largest force [N] and torque [mN m] resisted, (LATITUDES, LONGITUDES) each."""
     check_drawn(body, grasp, friction)
-    positive(max_normal_force_n, "max_normal_force_n")
+    value_of(Quantity, max_normal_force_n, "max_normal_force_n")
     certificate = force_closure(grasp, friction=friction)
     if certificate.forces is None:
         raise InputError(

@@ -6,8 +6,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
-from grasp_core.checked import function, path_of, whole
 from grasp_core.files.text_files import write_text
+from grasp_core.kinds import Count, Number, function, path_of, value_of
 from scenes.drawing.pages import as_text, object_data
 from sim_validate.kit.processes import available_cores, each
 from sim_validate.kit.result_folders import (
@@ -84,8 +84,8 @@ def write_report(
     out = folder / REPORT if out is None else path_of(out, "out")
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None:
-            whole(value, name, least=1)
-    whole(clips, "clips")
+            value_of(Count, value, name)
+    value_of(Number, clips, "clips")
     function(progress, "progress")
     function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))

@@ -10,7 +10,7 @@ from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.planning import family_search as promising_module
 from grasp_core.planning.family_search import SAME_MERIT, BestFirst
-from grasp_core.planning.methods import prepared
+from grasp_core.planning.plan_search import in_standard_order
 from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.quadruples import all_blocks
 from grasp_core.planning.request import PlanRequest
@@ -64,7 +64,7 @@ def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
 def opened(body, family, least):
     """Quadruples as they are handed out, and blocks that were made."""
     request = PlanRequest(0.4, (family,), None, "tilted")
-    on, _ = prepared(body, request)
+    on = in_standard_order(body, request)
     cones = PlannedCones(on.body, on.shapes, request.theta, tilted=True)
     (rooms, blocks), made = all_blocks(cones, len(on.faces), on.shared), []
 
