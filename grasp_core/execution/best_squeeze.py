@@ -177,12 +177,13 @@ def _solved(
     grip = start.squeezed(np.einsum("kij,kj->ki", start.frames, local))
     own = Survival.of(grip, loads, motors)
     local = grip.local_squeeze
-    angles, _ = own.reactions(local).worst_angles()
+    angles, slips = own.reactions(local).worst_angles()
     worst = Cuts(angles, np.arange(len(angles)))
     rows = own.rows(worst)
     pushes = rows.reached(local, 1.0)[rows.d > 0.0]
     limit = most or float(pushes.max()) * (1.0 + 2.0 * SAFE[-1])
-    scales = rows.scales(local, limit)
+    # of nearly equal angles a rule takes one, so that its row may end a little later
+    scales = np.append(slips, rows.scales(local, limit)[len(slips) :])
     y, z = multipliers[:-WRENCH], multipliers[-WRENCH:]
     upper = max(own.bound(own.rows(cuts), y, z, limit), float(scales.min()))
     least = 0.0 if most else 1.0 + SAFE[-1]

@@ -4,7 +4,7 @@ import numpy as np
 
 import grasp_core as gc
 from tests.tampering.exact_closure import contacts_make_sense
-from tests.tampering.squeezes import GRAVITY, ray
+from tests.tampering.squeezes import GRAVITY, ray, squeeze
 
 
 def payload(c):
@@ -24,6 +24,22 @@ def payload(c):
     least = min(held(h, way) for way in ways)
     slack = 1e-6 * h.max_push_n
     return bool(c.lower <= least + slack and c.upper >= least - slack)
+
+
+def payload_of_contacts(c):
+    """The squeeze is as claimed, and so is what other forces hold behind links without weight."""
+    g, h, E = c.fixed.grip, c.free.hand, c.fixed.loads.axes
+    ball = np.diag([GRAVITY**2] * 3 + [0.0] * 3)
+    if c.fixed.loads.offset.any() or np.abs(E @ E.T - ball).max() > 1e-6 or not squeeze(c.fixed):
+        return False
+    motors = c.fixed.motors or gc.Motors.of(np.zeros((0, h.arms.size)), 1.0)
+    pairs = (
+        (h.arms, g.arms), (h.normals, g.normals), (h.friction, g.friction),
+        (h.max_push_n, c.fixed.max_push_n), (h.motors.levers, motors.levers),
+        (h.motors.limits, motors.limits), (h.motors.gravity, motors.gravity),
+        (h.weights, np.zeros((len(motors.limits), 3))),
+    )  # fmt: skip
+    return all(np.array_equal(one, other) for one, other in pairs) and payload(c.free)
 
 
 def carries_links(h):
