@@ -41,7 +41,7 @@ which bounds s where c.y > 0. The residual r is zero but for rounding.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,7 +178,7 @@ class Survival:
         """Number of rows (3)."""
         return 2 * self.groups * len(self.motors.limits)
 
-    def torques(self, values: Array) -> Array:
+    def torques(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return those of rows (3), (2, groups, joints), of values of all rows, (rows,)."""
         return values[len(values) - self.torque_rows :].reshape(2, self.groups, -1)
 

@@ -262,7 +262,7 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
 def of_object(
     hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, needs: Array
 ) -> float:  # fmt: skip
-    """Return the least distance of shapes from a surface, beyond what each needs, if it is negative.
+    """Return the least distance of shapes from a surface beyond what each needs, if negative.
 
     A shape whose hull overlaps the surface, or is inside it, is as deep as the surface is large.
     """

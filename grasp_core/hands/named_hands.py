@@ -15,9 +15,9 @@ Menagerie states the mass of the palm and a density of links, but no masses of l
 `leap_hand` (MIT, copyright 2023 Ananye Agarwal), which comes from dexsuite's URDF. Boxes, masses
 and centres of mass are those of the model. Fingertips are rubber blocks 21 mm wide, 24 mm broad and
 rounded at the end: the hulls of the corners of the model's meshes, given to .1 mm. All points
-within .1 mm of such a hull hold the mesh, and reach at most .18 mm beyond it. What covers a block is
-the box around its corners, its edges rounded by 5 mm and as much as the corners need. The ball of
-10.4 mm, half a block's width, stands for a block where a tip has to be a ball.
+within .1 mm of such a hull hold the mesh, and reach at most .18 mm beyond it. A block is covered by
+the box around its corners, whose edges are rounded by 5 mm and by as much as the corners need. The
+ball of 10.4 mm, half a block's width, stands for a block where a tip has to be a ball.
 """
 
 from pathlib import Path
