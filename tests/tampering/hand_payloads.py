@@ -17,9 +17,11 @@ def payload(c):
         return False
     if not 0.0 <= c.lower <= c.upper:
         return False
-    facing = h.weights.T @ c.motor_multipliers - GRAVITY * c.upper * c.facet[:3]
+    large = max(1.0, c.upper)  # any length of the way is as good, and claims may be huge
+    facing = h.weights.T @ (c.motor_multipliers / large) - GRAVITY * c.upper / large * c.facet[:3]
     ways = np.vstack([c.gravities, np.random.default_rng(0).normal(size=(30, 3)), facing])
-    ways = ways[np.linalg.norm(ways, axis=1) > 0.0]
+    ways = ways[np.abs(ways).max(axis=1) > 0.0]
+    ways /= np.abs(ways).max(axis=1, keepdims=True)
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     least = min(held(h, way) for way in ways)
     slack = 1e-6 * h.max_push_n
