@@ -187,26 +187,27 @@ class Survival:
         return Reactions(np.tile(local, (self.groups, 1)) + self.offset, self.change, self.friction)
 
     def rows(self, cuts: Cuts) -> Rows:
-        """Build the rows (1) at some angles, and all of (2) and (3).
-
-        Each asks for a sum over the forces of all cases, with weights V (rows, cases * 3).
-        """
-        r, count, mu = len(cuts.cases), len(self.friction), self.friction[cuts.cases]
-        cones, pushes = np.zeros((r, count, 3)), np.zeros((count, count, 3))
-        sides = np.cos(cuts.angles), np.sin(cuts.angles)
-        cones[np.arange(r), cuts.cases] = np.stack([-mu, *sides], axis=1)
-        pushes[:, :, 0] = np.eye(count)
-        above, torques = pushes.reshape(count, -1), np.kron(np.eye(self.groups), self.motors.levers)
-        V = np.vstack([cones.reshape(r, -1), above, -above, torques, -torques])
+        """Build the rows (1) at some angles, and all of (2) and (3)."""
+        r, count, k = len(cuts.cases), len(self.friction), self.contacts
+        squeezes = np.tile(np.eye(3 * k).reshape(k, 3, 3 * k), (self.groups, 1, 1))
         links, none = np.tile(self.motors.gravity, self.groups), np.zeros(r + 2 * count)
         limits = np.tile(self.motors.limits, 2 * self.groups)
-        limited = np.zeros(len(V))
+        limited = np.zeros(r + 2 * count + len(limits))
         limited[r : r + count] = 1.0
         return Rows(
-            V.reshape(len(V), self.groups, -1).sum(axis=1),
-            V @ self.offset.ravel() + np.concatenate([none, links, -links]),
-            V @ self.change.reshape(3 * count, -1), np.append(none, limits), limited,
+            self._sums(cuts, squeezes),
+            self._sums(cuts, self.offset[:, :, None])[:, 0] + np.concatenate([none, links, -links]),
+            self._sums(cuts, self.change), np.append(none, limits), limited,
         )  # fmt: skip
+
+    def _sums(self, cuts: Cuts, forces: Array) -> Array:
+        """Compute what rows ask of forces in all cases, (cases, 3, m), without links, (rows, m)."""
+        sides = np.cos(cuts.angles), np.sin(cuts.angles)
+        v = np.stack([-self.friction[cuts.cases], *sides], axis=1)
+        cones, pushes = np.einsum("rj,rjm->rm", v, forces[cuts.cases]), forces[:, 0]
+        stacked = forces.reshape(self.groups, -1, forces.shape[2])
+        torques = (self.motors.levers @ stacked).reshape(-1, forces.shape[2])
+        return np.concatenate([cones, pushes, -pushes, torques, -torques])
 
     def bound(self, rows: Rows, multipliers: Array, balance: Array, max_push_n: float) -> float:
         """Bound by (4) the scale that any squeeze with this response survives; infinite if none."""
