@@ -188,7 +188,8 @@ class HandPayload(Declared):
     """The largest mass that a hand holds in every orientation, proved from both sides.
 
     The hand stands still, its motors carry its links too, and forces are chosen anew for each
-    orientation. Everything is along the object's axes and about its centre of mass.
+    orientation. Contacts alone are held as by a hand whose links have no weight. Everything is
+    along the object's axes and about its centre of mass.
     """
 
     lower: Amount
@@ -204,9 +205,9 @@ class HandPayload(Declared):
     triangles: Triangles
     """Triangles of that hull, by the indices of their corners, (t, 3)."""
     facet: Annotated[Array, Shape(WRENCH)]
-    """Twist y in (5), (6,)."""
+    """Twist y that proves the upper bound by (5) of `carried_mass`, (6,)."""
     motor_multipliers: Annotated[Array, Shape(None)]
-    """Multipliers u of the joints in (5), (joints,)."""
+    """Multipliers u of the joints in it, (joints,)."""
     hand: "CarryingHand"
     """The contacts, and the motors and links behind them."""
 
