@@ -42,6 +42,8 @@ def page() -> str:
 
 def entry(short: str, name: str, thing: Any) -> str:
     """What is said of one public name."""
+    if inspect.isclass(thing) and thing.__name__ != name:
+        return f"\n### class `{short}.{name}`\n\nAnother name of `{short}.{thing.__name__}`.\n"
     if inspect.isclass(thing):
         members = "".join(f"{line}\n" for line in members_of(thing))
         end = f"\n{members}" if members else ""

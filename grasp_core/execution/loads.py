@@ -46,7 +46,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, Shape, frozen
+from grasp_core.arrays import Array, Shape, frozen
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
@@ -146,11 +146,6 @@ class Reactions:
         """L of (4) as a quadratic form in (mu, u), (k, 3, 3)."""
         return self.change @ self.change.transpose(0, 2, 1)
 
-    def leaning(self, contacts: Indices, angles: Array) -> Array:
-        """Compute B'u - mu a of (3) for contacts and an angle of each, (r, m) [N]."""
-        v = np.stack([-self.friction[contacts], np.cos(angles), np.sin(angles)], axis=1)
-        return np.einsum("rj,rjm->rm", v, self.change[contacts])
-
     def room(self, angles: Array) -> Array:
         """Compute mu n0 - u.t0 of (3) at angles of each contact, (k, g) [N]."""
         n, t = self.start[:, 0, None], self.start[:, 1:]
@@ -186,7 +181,8 @@ class Reactions:
 
     def worst_of(self, contact: int, angle: float) -> Array:
         """Find the z at which a contact slips first in a direction, of unit length, (m,)."""
-        leaning = self.leaning(np.array([contact]), np.array([angle]))[0]
+        weights = np.array([-self.friction[contact], np.cos(angle), np.sin(angle)])
+        leaning = weights @ self.change[contact]  # B'u - mu a of (3)
         return leaning / (float(np.linalg.norm(leaning)) or 1.0)
 
     def survives(self, scale: float, multipliers: Array) -> bool:

@@ -345,7 +345,7 @@ TABLE = {
     "a cut tree for other loads": Row(cut_tree_for_loads, best_grasps.proof, 0.4),
     "a best grasp for a task": Row(lambda _: best_for_loads(0), best_grasps.best, 0.4),
     "ResistedLoads": Row(resisted, wrench_bounds.resisted),
-    "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
+    "Payload": Row(payload, lambda c, _: hand_payloads.payload_of_contacts(c), 0.4),
     "HandPayload": Row(hand_payload, lambda c, _: hand_payloads.payload(c), 0.8),
     "proof file of regions": Row(
         proof_file, lambda c, rng: on_planes.regions(regions_of(vars(c)), rng), 0.4
