@@ -69,6 +69,7 @@ WIDENED = 1e-8
 MOST_MAPS = 128
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
+NODES = "grasp_core.optimizing.nodes_kernel"
 TWISTS = "grasp_core.optimizing.twists_kernel"
 
 
@@ -234,7 +235,7 @@ def first_nodes(
 
 def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, int]:
     """Cut a piece to the part nearer to a point of it than to the point's images, by (1)."""
-    clip = compiled(TWISTS).clip
+    clip = compiled(NODES).clip
     polygon, count = grounds.corners[piece].copy(), int(grounds.counts[piece])
     middle = polygon[:count].mean(axis=0)
     aside = sum(share * (polygon[k] - middle) for k, share in enumerate(ASIDE))
@@ -245,7 +246,5 @@ def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, 
         limit = 0.5 * (float((turn @ q) @ (turn @ q)) - float(q @ q))
         line = np.array([*(away @ grounds.frames[piece]), limit - away @ grounds.origins[piece]])
         line[2] += WIDENED * float(np.linalg.norm(away))
-        out = np.zeros((ROOM, 2))
-        count = clip(polygon, count, line, 1.0, out)
-        polygon = out
+        count = clip(polygon, count, line, 1.0)
     return polygon, count

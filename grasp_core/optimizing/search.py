@@ -25,7 +25,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.grounds import ROOM, SEARCH_DIGITS, TWISTS, Grounds
+from grasp_core.optimizing.grounds import NODES, SEARCH_DIGITS, TWISTS, Grounds
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
 from grasp_core.solvers.ties import on_grid
@@ -133,20 +133,14 @@ def leave(part: Part) -> None:
 
 def part_from(first: Nodes, pool: Any) -> Part:
     """Return a part that begins with nodes and the twists of a pool."""
-    nodes = compiled(KERNEL)
     corners, counts, fresh = first
-    deep, pieces = max(DEEP, len(corners) + FINGERS + 1), counts.shape[2]
-    stack = nodes.Stack(
-        np.zeros((deep, FINGERS, pieces, ROOM, 2)),
-        np.zeros((deep, FINGERS, pieces), np.int64),
-        np.zeros((deep, FINGERS), np.int64), np.zeros(deep, np.int64), np.zeros(1, np.int64),
-    )  # fmt: skip
+    stack = compiled(NODES).vacant(max(DEEP, len(corners) + FINGERS + 1), counts.shape[2])
     n = len(corners)
     # the last one is searched first
     stack.corners[:n, :, :, : corners.shape[3]] = corners[::-1]
     stack.counts[:n], stack.fresh[:n] = counts[::-1], fresh[::-1]
     stack.top[0] = n
-    tree = nodes.Tree(
+    tree = compiled(KERNEL).Tree(
         np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
         np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
     )  # fmt: skip
@@ -160,8 +154,8 @@ def part_from(first: Nodes, pool: Any) -> Part:
 def enlarge(part: Part) -> None:
     """Make room in what is full of a part's stack and tree; few twists serve many nodes."""
     stack, tree = part.stack, part.tree
-    if int(stack.top[0]) + FINGERS >= len(stack.depths):
-        part.stack = type(stack)(*map(_doubled, stack[:4]), stack.top)
+    if int(stack.top[0]) + FINGERS >= len(stack.above):
+        part.stack = compiled(NODES).doubled(stack)
     sizes = [int(tree.sizes[k]) for k in (0, 0, 1, 2)]
     arrays = [
         _doubled(array) if size + 1 >= len(array) else array
@@ -176,15 +170,15 @@ def _doubled(array: Any) -> Any:
 
 def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     """Put the trees of parts into their places in the trunk's tree, and in each other's."""
-    nodes = compiled(KERNEL)
+    splice, lines_from = int(compiled(KERNEL).SPLICE), int(compiled(NODES).BY_PIECES)
     every = [trunk, *parts]
     sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
     starts = np.cumsum(sizes, axis=0) - sizes
     asked: dict[int, Indices] = {}
     for part, (n, _, _), (_, twists, lines) in zip(every, sizes, starts, strict=True):
-        shifts = np.where(part.tree.deeds[:n] < int(nodes.BY_PIECES), int(twists), int(lines))
+        shifts = np.where(part.tree.deeds[:n] < lines_from, int(twists), int(lines))
         asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
-    rows = list(_in_order(trunk, int(nodes.SPLICE)))
+    rows = list(_in_order(trunk, splice))
     return Steps(
         np.concatenate([part.tree.deeds[some] for part, some in rows]),
         np.concatenate([asked[id(part)][some] for part, some in rows]),
@@ -230,7 +224,7 @@ class Searching:
         kernel, grounds = compiled(TWISTS), self.grounds
         each = (grounds.normals, grounds.origins, grounds.frames)
         numbers = (on_grid(every, SEARCH_DIGITS) for every in each)
-        self.pieces = kernel.Pieces(*numbers, float(self.friction))
+        self.pieces = compiled(NODES).Pieces(*numbers, float(self.friction))
         kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
         scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
         loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
@@ -315,7 +309,7 @@ class Searching:
                     break
                 size = int(part.tree.sizes[0])
                 # found again: the twist refutes the contacts by less than rounding
-                if size == found_at and not kernel.divide(search, int(part.stack.top[0]) - 1):
+                if size == found_at and not kernel.divide(search):
                     break
                 found_at = size
         part.stack = None  # the memory of a part that is done
