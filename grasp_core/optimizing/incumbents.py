@@ -63,7 +63,7 @@ def _closed_sets(
     weights = [rng.dirichlet(np.ones(len(polygons[int(p)]))) for p in on]
     inside = [w @ polygons[int(p)] for w, p in zip(weights, on, strict=True)]
     at = on_grid(np.array(inside))
-    supports = _supports(grounds, searching.friction, on, at, twists)
+    supports = grounds.supports(on, at, searching.friction, twists)
     sets = np.sort(rng.integers(POINTS, size=(SETS, FINGERS)), axis=1)
     demands = measure.demands(twists)
     bounds = np.concatenate(
@@ -127,12 +127,3 @@ def piece_at(grounds: Grounds, place: int) -> FacePiece:
         origin=grounds.origins[place], frame=grounds.frames[place], corners=corners, E=E, b=b,
         inradius=0.0,
     )  # fmt: skip
-
-
-def _supports(grounds: Grounds, friction: float, on: Indices, at: Array, twists: Array) -> Array:
-    points = grounds.origins[on] + np.einsum("kij,kj->ki", grounds.frames[on], at)
-    normals = grounds.normals[on]
-    u = twists[None, :, :3] + np.cross(twists[None, :, 3:], points[:, None])
-    along = np.einsum("mnj,mj->mn", u, normals)
-    across = np.linalg.norm(u - along[:, :, None] * normals[:, None], axis=2)
-    return along + friction * across
