@@ -71,7 +71,7 @@ ALONE = np.eye(3)[None]
 """The symmetry that every object has, (1, 3, 3)."""
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
-NODES = "grasp_core.optimizing.nodes_kernel"
+REPLAY = "grasp_core.optimizing.replay_kernel"
 TWISTS = "grasp_core.optimizing.twists_kernel"
 
 
@@ -244,7 +244,7 @@ def first_nodes(
 
 def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, int]:
     """Cut a piece to the part nearer to a point of it than to the point's images, by (1)."""
-    clip = compiled(NODES).clip
+    clip = compiled(REPLAY).clip
     polygon, count = grounds.corners[piece].copy(), int(grounds.counts[piece])
     middle = polygon[:count].mean(axis=0)
     aside = sum(share * (polygon[k] - middle) for k, share in enumerate(ASIDE))

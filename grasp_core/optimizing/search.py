@@ -27,7 +27,7 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.optimizing.grounds import (
     ALONE,
-    NODES,
+    REPLAY,
     SEARCH_DIGITS,
     TWISTS,
     Grounds,
@@ -149,7 +149,7 @@ def leave(part: Part) -> None:
 def part_from(first: Nodes, pool: Any) -> Part:
     """Return a part that begins with nodes and the twists of a pool."""
     corners, counts, fresh = first
-    stack = compiled(NODES).vacant(max(DEEP, len(corners) + FINGERS + 1), counts.shape[2])
+    stack = compiled(REPLAY).vacant(max(DEEP, len(corners) + FINGERS + 1), counts.shape[2])
     n = len(corners)
     # the last one is searched first
     stack.corners[:n, :, :, : corners.shape[3]] = corners[::-1]
@@ -170,7 +170,7 @@ def enlarge(part: Part) -> None:
     """Make room in what is full of a part's stack and tree; few twists serve many nodes."""
     stack, tree = part.stack, part.tree
     if int(stack.top[0]) + FINGERS >= len(stack.above):
-        part.stack = compiled(NODES).doubled(stack)
+        part.stack = compiled(REPLAY).doubled(stack)
     sizes = [int(tree.sizes[k]) for k in (0, 0, 1, 2)]
     arrays = [
         _doubled(array) if size + 1 >= len(array) else array
@@ -185,7 +185,7 @@ def _doubled(array: Any) -> Any:
 
 def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     """Put the trees of parts into their places in the trunk's tree, and in each other's."""
-    splice, lines_from = int(compiled(KERNEL).SPLICE), int(compiled(NODES).BY_PIECES)
+    splice, lines_from = int(compiled(KERNEL).SPLICE), int(compiled(REPLAY).BY_PIECES)
     every = [trunk, *parts]
     sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
     starts = np.cumsum(sizes, axis=0) - sizes
@@ -249,7 +249,7 @@ class Searching:
         self.searched = Slack.of(self.friction, len(self.maps), self.measure, SEARCHED_BELOW)
         each = (grounds.normals, grounds.origins, grounds.frames)
         numbers = (on_grid(every, SEARCH_DIGITS) for every in each)
-        self.pieces = compiled(NODES).Pieces(*numbers, float(self.friction))
+        self.pieces = compiled(REPLAY).Pieces(*numbers, float(self.friction))
         kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
         scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
         loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)

@@ -13,7 +13,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
-from grasp_core.optimizing.nodes_kernel import BY_LINE, BY_PIECES, Nodes, Pieces, branch, split
+from grasp_core.optimizing.replay_kernel import BY_LINE, BY_PIECES, Nodes, Pieces, branch, split
 from grasp_core.optimizing.twists_kernel import (
     Demand,
     Pool,

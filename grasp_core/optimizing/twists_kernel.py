@@ -14,7 +14,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
-from grasp_core.optimizing.nodes_kernel import Pieces, outline
+from grasp_core.optimizing.replay_kernel import Pieces, outline
 
 SLOPES = 6
 """Numbers that say how a contact of a piece answers a twist, see `slopes`."""
