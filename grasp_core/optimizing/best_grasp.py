@@ -5,7 +5,7 @@ contact's position, so that no contact on a polygon answers a twist with more th
 support at its corners; the largest of all polygons, over the twist's demand, is what no four
 contacts exceed.
 
-*Levels.* Good contacts are found (`incumbents`), and then one threshold after another is refuted,
+*Levels.* Good contacts are found (`ascent`), and then one threshold after another is refuted,
 each by a tree of cuts (`search`). Each threshold is nearer to the best known quality q: the gap is
 halved from level to level, to q / (1 - gap) at last. Contacts that are found on the way and reach a
 threshold become the best known, and the level is tried again. A level costs more than all before
@@ -34,9 +34,9 @@ from grasp_core.geometry.polygons import convex_polygon
 from grasp_core.kinds import Gap, TimeLimit
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.optimizing.ascent import begin, climbed, piece_at
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
 from grasp_core.optimizing.grounds import UNIT, exact_maps, grounds_of
-from grasp_core.optimizing.incumbents import begin, climbed, piece_at
 from grasp_core.optimizing.search import EXACT_GAP, Searching, Stop
 from grasp_core.optimizing.support_cuts import CutTree
 from grasp_core.planning.certify import named

@@ -10,8 +10,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.optimizing import best_grasp as searching
 from grasp_core.optimizing import search
+from grasp_core.optimizing.ascent import CLIMBED, climbed
 from grasp_core.optimizing.grounds import exact_maps, grounds_of
-from grasp_core.optimizing.incumbents import CLIMBED, climbed
 from grasp_core.optimizing.search import Searching, Stop
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
