@@ -15,7 +15,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby
+from itertools import groupby, product
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -43,7 +43,7 @@ from sim_validate.datasets.manifest import (
     read_manifest,
     write_manifest,
 )
-from sim_validate.datasets.parquet import TableFiles, pyarrow
+from sim_validate.datasets.parquet import joined, pyarrow, write_files
 from sim_validate.datasets.rows import ROWS, dataset_tables
 from sim_validate.datasets.units import WorkUnit, given_text, provenance, units_of, units_sha256
 from sim_validate.datasets.workers import Engine, Staging, UnitRecord, drive
@@ -227,18 +227,21 @@ def _sorted_out(
 def _write_tables(
     config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
 ) -> list[Listed]:
-    tables = dataset_tables(config.groups)
+    tables, found = dataset_tables(config.groups), list[Listed]()
     about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
-    with TableFiles(folder / DATA, about, tables) as files:
-        for (_, split), same in groupby(good, key=lambda each: (each[1].object_id, each[1].split)):
-            of_object = [unit for unit, _ in same]
-            for name in tables:
-                chosen = of_object[:1] if name == "objects" else of_object
-                files.add(name, str(split), [staging.table(unit, name) for unit in chosen])
-        return [
+    objects = groupby(good, key=lambda each: (each[1].object_id, each[1].split))
+    units = [(split, [unit for unit, _ in same]) for (_, split), same in objects]
+    for name, (split, _) in product(tables, SPLITS):
+        parts = (
+            joined([staging.table(unit, name) for unit in chosen], name, tables)
+            for own, of_object in units if own == split
+            for chosen in [of_object[:1] if name == "objects" else of_object]
+        )  # fmt: skip
+        found += [
             replace(listed(folder, path), table=name, split=split, rows=rows)
-            for name, split, path, rows in files.close()
+            for path, rows in write_files(folder / DATA / name, split, parts, about)
         ]
+    return found
 
 
 def card_text(config: DatasetConfig, manifest: Manifest) -> str:

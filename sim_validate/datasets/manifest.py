@@ -21,7 +21,7 @@ from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import Number, Range
 from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.rows import Tables, dataset_tables, groups_asked
-from sim_validate.kit.files import require_inside
+from sim_validate.kit.files import path_inside, require_inside
 
 MANIFEST = "manifest.json"
 QUARANTINE = "quarantine.jsonl"
@@ -44,6 +44,18 @@ class Listed(Declared):
 
     def _check_together(self) -> None:
         require_inside(self.path, "path")
+
+    def fault(self, folder: Path) -> str:
+        """Say how the file of a folder is not as listed, by its hash; empty if it is."""
+        path = path_inside(folder, self.path)
+        if not path.is_file():
+            return "this file is listed in the manifest, but missing"
+        found = listed(folder, path)
+        if found.bytes != self.bytes:
+            return f"the file differs from what was written: {found.bytes} bytes, not {self.bytes}"
+        if found.sha256 != self.sha256:
+            return "the file differs from what was written (its sha256 differs)"
+        return ""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -100,12 +112,10 @@ class Manifest(RecordFile):
 
 def listed(folder: Path, path: Path) -> Listed:
     """Describe a file as the manifest lists it: path, size and hash."""
-    digest, size = hashlib.sha256(), 0
     with path.open("rb") as stream:
-        while part := stream.read(2**20):
-            digest.update(part)
-            size += len(part)
-    return Listed(path.relative_to(folder).as_posix(), size, digest.hexdigest())
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        size = stream.tell()
+    return Listed(path.relative_to(folder).as_posix(), size, digest)
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> Path:

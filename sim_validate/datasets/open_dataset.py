@@ -36,7 +36,7 @@ from sim_validate.datasets.config import (
     Name,
     config_from_toml,
 )
-from sim_validate.datasets.manifest import Listed, Manifest, listed, read_manifest
+from sim_validate.datasets.manifest import Listed, Manifest, read_manifest
 from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.datasets.rows import (
     GIVEN,
@@ -92,18 +92,9 @@ class Selection:
 
     def _whole(self, each: Listed) -> Path:
         """Check that a file has the manifest's hash, as page checksums miss some bytes."""
-        path = path_inside(self.folder, each.path)
-        if not path.is_file():
-            raise InputError(
-                f"{path}: this file of the dataset is missing; see `graspproof dataset verify`"
-            )
-        found = listed(self.folder, path)
-        if (found.bytes, found.sha256) != (each.bytes, each.sha256):
-            raise InputError(
-                f"{path}: this file of the dataset differs from what was written; see `graspproof "
-                "dataset verify`"
-            )
-        return path
+        if fault := each.fault(self.folder):
+            raise InputError(f"{each.path}: {fault}; see `graspproof dataset verify`")
+        return path_inside(self.folder, each.path)
 
     def config(self) -> DatasetConfig:
         """Read the configuration of the dataset."""

@@ -98,7 +98,6 @@ def _rows(array: Array) -> tuple[Triple, ...]:
     return tuple((float(x), float(y), float(z)) for x, y, z in array)
 
 
-CHUNK = 2**20
 PART = 25
 """Largest number of given grasps in one unit, which take half a minute."""
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
@@ -204,11 +203,8 @@ def is_mesh_file(name: str) -> bool:
 def _source_sha256(name: str) -> str:
     if not is_mesh_file(name):
         return example_object(name).content_sha256
-    digest = hashlib.sha256()
     try:
         with Path(name).open("rb") as stream:
-            while part := stream.read(CHUNK):
-                digest.update(part)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{name}: the mesh file cannot be read ({error.strerror})") from error
-    return digest.hexdigest()

@@ -27,7 +27,6 @@ from sim_validate.datasets.manifest import (
     QUARANTINE,
     Listed,
     Manifest,
-    listed,
     read_left_out,
     read_manifest,
 )
@@ -37,7 +36,6 @@ from sim_validate.datasets.rows import GraspRow, ObjectRow, Rows
 from sim_validate.datasets.units import WorkUnit, provenance, read_given
 from sim_validate.datasets.verify_rows import object_faults
 from sim_validate.execution.verdict import may_slip
-from sim_validate.kit.files import path_inside
 
 OTHER_ROUNDING = 1e-6
 """Relative difference that numbers may have when other packages or processors round them."""
@@ -64,11 +62,10 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     the row; and for a sample, whether planning and simulating again gives the same rows.
     """
     pyarrow()  # before any work, so that a missing library is named at once
-    manifest = read_manifest(folder)
-    if faults := list(_file_faults(folder, manifest.files)):
-        return faults
-    faults: list[str] = []
+    manifest, faults = read_manifest(folder), list[str]()
     try:
+        if faults := list(_file_faults(folder, manifest.files)):
+            return faults
         config = config_from_toml(folder / CONFIG)
         faults += _manifest_faults(folder, manifest, config)
         faults += _content_faults(folder, manifest, config)
@@ -104,21 +101,8 @@ def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
         f"{path}: this file is not listed in the manifest" for path in sorted(there - names)
     )
     for each in files:
-        if each.path not in there:
-            yield f"{each.path}: this file is listed in the manifest, but missing"
-            continue
-        try:
-            found = listed(folder, path_inside(folder, each.path))
-        except InputError as error:
-            yield str(error)
-            continue
-        if found.bytes != each.bytes:
-            yield (
-                f"{each.path}: the file has {found.bytes} bytes, but the manifest lists "
-                f"{each.bytes}"
-            )
-        elif found.sha256 != each.sha256:
-            yield f"{each.path}: the file differs from what was written (its sha256 differs)"
+        if fault := each.fault(folder):
+            yield f"{each.path}: {fault}"
 
 
 def _manifest_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
