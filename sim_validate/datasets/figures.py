@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.cones.spanning import span_angle
-from grasp_core.errors import GraspError, NoForcesError
+from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
 from grasp_core.hands.named_hands import load_hand
@@ -21,11 +21,11 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.values import FINGERS, Contact, Grasp
 from sim_validate.datasets.columns import Cells, figures_in
-from sim_validate.datasets.config import DatasetConfig, Learning
+from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.rows import ExecutionRow, GraspRow
 from sim_validate.execution.execute import execute, tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
-from sim_validate.settings import ExecutionSettings, TrialKind
+from sim_validate.settings import TrialKind
 
 Executed: TypeAlias = ExecutedGrasp | str | None
 """An execution, the reason why it was refused, or None where none is asked for."""
@@ -71,22 +71,28 @@ def trial_cells(trials: Sequence[ExecutionTrial]) -> dict[str, Any]:
 
 
 def executed_by(
-    body: Polyhedron, contacts: Sequence[Contact], friction: float, settings: ExecutionSettings,
-    asked: Learning | None, name: str,
-) -> ExecutedGrasp:  # fmt: skip
+    config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact], friction: float,
+    name: str, mass_kg: float | None = None,
+) -> Executed:  # fmt: skip
     """Execute contacts, and once more for each seed asked for with objects misplaced by it.
 
     Contacts without a squeeze are a result with a reason.
     """
+    if config.execution is None:
+        return None
     about = name, "", contacts_sha256(contacts)
     try:
+        settings = config.execution.for_body(body)
+        if mass_kg is not None:
+            settings = replace(settings, mass_kg=mass_kg)
         first = execute(body, contacts, friction, settings, enough=False)
     except NoForcesError as error:
         return ExecutedGrasp(*about, None, str(error))
-    if asked is None or MISPLACED not in settings.trials:
-        return ExecutedGrasp(*about, first)
+    except InputError as error:
+        return str(error)
+    seeds = () if config.learning is None else config.learning.seeds
     trials = list(first.trials)
-    for place, seed in enumerate(asked.seeds, start=1):
+    for place, seed in enumerate(seeds if MISPLACED in settings.trials else (), start=1):
         again = replace(settings, trials=(MISPLACED,), seed=seed)
         more = execute(body, contacts, friction, again, enough=False).trials
         trials += [

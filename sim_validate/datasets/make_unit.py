@@ -149,22 +149,12 @@ class _Making:
         verdict = validated_with(body, grasp, friction, self.agenda, config.learning)
         if config.scenes and verdict.scene is not None:
             self.files[f"scenes/{self._name(grasp.id)}.xml"] = verdict.scene.xml
-        executed = self._executed(grasp, body)
+        executed = executed_by(config, body, grasp.contacts, friction, grasp.id)
         self._add_closed(begun, grasp, verdict, executed, body)
         if config.learning is not None:
-            varying = Varying(config.learning, friction, self.agenda, config.execution)
+            varying = Varying(config, config.learning, friction, self.agenda)
             for each in varying.of(body, grasp, verdict, executed):
                 self._add_varied(self._name(grasp.id), each)
-
-    def _executed(self, grasp: Grasp, body: Polyhedron) -> Executed:
-        config, friction = self.config, self.unit.friction
-        if config.execution is None:
-            return None
-        try:
-            settings = config.execution.for_body(body)
-            return executed_by(body, grasp.contacts, friction, settings, config.learning, grasp.id)
-        except InputError as error:
-            return str(error)
 
     def _add_varied(self, made_from: str, tried: Tried) -> None:
         """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
@@ -177,7 +167,6 @@ class _Making:
             kind=variant.kind,
             made_from=made_from,
             friction=variant.friction,
-            friction_ratio=variant.friction_ratio,
             displaced_m=variant.displaced_m,
             region_exit_m=variant.exits_m,
             mass_ratio=variant.mass_ratio,
@@ -234,7 +223,6 @@ class _Making:
             "trials": len(verdict.wrenches),
             "mismatches": len(verdict.mismatches),
             "verdict": figures_in(GraspRow, "verdict", verdict),
-            "friction_ratio": ratio_of(verdict.friction, grasp.critical_friction),
             **closed_cells(self.config, body, grasp, verdict.friction),
         }
         row = self._added(proved | {**begun}, verdict.wrenches, executed, body)
@@ -268,7 +256,8 @@ class _Making:
         executed: Executed, body: Polyhedron,
     ) -> GraspRow:  # fmt: skip
         """Add a row with what its execution found, and the rows of its trials."""
-        row = GraspRow(**cells, **execution_cells(executed))
+        ratio = ratio_of(cells["friction"], cells.get("critical_friction"))
+        row = GraspRow(**cells, **execution_cells(executed), friction_ratio=ratio)
         if row.mass_kg is not None:
             more = squeeze_cells(self.config, body, row.placed, row.friction, row.mass_kg)
             row = replace(row, **more)

@@ -38,13 +38,12 @@ from sim_validate.closure.controls import (
 )
 from sim_validate.closure.validate import tested, validate
 from sim_validate.closure.verdict import Verdict
-from sim_validate.datasets.config import CONTROLS, Learning
+from sim_validate.datasets.config import CONTROLS, DatasetConfig, Learning
 from sim_validate.datasets.figures import Executed, executed_by
 from sim_validate.datasets.rows import VARIED
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.settings import ExecutionSettings
 
 RATIOS = {
     "friction_below": (0.6, 0.9),
@@ -86,11 +85,6 @@ class Variant:
     mass_kg: float | None = None
     """Mass of the object in the execution; None for the mass of the settings [kg]."""
     mass_ratio: float | None = None
-
-    @property
-    def friction_ratio(self) -> float | None:
-        """The friction over the critical one; None where that is not known."""
-        return ratio_of(self.friction, self.critical_friction)
 
 
 def ratio_of(friction: float, critical: float | None) -> float | None:
@@ -233,10 +227,10 @@ def validated_with(
 class Varying:
     """How the grasps of one unit of work are varied and tried."""
 
+    config: DatasetConfig
     asked: Learning
     friction: float
     agenda: Agenda
-    execution: ExecutionSettings | None
 
     def of(
         self, body: Polyhedron, grasp: Grasp, verdict: Verdict, executed: Executed
@@ -277,14 +271,11 @@ class Varying:
         return try_control(seated.body, control, self.agenda, Setup())
 
     def _executed(self, variant: Variant) -> Executed:
-        body, contacts = variant.seated.body, variant.seated.contacts
-        if self.execution is None:
-            return None
         try:
-            settings = self.execution.for_body(body)
-            if variant.mass_kg is not None:
-                settings = replace(settings, mass_kg=variant.mass_kg)
-            return executed_by(body, contacts, variant.friction, settings, self.asked, variant.name)
-        except (InputError, UnfaithfulError) as error:
+            return executed_by(
+                self.config, variant.seated.body, variant.seated.contacts, variant.friction,
+                variant.name, variant.mass_kg,
+            )  # fmt: skip
+        except UnfaithfulError as error:
             # a varied mass or friction may be beyond what the simulator is faithful for
             return str(error)

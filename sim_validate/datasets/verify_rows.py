@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import GraspError, InputError, UndecidedError
@@ -36,21 +36,16 @@ from sim_validate.datasets.figures import contact_cells, hand_named, trial_cells
 from sim_validate.datasets.make_unit import PLANNED
 from sim_validate.datasets.open_dataset import stored_body, stored_surface
 from sim_validate.datasets.rows import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
-from sim_validate.datasets.varied import RATIOS
+from sim_validate.datasets.varied import RATIOS, ratio_of
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial
 from sim_validate.settings import ExecutionSettings
 
-SAME_MARGIN = 1e-6
-"""Largest difference between a closure margin in a row and that of the contacts, relative to the
-friction."""
 ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
 """Largest distance of contacts from the mesh, for grasps and negative controls, relative to the
 object's radius. Planar faces are as flat as six digits show. Negative controls are moved in
 the planes of patches, from which a curved surface departs."""
-NEAR_ZERO = 1e-7
-"""Difference of critical frictions that counts as none: those near zero are found to millionths."""
 BAND = 1e-3
 """Share by which a ratio may leave its band: frictions and masses are rounded to four digits."""
 LABELS = {"grasp": PLANNED, GIVEN: GIVEN}
@@ -148,7 +143,7 @@ def _on_surface(surface: Surface, row: GraspRow, radius_m: float) -> Iterator[bo
 def _contact_faults(row: GraspRow) -> Iterator[str]:
     """Compute the closure of a contact set from the contacts alone."""
     try:
-        certificate = force_closure(row.points, row.normals, row.friction)
+        found = force_closure(row.points, row.normals, row.friction)
     except UndecidedError as error:
         if row.force_closed:
             yield f"force closure of the contacts cannot be decided ({error})"
@@ -156,10 +151,8 @@ def _contact_faults(row: GraspRow) -> Iterator[str]:
     except GraspError as error:
         yield f"force closure of the contacts cannot be computed ({error})"
         return
-    yield from _disagreements(row, {"force_closed": certificate.closed}, "the contacts")
-    stated, slack = row.closure_margin, SAME_MARGIN * row.friction
-    if certificate.closed and stated is not None and abs(stated - certificate.margin) > slack:
-        yield f"closure_margin is {stated:.9g}, but {certificate.margin:.9g} by the contacts"
+    margin = {"closure_margin": found.margin} if found.closed and row.force_closed else {}
+    yield from _disagreements(row, {"force_closed": found.closed, **margin}, "the contacts")
 
 
 def _requested_faults(folder: Path, config: DatasetConfig, rows: Rows) -> Iterator[str]:
@@ -179,8 +172,7 @@ def _requested_faults(folder: Path, config: DatasetConfig, rows: Rows) -> Iterat
             if config.execution is not None:
                 own = trials.get(row.grasp_id, [])
                 found += _trial_faults(row, own, has_margins=config.learning is not None)
-                if row.executed and not found:
-                    found += _squeeze_faults(row, body, config.execution)
+                found += [] if found else _squeeze_faults(row, body, config.execution)
             if config.learning is not None:
                 found += _learning_faults(row, by_name, of_object, body, config)
             yield from (f"grasps: {row.grasp_id}: {fault}" for fault in found)
@@ -194,6 +186,8 @@ def _learning_faults(
         yield from _varied_faults(row, by_name, is_curved=of_object.curved)
     else:
         yield from _disagreements(row, {"kind": LABELS.get(row.label, row.label)}, "label")
+    ratio = {"friction_ratio": ratio_of(row.friction, row.critical_friction)}
+    yield from _disagreements(row, ratio, "the critical friction")
     if row.was_tried:
         yield from _disagreements(row, contact_cells(config, body, row.placed), "the contacts")
     if row.witness_forces_n is not None:
@@ -214,33 +208,21 @@ def _varied_faults(
         yield "displaced_m or region_exit_m is missing, or contacts of made_from are"
         return
     moves = np.linalg.norm(row.points - source.points, axis=1)
-    size = max(1.0, float(np.abs(stated).max()))
-    if not np.allclose(moves, stated, rtol=0.0, atol=ROUNDING * size):
-        yield "displaced_m is not the distance from the contacts of made_from"
+    yield from _disagreements(row, {"displaced_m": moves}, "the contacts of made_from")
     if (row.kind == "moved_out") == (not stated.any()):
         yield f"contacts of the kind {row.kind} are not where they must be"
     # where a contact did not move, its exit is NaN, which nothing is below
     if not is_curved and (stated <= exits * (1.0 - ROUNDING)).any():
         yield "a contact was moved, but is still in its region"
-    yield from _ratio_faults(row)
-
-
-def _ratio_faults(row: GraspRow) -> Iterator[str]:
     try:
         critical = critical_friction(row.points, row.normals)
     except GraspError as error:
         yield f"the critical friction cannot be computed ({error})"
         return
-    wanted = row.friction / critical if 0.0 < critical < np.inf else None
-    known = row.friction_ratio
-    near = known is not None and known > 0.0 and np.isclose(
-        row.friction / known, critical, rtol=10.0 * ROUNDING, atol=NEAR_ZERO
-    )  # fmt: skip
-    if (known is None) != (wanted is None) or not (known is None or near):
-        yield f"friction_ratio is {known}, but {wanted} by the contacts"
+    yield from _disagreements(row, {"critical_friction": critical}, "the contacts")
     if row.kind in RATIOS:
         least, most = RATIOS[row.kind]
-        ratio = row.mass_ratio if row.kind == "mass_near" else known
+        ratio = row.mass_ratio if row.kind == "mass_near" else row.friction_ratio
         if ratio is None or not least * (1.0 - BAND) <= ratio <= most * (1.0 + BAND):
             yield f"the ratio {ratio} is none of the kind {row.kind}"
 
@@ -280,8 +262,7 @@ def _proved(
 ) -> Iterator[str]:
     """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
     if row.squeeze_n is None or row.load_multiple is None or row.mass_kg is None:
-        yield "the row lacks its squeeze, its mass, or what the squeeze carries"
-        return
+        return  # nothing was executed
     try:
         settings = asked.for_body(body)
         if row.mass_ratio is not None:
@@ -322,65 +303,60 @@ def _witness_faults(row: GraspRow, forces: Array, body: Polyhedron) -> Iterator[
 
 
 def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
-    reached = row.hand_reached
-    if bool(row.force_closed) != (reached is not None):
-        yield f"hand_reached is {reached}, but force_closed is {row.force_closed}"
-    elif reached is not None and reached == bool(row.hand_reason):
-        yield f"hand_reason is {row.hand_reason!r}, but hand_reached is {reached}"
-    elif reached:
-        joints, pose, fingers = row.hand_joints_rad, row.T_object_palm_m, row.hand_fingers
-        if joints is None or pose is None or fingers is None:
-            yield "the row lacks the pose of the hand, although hand_reached is True"
-            return
-        if len({*fingers.tolist()}) < FINGERS or fingers.max() >= len(hand.fingers):
-            listed = fingers.tolist()
-            yield f"hand_fingers are {listed}, not {FINGERS} of the hand's {len(hand.fingers)}"
-            return
-        yield from _motion_faults(row, pose, hand)
-        yield from _place_faults(row, (joints, pose, fingers), hand, body)
-
-
-def _motion_faults(row: GraspRow, pose: Array, hand: Hand) -> Iterator[str]:
-    low, high = hand.ranges.T
-    for name in ("hand_joints_rad", "hand_open_joints_rad"):
-        angles: Array | None = getattr(row, name)
-        outside = angles is not None and (angles < low - ROUNDED) | (angles > high + ROUNDED)
-        if np.any(outside):
-            yield f"{name} are not within the ranges of the joints"
-    turn = pose[:3, :3]
-    off = float(np.abs(turn @ turn.T - np.eye(3)).max())
-    if off > ROUNDED or np.linalg.det(turn) < 0.0 or pose[3].tolist() != np.eye(POSE)[3].tolist():
-        yield "T_object_palm_m is not a rigid motion"
-    way = row.hand_approach
-    if way is not None and abs(np.linalg.norm(way) - 1.0) > ROUNDED:
-        yield "hand_approach is not of unit length"
-
-
-def _place_faults(
-    row: GraspRow, posture: tuple[Array, Array, Indices], hand: Hand, body: Polyhedron
-) -> Iterator[str]:
-    (joints, pose, fingers), points, normals = posture, row.hand_points_m, row.hand_normals
-    if points is None or normals is None:
-        yield "the row lacks the contacts of the hand, although hand_reached is True"
-        return
-    surface = Surface(body.vertices, body.triangles)
-    pairs = zip(points, normals, strict=True)
-    if not all(surface.holds(point, normal, TOUCHES_M) for point, normal in pairs):
-        yield "hand_points_m are not on the object, or hand_normals not its normals there"
+    """Check a pose by itself, with what it must keep to."""
+    if bool(row.force_closed) != (row.hand_reached is not None):
+        yield f"hand_reached is {row.hand_reached}, but force_closed is {row.force_closed}"
+    joints, pose, fingers = row.hand_joints_rad, row.T_object_palm_m, row.hand_fingers
+    points, normals = row.hand_points_m, row.hand_normals
+    if joints is None or pose is None or fingers is None or points is None or normals is None:
+        return  # the hand does not reach the grasp
     standing: list[int] = fingers.tolist()
+    if len({*standing}) < FINGERS or fingers.max() >= len(hand.fingers):
+        yield f"hand_fingers are {standing}, not {FINGERS} of the hand's {len(hand.fingers)}"
+        return
+    surface, turn = Surface(body.vertices, body.triangles), pose[:3, :3]
     roundings = np.array([hand.fingers[finger].tip.core[1] for finger in standing])
     behind = points - roundings[:, None] * normals  # within the tips, as deep as they are rounded
     gaps = tip_distances(hand, joints, pose, standing, behind) + roundings
-    if gaps.max() > TOUCHES_M:
-        yield "the fingertips of hand_joints_rad do not touch the object at hand_points_m"
-    found = clearances(hand, body, joints, pose, fingers)
-    # a link whose tip touches the object may come as near to it as it likes
-    if found.itself < APART_M or found.object < -ROUNDED or found.tips < -TOUCHES_M:
-        yield "the hand of hand_joints_rad overlaps the object or itself"
+    found, way = clearances(hand, body, joints, pose, fingers), row.hand_approach
+    rules = {
+        "hand_joints_rad are not within the ranges of the joints": _in_ranges(joints, hand),
+        "hand_open_joints_rad are not within the ranges of the joints": (
+            row.hand_open_joints_rad is None or _in_ranges(row.hand_open_joints_rad, hand)
+        ),
+        "T_object_palm_m is not a rigid motion": (
+            np.abs(turn @ turn.T - np.eye(3)).max() <= ROUNDED and np.linalg.det(turn) > 0.0
+            and pose[3].tolist() == np.eye(POSE)[3].tolist()
+        ),
+        "hand_approach is not of unit length": (
+            way is None or abs(np.linalg.norm(way) - 1.0) <= ROUNDED
+        ),
+        "hand_points_m are not on the object, or hand_normals not its normals there": all(
+            surface.holds(point, normal, TOUCHES_M)
+            for point, normal in zip(points, normals, strict=True)
+        ),
+        "the fingertips of hand_joints_rad do not touch the object at hand_points_m": (
+            gaps.max() <= TOUCHES_M
+        ),
+        # a link whose tip touches the object may come as near to it as it likes
+        "the hand of hand_joints_rad overlaps the object or itself": (
+            found.itself >= APART_M and found.object >= -ROUNDED and found.tips >= -TOUCHES_M
+        ),
+        "hand_points_m are not proved to be in force closure": (
+            _is_proved(points, normals, row.friction)
+        ),
+    }  # fmt: skip
+    yield from (fault for fault, fits in rules.items() if not fits)
+
+
+def _in_ranges(angles: Array, hand: Hand) -> bool:
+    low, high = hand.ranges.T
+    return bool(((angles >= low - ROUNDED) & (angles <= high + ROUNDED)).all())
+
+
+def _is_proved(points: Array, normals: Array, friction: float) -> bool:
     try:
-        certificate = force_closure(points, normals, row.friction)
-        proved = certificate.closed and certificate.verify()
+        certificate = force_closure(points, normals, friction)
+        return certificate.closed and certificate.verify()
     except GraspError:
-        proved = False
-    if not proved:
-        yield "hand_points_m are not proved to be in force closure"
+        return False
