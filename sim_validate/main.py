@@ -66,7 +66,7 @@ ACTIONS: dict[type[Any], str] = {
     View: "report.command:view_grasp",
     Report: "report.command:report_folder",
     Regions: "planning.regions:certify_file",
-    Replay: "report.replay_command:replay_trial",
+    Replay: "report.command:replay_trial",
     Analyze: "planning.analyze:analyze_file",
     Transfer: "planning.transfer:transfer_file",
     Reach: "protocols.command:judge_reach",

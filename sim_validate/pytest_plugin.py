@@ -62,7 +62,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if marker is None or "grasp_case" not in metafunc.fixturenames:
         return
     from grasp_core.errors import GraspError
-    from sim_validate.baselines.demands import grasp_cases
+    from sim_validate.baselines.suite import grasp_cases
 
     wrong = ""
     try:
@@ -229,7 +229,7 @@ def assert_stable(
     def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls."""
         from sim_validate.baselines.baseline import Entry
-        from sim_validate.baselines.demands import case_of, checked, demands_of
+        from sim_validate.baselines.suite import case_of, checked, demands_of
 
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
@@ -254,7 +254,7 @@ def assert_survives(
         """Execute a grasp with its negative controls."""
         from grasp_core.files.records import record_of
         from sim_validate.baselines.baseline import ExecutedFigures
-        from sim_validate.baselines.demands import survival
+        from sim_validate.baselines.suite import survival
 
         chosen, found, why = survival(case, friction, settings)
         for key, value in record_of(ExecutedFigures.of(found)).items():

@@ -32,9 +32,8 @@ from sim_validate.kit.command_flags import Testing
 from sim_validate.kit.compiling import EVERYTHING, compile_loops
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import write_arrays
+from sim_validate.kit.files import alone_in, remove_results, write_arrays
 from sim_validate.kit.processes import available_cores
-from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.planning.wrenches_json import weights, wrenches_from_file
 from sim_validate.settings import ChosenTrials, Noise

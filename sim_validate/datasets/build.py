@@ -32,7 +32,7 @@ from sim_validate.datasets.config import (
     config_to_toml,
     quoted,
 )
-from sim_validate.datasets.manifest import (
+from sim_validate.datasets.open_dataset import (
     MANIFEST,
     QUARANTINE,
     LeftOut,
@@ -49,8 +49,7 @@ from sim_validate.datasets.units import WorkUnit, given_text, provenance, units_
 from sim_validate.datasets.workers import Engine, Staging, UnitRecord, drive
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
-from sim_validate.kit.files import path_inside
-from sim_validate.kit.result_folders import alone_in
+from sim_validate.kit.files import alone_in, path_inside
 
 CARD = "README.md"
 SIZES = (

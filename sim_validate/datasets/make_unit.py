@@ -20,14 +20,18 @@ from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict,
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets.columns import Cells, figures_in
 from sim_validate.datasets.config import SPLITS, SplitName, id_beginning
-from sim_validate.datasets.figures import (
+from sim_validate.datasets.learning import (
     Executed,
+    Tried,
+    Varying,
     closed_cells,
     contact_cells,
     executed_by,
     execution_cells,
     execution_rows,
+    ratio_of,
     squeeze_cells,
+    validated_with,
 )
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.rows import (
@@ -40,7 +44,6 @@ from sim_validate.datasets.rows import (
     TrialRow,
 )
 from sim_validate.datasets.units import GivenGrasp, WorkUnit
-from sim_validate.datasets.varied import Tried, Varying, ratio_of, validated_with
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 

@@ -22,15 +22,17 @@ from sim_validate.datasets.build import CONFIG, CONTACTS, TWIN
 from sim_validate.datasets.columns import Cells
 from sim_validate.datasets.config import KEYS, DatasetConfig, Name, config_from_toml, id_beginning
 from sim_validate.datasets.make_unit import made_of
-from sim_validate.datasets.manifest import (
+from sim_validate.datasets.open_dataset import (
     MANIFEST,
     QUARANTINE,
     Listed,
     Manifest,
+    Selection,
+    by_object,
     read_left_out,
     read_manifest,
+    stored_body,
 )
-from sim_validate.datasets.open_dataset import Selection, by_object, stored_body
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GraspRow, ObjectRow, Rows
 from sim_validate.datasets.units import WorkUnit, provenance, read_given

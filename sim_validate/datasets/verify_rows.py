@@ -32,11 +32,10 @@ from grasp_core.values import FINGERS
 from sim_validate.datasets.build import CONFIG
 from sim_validate.datasets.columns import agrees
 from sim_validate.datasets.config import KEYS, NAMES, DatasetConfig
-from sim_validate.datasets.figures import contact_cells, hand_named, trial_cells
+from sim_validate.datasets.learning import RATIOS, contact_cells, hand_named, ratio_of, trial_cells
 from sim_validate.datasets.make_unit import PLANNED
 from sim_validate.datasets.open_dataset import stored_body, stored_surface
 from sim_validate.datasets.rows import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
-from sim_validate.datasets.varied import RATIOS, ratio_of
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial

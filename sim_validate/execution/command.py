@@ -37,8 +37,7 @@ from sim_validate.kit import command_flags
 from sim_validate.kit.command_flags import Run
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_finger, asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 

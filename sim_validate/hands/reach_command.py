@@ -35,8 +35,7 @@ from sim_validate.kit import processes
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import GRASPS, asked_grasps
 from sim_validate.settings import ExecutionSettings
 

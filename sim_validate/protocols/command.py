@@ -14,8 +14,7 @@ from sim_validate.hands.reach_command import reach_file
 from sim_validate.kit import command_flags, processes
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import remove_results
+from sim_validate.kit.files import AboutObject, remove_results
 from sim_validate.protocols.judging import judge_by, judge_hand_by
 from sim_validate.protocols.published import protocol
 from sim_validate.protocols.verdict import Judgement, Judgements

@@ -23,12 +23,11 @@ from sim_validate.closure.replaying import Wanted, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
-from sim_validate.kit.result_folders import CLIPS, PICTURES
-from sim_validate.planning.regions_json import GraspRegions
-from sim_validate.report.grasp_charts import margin_panels, wrench_panels
-from sim_validate.report.reached_grasps import held_in
-from sim_validate.report.run_charts import motion_panels
+from sim_validate.kit.files import CLIPS, PICTURES
+from sim_validate.planning.regions import GraspRegions
+from sim_validate.report.charts import margin_panels, motion_panels, wrench_panels
 from sim_validate.report.run_folder import RunFolder
+from sim_validate.report.sections import held_in
 
 
 @dataclass(frozen=True, slots=True, eq=False)

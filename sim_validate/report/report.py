@@ -9,8 +9,7 @@ from typing import TypeAlias
 from grasp_core.checked import function, path_of, whole
 from grasp_core.files.text_files import write_text
 from scenes.drawing.pages import as_text, object_data
-from sim_validate.kit.processes import available_cores, each
-from sim_validate.kit.result_folders import (
+from sim_validate.kit.files import (
     GRASPS,
     INDEX,
     REPORT,
@@ -19,10 +18,19 @@ from sim_validate.kit.result_folders import (
     new_pages,
     require_report_folder,
 )  # fmt: skip
+from sim_validate.kit.processes import available_cores, each
 from sim_validate.report.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.report.grasp_page import MIRRORED, ROTATED, Copy, grasp_page
-from sim_validate.report.index_page import Shown, cards_of, index_page
-from sim_validate.report.pages import asset, style
+from sim_validate.report.pages import (
+    MIRRORED,
+    ROTATED,
+    Copy,
+    Shown,
+    asset,
+    cards_of,
+    grasp_page,
+    index_page,
+    style,
+)
 from sim_validate.report.run_folder import RunFolder, folder_of, runs_in
 
 FIRST = 4

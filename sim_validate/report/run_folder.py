@@ -11,10 +11,10 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
-from sim_validate.kit.result_folders import REACHES
+from sim_validate.kit.files import REACHES
 from sim_validate.planning.asked_objects import GRASPS
-from sim_validate.planning.best_json import Best
-from sim_validate.planning.regions_json import GraspRegions, Regions
+from sim_validate.planning.best import Best
+from sim_validate.planning.regions import GraspRegions, Regions
 from sim_validate.protocols.verdict import Judgements
 from sim_validate.report.agreement import BAD, said_of
 

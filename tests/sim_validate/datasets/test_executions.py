@@ -15,7 +15,7 @@ import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.figures import execution_cells, execution_rows
+from sim_validate.datasets.learning import execution_cells, execution_rows
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import TABLES, GraspRow
 from sim_validate.datasets.verify import Sample, loose_differences, verify

@@ -10,13 +10,12 @@ from grasp_core.errors import UnfaithfulError
 from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import validate
-from sim_validate.datasets import figures as varied_figures
+from sim_validate.datasets import learning as varied_figures
 from sim_validate.datasets.config import (
     Learning,
     config_from_toml,
 )
-from sim_validate.datasets.figures import execution_cells
-from sim_validate.datasets.varied import RATIOS, Varying, region_exit, variants
+from sim_validate.datasets.learning import RATIOS, Varying, execution_cells, region_exit, variants
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.engine.setup import Agenda
 from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of

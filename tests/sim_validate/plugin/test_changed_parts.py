@@ -14,9 +14,8 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.compare import Status
-from sim_validate.baselines.demands import grasp_cases
 from sim_validate.baselines.part import ChangedPartError, Source, source_of
-from sim_validate.baselines.suite import suite_from_toml
+from sim_validate.baselines.suite import grasp_cases, suite_from_toml
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
