@@ -36,11 +36,12 @@ from sim_validate.report.agreement import (
     frictions_in,
     limits_in,
     quadrants_in,
+    said_of_execution,
     wrench_size,
 )
 from sim_validate.report.charts import fidelity_panel
-from sim_validate.report.drawn_grasps import Drawn, certified, largest_push
-from sim_validate.report.run_folder import RunFolder
+from sim_validate.report.drawn_grasps import Drawn, largest_push
+from sim_validate.report.run_folder import RunFolder, about_grasp
 from sim_validate.report.sections import (
     described_executions,
     described_reaches,
@@ -53,7 +54,6 @@ from sim_validate.report.sections import (
     reach_commands,
     reach_section,
     reach_settings,
-    said_of_both,
     said_of_reach,
 )
 
@@ -115,9 +115,8 @@ def grasp_page(
     It leads to the pages before and after it. A grasp that is drawn has copies by symmetry; of
     these, `first` is the one that is drawn, with the kind of this copy.
     """
-    verdict = run.verdicts.get(grasp.id)
-    shown = certified(grasp, run.shaded.get(grasp.id))
-    said, tone = said_of_both(verdict, run.executions, run.executed(grasp.id))
+    verdict, shown = run.verdict(grasp.id), run.shown(grasp)
+    said, tone = run.said(grasp.id)
     size = None if verdict is None else verdict.scale.grasp_size_m
     return page(
         "grasp.html",
@@ -134,7 +133,7 @@ def grasp_page(
         first=first,
         drawn=drawn,
         push=largest_push(verdict),
-        executed=execution_section(run.executions, run.executed(grasp.id)),
+        executed=execution_section(run, grasp.id),
         reached=reach_section(run.reaches, grasp),
         executed_clips=drawn.executed if drawn else (),
         object_script=object_script,
@@ -208,11 +207,11 @@ def _contacts(grasp: Grasp) -> Iterable[Record]:
 
 
 def _certified(run: RunFolder, grasp: Grasp) -> str:
-    found = run.regions.get(grasp.id)
+    found = about_grasp(run.certified, grasp.id)
     if run.certified is None or found is None:
         return ""
     friction = f"{run.certified.friction:g}"
-    if not run.shaded:
+    if not run.shades:
         return f"Certified regions are for friction {friction}: not shown."
     if found.regions is None:
         return f"No certified regions: {found.reason}."
@@ -255,7 +254,7 @@ def _commands(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable
         yield f"graspproof replay . {asked} --out replay"
         for name in (each.control.name for each in verdict.controls):
             yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
-    if run.executions is not None and run.executed(grasp.id) is not None:
+    if run.executions is not None and grasp.id in run.executions:
         yield execute_command(run.executions, GRASPS, grasp.id)
     yield from reach_commands(run.reaches, grasp, GRASPS)
 
@@ -290,11 +289,9 @@ def cards_of(run: RunFolder) -> tuple[Copies, ...]:
     grasps = run.saved.grasps
     ended: dict[object, list[int]] = {}
     for place, grasp in enumerate(grasps):
-        found = run.executed(grasp.id)
-        said = said_of_both(run.verdicts.get(grasp.id), run.executions, found)
-        executed = execution_row(found)["said"] if run.executions else None
+        executed = said_of_execution(run.executed(grasp.id)) if run.executions else None
         reached = said_of_reach(run.reaches, grasp)[0]
-        ended.setdefault((said, executed, reached), []).append(place)
+        ended.setdefault((run.said(grasp.id), executed, reached), []).append(place)
     cards = list[Copies]()
     for places in ended.values():
         for card in copies_of(run.saved.body, [grasps[place] for place in places]):
@@ -307,7 +304,7 @@ def cards_of(run: RunFolder) -> tuple[Copies, ...]:
 
 def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int = 0) -> str:
     """Write the text of the report's first page."""
-    verdicts = [verdict for run in runs for verdict in run.verdicts.values()]
+    verdicts = [verdict for run in runs for verdict in run.tested or ()]
     executed = [run.executions for run in runs if run.executions and run.executions.grasps]
     cards = [_card(each) for each in shown]
     frictions, limits = frictions_in(verdicts), limits_in(verdicts)
@@ -371,9 +368,8 @@ def _described_possible(best: Best) -> Record:
 
 
 def _card(shown: Shown) -> dict[str, Any]:
-    grasp, verdict = shown.grasp, shown.run.verdicts.get(shown.grasp.id)
-    executed = shown.run.executed(grasp.id)
-    said, tone = said_of_both(verdict, shown.run.executions, executed)
+    grasp, verdict = shown.grasp, shown.run.verdict(shown.grasp.id)
+    said, tone = shown.run.said(grasp.id)
     return {
         "id": grasp.id,
         "object": shown.run.saved.body.name,
@@ -388,7 +384,7 @@ def _card(shown: Shown) -> dict[str, Any]:
         "quality": grasp.ferrari_canny[0],
         "share": shown.run.possible.shares.get(grasp.id) if shown.run.possible else None,
         "critical_friction": grasp.critical_friction,
-        "executed": execution_row(executed) if shown.run.executions else None,
+        "executed": execution_row(shown.run.executed(grasp.id)) if shown.run.executions else None,
         "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,
         "weakest": None if verdict is None else _weakest(verdict),
         "by_hand": held_by_hand(shown.run.reaches, grasp),

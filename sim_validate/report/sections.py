@@ -3,8 +3,8 @@
 import math
 import shlex
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, cast
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from grasp_core.hands.named_hands import HANDS
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
 from scenes.drawing.pages import number
-from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     ExecutionControl,
@@ -24,11 +23,13 @@ from sim_validate.execution.verdict import (
     multiple_in_words,
     totals_in_words,
 )
-from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of
+from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of_execution
+from sim_validate.report.run_folder import RunFolder, about_grasp
 from sim_validate.settings import ExecutionSettings
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
+
 Fact = tuple[str, str, str]
 """Name, value and meaning of a figure."""
 REASONS = {
@@ -41,26 +42,22 @@ REASONS = {
 FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
 SAID_ABOVE = ("grasp", "id")
 """Figures that the page has in its title."""
-FLAGS = {"starts": "--starts", "seed": "--seed", "clearance_m": "--clearance-m"}
-"""Flags of `graspproof reach` for what may be asked of a pose."""
+MILLI = 1e3
+ALWAYS = ("mass_kg", "seed")
+"""Settings of executions whose usual value depends on the object or on the plan."""
 
 
 def held_in(reaches: "Reaches | None", grasp: Grasp) -> PosedHand | None:
     """Return the hand in the pose in which it stands in a grasp."""
-    found = reach_of(reaches, grasp)
+    found = about_grasp(reaches, grasp.id)
     if reaches is None or found is None or not found.reach.reached:
         return None
     return posed_hand(reaches.hand, found.reach, grasp)
 
 
-def reach_of(reaches: "Reaches | None", grasp: Grasp) -> "ReachedGrasp | None":
-    """Return what was found for a grasp; None where no hand was asked for."""
-    return None if reaches is None or grasp.id not in reaches else reaches[grasp.id]
-
-
 def why_not_held(reaches: "Reaches", grasp: Grasp) -> str:
     """Say why there is no hand to draw in a grasp."""
-    found = reach_of(reaches, grasp)
+    found = about_grasp(reaches, grasp.id)
     if found is None:
         return f"reaches.json holds nothing about {grasp.id}; `graspproof reach` looks for a pose"
     return f"{grasp.id}: {found.reach.explanation}"
@@ -70,7 +67,7 @@ def said_of_reach(reaches: "Reaches | None", grasp: Grasp) -> tuple[str, str]:
     """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
     if reaches is None:
         return "", QUIET
-    found, name = reach_of(reaches, grasp), reaches.hand.name
+    found, name = about_grasp(reaches, grasp.id), reaches.hand.name
     if found is None:
         return f"{name}: not asked", QUIET
     reach, held, executed = found.reach, found.simulated, found.executed
@@ -96,7 +93,7 @@ def held_by_hand(reaches: "Reaches | None", grasp: Grasp) -> float | None:
 
     Torques count over the object's radius.
     """
-    found = reach_of(reaches, grasp)
+    found = about_grasp(reaches, grasp.id)
     return None if found is None or found.simulated is None else found.simulated.weakest_n
 
 
@@ -122,7 +119,7 @@ def reach_settings(reaches: "Reaches") -> Iterable[tuple[str, str]]:
 
 def reach_section(reaches: "Reaches | None", grasp: Grasp) -> Record | None:
     """Build the section about the hand in a grasp; None where no hand was asked for."""
-    found = reach_of(reaches, grasp)
+    found = about_grasp(reaches, grasp.id)
     if reaches is None or found is None:
         return None
     said, tone = said_of_reach(reaches, grasp)
@@ -143,11 +140,15 @@ def _reach_facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
     if found.simulated is not None:
         yield from _figures(found.simulated, "With its motors: ")
     if (executed := found.executed) is not None:
-        yield from _figures(executed, "Executed with the hand: ")
         if executed.reason is not None:
             yield "Not executed", executed.reason, ""
-        if executed.enough is not None:
-            yield "What would be enough", str(executed.enough), ""
+        yield from _of_execution(executed, "Executed with the hand: ")
+
+
+def _of_execution(found: ExecutedGrasp, part: str) -> Iterable[Fact]:
+    yield from _figures(found, part)
+    if found.enough is not None:
+        yield "What would be enough", str(found.enough), ""
 
 
 def _figures(record: object, part: str) -> Iterable[Fact]:
@@ -165,50 +166,11 @@ def reach_commands(reaches: "Reaches | None", grasp: Grasp, path: str) -> Sequen
     asked, usual = reaches.asked, type(reaches.asked)()
     words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", grasp.id]
     words += ["--friction", repr(reaches.friction)]
-    for name, flag in FLAGS.items():
-        value = getattr(asked, name)
-        words += [] if value == getattr(usual, name) else [flag, repr(value)]
+    numbers = replace(asked, regions=usual.regions, table_down=usual.table_down)
+    words += _changed_flags(numbers, usual)
     words += [] if asked.table_down is None else ["--table", *map(repr, asked.table_down)]
     words += [] if asked.regions else ["--contacts-only"]
     return [shlex.join(words)]
-
-
-MILLI = 1e3
-ALWAYS = ("mass_kg", "seed")
-"""Settings whose usual value depends on the object or on the plan."""
-FAILED, LOST = "failed", "lost"
-"""Word that begins how many trials were not survived, and the one word for it."""
-
-
-def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
-    """Say in words how the execution of a grasp ended, with the tone: good, bad or neither."""
-    if found is None:
-        return "not executed", QUIET
-    if found.execution is None:
-        return "no squeeze", BAD
-    if not found.controls_let_go:
-        return "a negative control held", BAD
-    if not found.execution.trials:
-        return "no trial is possible", BAD
-    if lost := found.execution.lost:
-        return f"{FAILED} {len(lost)} of {len(found.execution.trials)} trials", BAD
-    return "survived", GOOD
-
-
-def said_of_both(
-    verdict: Verdict | None, executions: Executions | None, found: ExecutedGrasp | None
-) -> tuple[str, str]:
-    """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
-
-    Gives the words, and the tone: good, bad or neither; bad if either ending is.
-    """
-    closure, tone = said_of(verdict)
-    if executions is None:
-        return closure, tone
-    ended, other = said_of_execution(found)
-    tones = {tone, other}
-    worst = next(each for each in (BAD, GOOD, QUIET) if each in tones)
-    return f"closure: {closure}; execution: {LOST if ended.startswith(FAILED) else ended}", worst
 
 
 def execution_row(found: ExecutedGrasp | None) -> Record:
@@ -236,17 +198,18 @@ def described_executions(executions: Executions) -> str:
     return " ".join(f"{line[0].upper()}{line[1:]}." for line in totals_in_words(executions) + ended)
 
 
-def execution_section(executions: Executions | None, found: ExecutedGrasp | None) -> Record | None:
+def execution_section(run: RunFolder, name: str) -> Record | None:
     """Build the section about the execution of a grasp; None where no grasp was executed."""
-    if executions is None:
+    if run.executions is None:
         return None
+    found = run.executed(name)
     said, tone = said_of_execution(found)
     execution = None if found is None else found.execution
     trials, controls = ((), ()) if execution is None else (execution.trials, execution.controls)
     return {
         "said": said,
         "tone": tone,
-        "facts": list(_execution_facts(executions, found)),
+        "facts": list(_execution_facts(run.executions, found)),
         "reason": None if found is None else found.reason,
         "trials": records_table(trials, ExecutionTrial),
         "controls": records_table(controls, ExecutionControl),
@@ -258,11 +221,18 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     """Write the shell command that executes a grasp again, with the same settings."""
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
-    usual = asdict(ExecutionSettings(executions.settings.object_kg).used)
-    for name, value in asdict(executions.settings).items():
-        if name in ALWAYS or value != usual[name]:
-            words += [f"--{name.replace('_', '-')}", *_words(value)]
-    return shlex.join(words)
+    usual = ExecutionSettings(executions.settings.object_kg).used
+    return shlex.join([*words, *_changed_flags(executions.settings, usual, ALWAYS)])
+
+
+def _changed_flags(settings: Any, usual: Any, always: Sequence[str] = ()) -> list[str]:
+    """Write flags for settings that are not the usual ones, and for some others."""
+    changed = {name: value for name, value in asdict(settings).items()
+               if name in always or value != getattr(usual, name)}  # fmt: skip
+    return [
+        word for name, value in changed.items()
+        for word in (f"--{name.replace('_', '-')}", *_words(value))
+    ]  # fmt: skip
 
 
 def _words(value: object) -> list[str]:
@@ -275,9 +245,7 @@ def _words(value: object) -> list[str]:
     return [repr(part) for part in parts]
 
 
-def _execution_facts(
-    executions: Executions, found: ExecutedGrasp | None
-) -> Iterable[tuple[str, str, str]]:
+def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Iterable[Fact]:
     settings, execution = executions.settings, None if found is None else found.execution
     yield "Mass", f"{settings.object_kg:.4g} kg", f"at friction {executions.friction:g}"
     tips = f"fingertips of {MILLI * settings.tip_mass_kg:.4g} g"
@@ -290,10 +258,7 @@ def _execution_facts(
         return
     sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))
     yield "Squeeze, finger by finger", f"{sizes} N", ""
-    for figure in execution_figures():
-        yield figure.shown.heading, figure.cell(found), figure.meaning
-    if found.enough is not None:
-        yield "What would be enough", str(found.enough), ""
+    yield from _of_execution(found, "")
 
 
 def records_table(records: Sequence[object], kind: type) -> Record:
