@@ -52,13 +52,8 @@ from sim_validate.engine.setup import Setup
 from sim_validate.kit.files import alone_in, path_inside
 
 CARD = "README.md"
-SIZES = (
-    (10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"),
-    (10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"),
-)  # fmt: skip
-"""Bounds on the number of rows, and the name that the Hugging Face Hub has for datasets below each.
-"""
-LARGEST = "10B<n<100B"
+SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
+"""Powers of ten, from a thousand, as the Hugging Face Hub names sizes of datasets."""
 MARKS = frozenset("\\`*_[]<>|~&#!$@")
 """Characters that can begin Markdown or HTML within a line."""
 SPDX = re.compile(r"[A-Za-z0-9.+-]+")
@@ -267,13 +262,19 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
             "Published": _as_markdown(config.published),
             "Licence": _as_address(config.license),
         },
-        size=next((size for upto, size in SIZES if sum(rows.values()) < upto), LARGEST),
+        size=_size(sum(rows.values())),
         chances=", ".join(reversed(chances)),
         split=next(iter(of_grasps), "train"),
         quoted=quoted,
         markdown=_as_markdown,
         references=_reference,
     )
+
+
+def _size(rows: int) -> str:
+    """Return the name that the Hugging Face Hub has for datasets of about as many rows."""
+    place = min(max(len(str(rows)) - 3, 0), len(SIZES) - 1)
+    return f"{SIZES[place - 1]}<n<{SIZES[place]}" if place else f"n<{SIZES[0]}"
 
 
 def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:

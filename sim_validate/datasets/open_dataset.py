@@ -13,7 +13,7 @@ made: equal configuration, meshes and versions give equal bytes.
 import hashlib
 import json
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, islice
 from pathlib import Path
@@ -154,6 +154,24 @@ def listed(folder: Path, path: Path) -> Listed:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
         size = stream.tell()
     return Listed(path.relative_to(folder).as_posix(), size, digest)
+
+
+def file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
+    """Yield sentences on files of a dataset that are not as listed, and on those that are not."""
+    names = {each.path for each in files}
+    there = {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != MANIFEST
+    }
+    # staged files no longer matter
+    there = {name for name in there if not name.startswith("staging/")}
+    yield from (
+        f"{path}: this file is not listed in the manifest" for path in sorted(there - names)
+    )
+    for each in files:
+        if fault := each.fault(folder):
+            yield f"{each.path}: {fault}"
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> Path:
