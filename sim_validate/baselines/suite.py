@@ -47,7 +47,6 @@ from sim_validate.baselines.part import (
     Present,
     Source,
     present,
-    source_of,
     testable,
 )
 from sim_validate.closure.validate import validate
@@ -95,12 +94,6 @@ class Suite(Settings):
         return load_grasps(self.grasps)
 
     @cached_property
-    def source(self) -> Source:
-        """Find the mesh file that the grasps were planned from."""
-        folders = [self.path.parent]
-        return source_of(self.saved, self.grasps, folders, self.object, self.asked.scale)
-
-    @cached_property
     def asked(self) -> IfChanged:
         """Return what to do if the part has changed, with the scale of the baseline if it has one.
 
@@ -115,7 +108,7 @@ class Suite(Settings):
     @cached_property
     def present(self) -> Present:
         """Carry the grasps over to their part as it is now."""
-        return present(self.saved, self.grasps, self.source, self.asked)
+        return present(self.saved, self.grasps, [self.path.parent], self.asked, self.object)
 
     @cached_property
     def compared(self) -> Present:
@@ -275,8 +268,7 @@ def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> lis
     friction = value_of(float, settings.get("friction", saved.friction), "friction")
     _check_any(saved.grasps, saved.body, friction)
     asked = IfChanged.of_table(settings.get(TABLE, {}), TABLE)
-    source = source_of(saved, path, [folder], scale=asked.scale)
-    now = present(replace(saved, friction=friction), path, source, asked)
+    now = present(replace(saved, friction=friction), path, [folder], asked)
     tested = {grasp.id: grasp for grasp in now.saved.grasps}
     return [
         GraspCase(now.saved.body, tested[each.id], friction, now.mesh)

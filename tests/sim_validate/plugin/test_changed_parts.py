@@ -453,10 +453,10 @@ def test_a_part_elsewhere_is_named_in_the_file(project):
     with pytest.raises(ChangedPartError, match=r"part\.stl: .* cannot be carried over"):
         _ = suite_from_toml(toml).present
     write_text(toml, 'grasps = "grasps.json"\nobject = "cad/renamed.obj"\n')
-    assert suite_from_toml(toml).source.file == elsewhere / "renamed.obj"
+    assert suite_from_toml(toml).present.source.file == elsewhere / "renamed.obj"
     write_text(toml, 'grasps = "grasps.json"\nobject = "cad/nowhere.obj"\n')
     with pytest.raises(gc.InputError, match=r"nowhere\.obj: "):
-        _ = suite_from_toml(toml).source
+        _ = suite_from_toml(toml).present
 
 
 def test_grasps_of_a_built_in_object_have_no_file(tmp_path):
