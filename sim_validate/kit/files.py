@@ -1,9 +1,8 @@
 """Reads and writes files: tables of TOML, paths that files name, arrays, and whole folders.
 
-An npz archive may claim any size, hold a name twice, or have members with wrong headers. Only
-arrays of numbers and truth values are read, with exactly as many bytes as their shapes need, and
-each is checked before much memory is used. Files and folders that are written are complete or
-absent.
+An npz archive may claim any size, or hold a name twice: that is checked before anything is read.
+Only arrays of numbers and truth values are read, and nothing in a file is executed. Files and
+folders that are written are complete or absent.
 
 A folder of results is kept whole: one command at a time writes to it, and removes old results. The
 folder itself is locked, without a lock file: the lock ends with the process, however that ends.
@@ -14,7 +13,6 @@ whatever ends a command. Files of other names are left alone.
 import errno
 import fcntl
 import io
-import math
 import os
 import re
 import shutil
@@ -89,6 +87,8 @@ def path_inside(folder: Path, name: str) -> Path:
 
 MOST_LETTERS = 2**20
 """Largest number of characters of a settings file, which is usually short."""
+MOST_SAID = 200
+"""Largest number of characters of what the parser says of a text."""
 ASIDE = re.compile(
     r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
     r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
@@ -113,20 +113,14 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         raise InputError(f"a key of the TOML file has more than {DEEPEST} parts; use shorter keys")
     try:
         found = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
     except RecursionError as error:
         raise InputError(
             "values of the TOML file are nested too deeply; use fewer levels"
         ) from error
-    except ValueError as error:  # numbers of thousands of digits, days that do not exist
-        raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
+    except ValueError as error:  # numbers of thousands of digits and days that do not exist, too
+        raise InputError(f"the text is not TOML: {str(error)[:MOST_SAID]}") from error
     check_values(found)
     return found
-
-
-def _printable(text: str) -> str:
-    return "".join(letter if letter.isprintable() else " " for letter in text[:200])
 
 
 MOST_BYTES = 256 * 2**20
@@ -189,33 +183,15 @@ def _checked(listed: list[zipfile.ZipInfo]) -> dict[str, zipfile.ZipInfo]:
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDArray[Any]:
     with archive.open(member) as stream:
-        version = np.lib.format.read_magic(stream)
-        readers = {(1, 0): np.lib.format.read_array_header_1_0,
-                   (2, 0): np.lib.format.read_array_header_2_0}  # fmt: skip
-        if version not in readers:
+        found: NDArray[Any] = np.lib.format.read_array(
+            stream, allow_pickle=False, max_header_size=MOST_HEADER
+        )
+        if found.dtype.kind not in KINDS or stream.read(1):
             raise InputError(
-                f"{name}: expected an array in npy format 1.0 or 2.0, got {version}; save it again"
+                f"{name}: expected an array of numbers with nothing behind them, got one of "
+                f"{shown(str(found.dtype))}; save it again"
             )
-        shape, by_columns, dtype = readers[version](stream, max_header_size=MOST_HEADER)
-        if dtype.kind not in KINDS or dtype.subdtype is not None:
-            raise InputError(f"{name}: expected an array of numbers, got {shown(str(dtype))}")
-        size = math.prod(shape) * dtype.itemsize
-        if min(shape, default=0) < 0 or size > member.file_size:
-            raise InputError(
-                f"{name}: the array's shape {shown(str(shape))} does not fit its data; save it "
-                "again"
-            )
-        held = stream.read(size)
-        if len(held) < size or stream.read(1):
-            raise InputError(
-                f"{name}: the array does not hold as many numbers as its shape {shape} needs"
-            )
-    return np.ndarray(shape, dtype, held, order="F" if by_columns else "C")
-
-
-def write_lines(path: Path, lines: Iterable[str]) -> Path:
-    """Write lines as `write_text` does, one at a time; each ends with its own line break."""
-    return write_parts(path, (line.encode() for line in lines))
+    return found
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:

@@ -20,7 +20,8 @@ import threading
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
 from types import FrameType
 from typing import Any, Generic, TypeVar
@@ -147,6 +148,7 @@ OBJECT_STORE_BYTES = 200 * 2**20
 RAY_SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 """Settings under which Ray sends no usage statistics, and hides no GPU from other programs here."""
 
+RAY_ENDED = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError")
 ANY_PORT = "127.0.0.1:0"
 """Address at which a Dask scheduler started here shows its state: for this machine only, at any
 free port."""
@@ -154,63 +156,47 @@ ANSWER_S = 10.0
 """Time that a scheduler may take to answer [s]."""
 
 
-class RayCluster:
-    """The worker processes of a Ray cluster."""
+@dataclass(slots=True)
+class Cluster:
+    """The worker processes of a cluster."""
 
-    ended = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError")
-
-    def __init__(self, ray: Any, workers: int) -> None:
-        self.workers = workers
-        self._ray = ray
-        self._remote: dict[Callable[..., Any], Any] = {}
-
-    def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Call a function on a worker process; the future fails if that process dies."""
-        if function not in self._remote:
-            self._remote[function] = self._ray.remote(max_retries=0, num_cpus=1)(function)
-        return self._remote[function].remote(unit).future()
-
-
-class DaskCluster:
-    """The worker processes of a Dask cluster."""
-
-    ended = ("KilledWorker",)
-
-    def __init__(self, client: Any, workers: int) -> None:
-        self.workers = workers
-        self._executor = client.get_executor(pure=False, retries=0)
-
-    def submit(self, function: Callable[[Unit], Result], unit: Unit, /) -> "Future[Result]":
-        """Call a function on a worker process; the future fails if that process dies."""
-        return self._executor.submit(function, unit)
+    workers: int
+    ended: tuple[str, ...]
+    """Names of the errors which say that a worker process died while it computed."""
+    submit: Callable[[Callable[[Any], Any], Any], "Future[Any]"]
+    """Calls a function with a unit on a worker process; the future fails if that process dies."""
 
 
 @contextmanager
-def ray_workers(workers: int, address: str | None) -> Generator[RayCluster]:
+def ray_workers(workers: int, address: str | None) -> Generator[Cluster]:
     """Start or join a Ray cluster."""
     with _environment(RAY_SETTINGS):  # read when Ray is imported, and by the programs it starts
-        yield from _ray(workers, address)
+        ray = _imported("ray", "ray")
+        where: dict[str, Any] = {"address": address} if address else {
+            "num_cpus": workers, "num_gpus": 0, "include_dashboard": False,
+            "object_store_memory": OBJECT_STORE_BYTES,
+        }  # fmt: skip
+        if address is not None:
+            _require_listener(address)
+        try:
+            ray.init(log_to_driver=False, configure_logging=False, **where)
+        except (ConnectionError, ValueError, RuntimeError, TimeoutError) as error:
+            raise InputError(
+                f"--address {address}: no Ray cluster answers there ({error})"
+            ) from error
 
+        @cache
+        def remote(function: Callable[..., Any]) -> Any:
+            return ray.remote(max_retries=0, num_cpus=1)(function)
 
-def _ray(workers: int, address: str | None) -> Generator[RayCluster]:
-    ray = _imported("ray", "ray")
-    quiet = {"log_to_driver": False, "configure_logging": False}
-    here = {
-        "num_cpus": workers,
-        "num_gpus": 0,
-        "include_dashboard": False,
-        "object_store_memory": OBJECT_STORE_BYTES,
-    }
-    if address is not None:
-        _require_listener(address)
-    try:
-        ray.init(**quiet, **({"address": address} if address else here))
-    except (ConnectionError, ValueError, RuntimeError, TimeoutError) as error:
-        raise InputError(f"--address {address}: no Ray cluster answers there ({error})") from error
-    try:
-        yield RayCluster(ray, int(ray.cluster_resources().get("CPU", workers)))
-    finally:
-        ray.shutdown()
+        try:
+            yield Cluster(
+                int(ray.cluster_resources().get("CPU", workers)),
+                RAY_ENDED,
+                lambda function, unit: remote(function).remote(unit).future(),
+            )
+        finally:
+            ray.shutdown()
 
 
 @contextmanager
@@ -237,7 +223,7 @@ def _require_listener(address: str) -> None:
 
 
 @contextmanager
-def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
+def dask_workers(workers: int, address: str | None) -> Generator[Cluster]:
     """Start or join a Dask cluster."""
     distributed = _imported("distributed", "dask")
     with _dask_client(distributed, workers, address) as client:
@@ -247,7 +233,8 @@ def dask_workers(workers: int, address: str | None) -> Generator[DaskCluster]:
                 "a Dask worker has several threads, but work that takes too long must end its "
                 "whole process: start workers with --nthreads 1"
             )
-        yield DaskCluster(client, max(1, len(threads)))
+        executor = client.get_executor(pure=False, retries=0)
+        yield Cluster(max(1, len(threads)), ("KilledWorker",), executor.submit)
 
 
 @contextmanager

@@ -33,7 +33,7 @@ from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import Reporter, finished
+from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject, alone_in, read_arrays, remove_results, write_arrays
 from sim_validate.kit.processes import each
@@ -313,11 +313,10 @@ def certified(
         for grasp, proved in zip(grasps, proofs, strict=True):
             yield GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved))
 
-    results = reporter.counted(
-        "certifying", recorded(), len(grasps), "proved", lambda one: one.regions is not None
-    )
-    collect = partial(Regions, AboutObject.of(body), friction, asked)
-    return finished(results, len(grasps), collect, folder and folder / Regions.FILE, reporter)
+    return reporter.collected(
+        "certifying", recorded(), len(grasps), ("proved", lambda one: one.regions is not None),
+        partial(Regions, AboutObject.of(body), friction, asked), folder,
+    )  # fmt: skip
 
 
 def _certify(
