@@ -21,24 +21,13 @@ from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import CHOSEN, Settings, for_users, named, value_of
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
+from sim_validate.baselines import check
 from sim_validate.baselines.baseline import (
     Baseline,
     How,
     check_writable,
     read_baseline,
     write_baseline,
-)
-from sim_validate.baselines.check import (
-    Checked,
-    check_one,
-    complete,
-    demanded,
-    measured,
-    not_survived,
-    seen_from,
-    setup_for,
-    unstable,
-    with_planned_fingers,
 )
 from sim_validate.baselines.part import (
     CARRY,
@@ -135,13 +124,13 @@ class Suite(Settings):
     @property
     def where(self) -> str:
         """Path of the file of grasps, relative to the baseline's folder."""
-        return seen_from(self.baseline, self.grasps)
+        return check.seen_from(self.baseline, self.grasps)
 
-    def tested(self, name: str) -> Checked:
+    def tested(self, name: str) -> check.Checked:
         """Simulate one grasp again, and compare the result with the baseline."""
         now, before = self.compared, self.kept
-        done = check_one(before, now, self.where, self._how(before), name)
-        return demanded(done) if self.survives else done
+        done = check.check_one(before, now, self.where, self._how(before), name)
+        return check.demanded(done) if self.survives else done
 
     def bless(self) -> Baseline:
         """Simulate all grasps and write the results as the new baseline."""
@@ -155,20 +144,20 @@ class Suite(Settings):
             ) from error
         how = self._how(before)
         if before is not None:
-            how = with_planned_fingers(how, before, now.saved)
+            how = check.with_planned_fingers(how, before, now.saved)
         limit = before and before.limit
-        done = measured(testable(now, limit), (self.where, limit), how)
-        found = complete(done, now)
+        done = check.measured(testable(now, limit), (self.where, limit), how)
+        found = check.complete(done, now)
         write_baseline(self.baseline, found)
         return found
 
     def _how(self, before: Baseline | None) -> How:
         """Take the baseline's settings, or the default ones, replaced by those of the file."""
         if before is None:
-            how = How(setup_for(self.saved, None), Agenda(seed=self.saved.seed))
+            how = How(check.setup_for(self.saved, None), Agenda(seed=self.saved.seed))
         else:
             how = before.settings
-        setup = how.setup if self.setup is None else setup_for(self.saved, self.setup)
+        setup = how.setup if self.setup is None else check.setup_for(self.saved, self.setup)
         execution = how.execution if self.execution is None else self.execution
         if self.survives and execution is None:
             raise InputError(
@@ -322,7 +311,7 @@ def checked(case: GraspCase, demands: Demands) -> tuple[Verdict, str]:
     verdict = validate(
         case.body, case.grasp, case.friction, agenda=demands.agenda, setup=demands.setup
     )
-    said, lacking = unstable(verdict), list(_lacking(verdict, demands))
+    said, lacking = check.unstable(verdict), list(_lacking(verdict, demands))
     if lacking and not said:
         said = f"{verdict.id} at friction {verdict.friction}: less than is asked for"
     return verdict, "\n  ".join([said, *lacking])
@@ -358,4 +347,4 @@ def survival(
         )
     case = case_of(given, friction, "assert_survives")
     found = executed_grasp(ExecutionJob(case.body, case.grasp, case.friction, settings))
-    return case, found, not_survived(found)
+    return case, found, check.not_survived(found)

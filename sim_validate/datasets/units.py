@@ -37,21 +37,9 @@ from grasp_core.values import FINGERS, Contact, Grasp
 from scenes.example_objects import example_object
 from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict, try_control
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.datasets import learning
 from sim_validate.datasets.columns import Cells, figures_in
 from sim_validate.datasets.config import CREDITS, SPLITS, DatasetConfig, SplitName, id_beginning
-from sim_validate.datasets.learning import (
-    Executed,
-    Tried,
-    Varying,
-    closed_cells,
-    contact_cells,
-    executed_by,
-    execution_cells,
-    execution_rows,
-    ratio_of,
-    squeeze_cells,
-    validated_with,
-)
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.rows import (
     GIVEN,
@@ -342,17 +330,17 @@ class _Making:
     def _try(self, begun: Cells, grasp: Grasp, body: Polyhedron) -> None:
         """Simulate a grasp and what is varied of it, and add all rows."""
         config, friction = self.config, self.unit.friction
-        verdict = validated_with(body, grasp, friction, self.agenda, config.learning)
+        verdict = learning.validated_with(body, grasp, friction, self.agenda, config.learning)
         if config.scenes and verdict.scene is not None:
             self.files[f"scenes/{self._name(grasp.id)}.xml"] = verdict.scene.xml
-        executed = executed_by(config, body, grasp.contacts, friction, grasp.id)
+        executed = learning.executed_by(config, body, grasp.contacts, friction, grasp.id)
         self._add_closed(begun, grasp, verdict, executed, body)
         if config.learning is not None:
-            varying = Varying(config, config.learning, friction, self.agenda)
+            varying = learning.Varying(config, config.learning, friction, self.agenda)
             for each in varying.of(body, grasp, verdict, executed):
                 self._add_varied(self._name(grasp.id), each)
 
-    def _add_varied(self, made_from: str, tried: Tried) -> None:
+    def _add_varied(self, made_from: str, tried: learning.Tried) -> None:
         """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
         variant, verdict, proved = tried.variant, tried.verdict, tried.variant.proved
         begun = self._begun(
@@ -384,7 +372,7 @@ class _Making:
             "contacts": len(contacts),
             "contact_points_m": [contact.position.tolist() for contact in contacts],
             "contact_normals": [contact.normal.tolist() for contact in contacts],
-            **contact_cells(self.config, self.body, contacts),
+            **learning.contact_cells(self.config, self.body, contacts),
             **more,
         }
 
@@ -403,8 +391,9 @@ class _Making:
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
     def _add_closed(
-        self, begun: Cells, grasp: Grasp, verdict: Verdict, executed: Executed, body: Polyhedron
-    ) -> None:
+        self, begun: Cells, grasp: Grasp, verdict: Verdict, executed: learning.Executed,
+        body: Polyhedron,
+    ) -> None:  # fmt: skip
         """Add the rows of a grasp in force closure, of its negative controls, and of all trials."""
         proved = {
             "force_closed": True,
@@ -419,7 +408,7 @@ class _Making:
             "trials": len(verdict.wrenches),
             "mismatches": len(verdict.mismatches),
             "verdict": figures_in(GraspRow, "verdict", verdict),
-            **closed_cells(self.config, body, grasp, verdict.friction),
+            **learning.closed_cells(self.config, body, grasp, verdict.friction),
         }
         row = self._added(proved | {**begun}, verdict.wrenches, executed, body)
         for each in verdict.controls:
@@ -431,7 +420,7 @@ class _Making:
             self._add_refuted(refuted, each)
 
     def _add_refuted(
-        self, begun: Cells, verdict: ControlVerdict, executed: Executed = None
+        self, begun: Cells, verdict: ControlVerdict, executed: learning.Executed = None
     ) -> None:
         """Add the rows of contacts that are proved not to be in force closure, and their trials."""
         control = verdict.control
@@ -449,17 +438,17 @@ class _Making:
 
     def _added(
         self, cells: Cells, tried: Sequence[WrenchVerdict] | Sequence[ControlTrial],
-        executed: Executed, body: Polyhedron,
+        executed: learning.Executed, body: Polyhedron,
     ) -> GraspRow:  # fmt: skip
         """Add a row with what its execution found, and the rows of its trials."""
-        ratio = ratio_of(cells["friction"], cells.get("critical_friction"))
-        row = GraspRow(**cells, **execution_cells(executed), friction_ratio=ratio)
+        ratio = learning.ratio_of(cells["friction"], cells.get("critical_friction"))
+        row = GraspRow(**cells, **learning.execution_cells(executed), friction_ratio=ratio)
         if row.mass_kg is not None:
-            more = squeeze_cells(self.config, body, row.placed, row.friction, row.mass_kg)
+            more = learning.squeeze_cells(self.config, body, row.placed, row.friction, row.mass_kg)
             row = replace(row, **more)
         self.grasps.append(row)
         self.trials += [_trial_row(row.grasp_id, number, each) for number, each in enumerate(tried)]
-        self.executions += execution_rows(row.grasp_id, executed, self.config)
+        self.executions += learning.execution_rows(row.grasp_id, executed, self.config)
         return row
 
 

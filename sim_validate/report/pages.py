@@ -28,6 +28,7 @@ from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best import MEASURES, Best, Rated
 from sim_validate.protocols.verdict import Totals
+from sim_validate.report import sections
 from sim_validate.report.agreement import (
     BAD,
     GOOD,
@@ -42,20 +43,6 @@ from sim_validate.report.agreement import (
 from sim_validate.report.charts import fidelity_panel
 from sim_validate.report.drawn_grasps import Drawn, largest_push
 from sim_validate.report.run_folder import RunFolder, about_grasp
-from sim_validate.report.sections import (
-    described_executions,
-    described_reaches,
-    execute_command,
-    execution_figures,
-    execution_row,
-    execution_section,
-    held_by_hand,
-    held_in,
-    reach_commands,
-    reach_section,
-    reach_settings,
-    said_of_reach,
-)
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -133,8 +120,8 @@ def grasp_page(
         first=first,
         drawn=drawn,
         push=largest_push(verdict),
-        executed=execution_section(run, grasp.id),
-        reached=reach_section(run.reaches, grasp),
+        executed=sections.execution_section(run, grasp.id),
+        reached=sections.reach_section(run.reaches, grasp),
         executed_clips=drawn.executed if drawn else (),
         object_script=object_script,
         facts=list(_facts(run, grasp, verdict)),
@@ -149,7 +136,7 @@ def grasp_page(
         controls=[] if verdict is None else [_control(each) for each in verdict.controls],
         commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(
-            grasp_data(run.saved.body, shown, run.friction, held_in(run.reaches, grasp))
+            grasp_data(run.saved.body, shown, run.friction, sections.held_in(run.reaches, grasp))
         ),
     )
 
@@ -255,8 +242,8 @@ def _commands(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable
         for name in (each.control.name for each in verdict.controls):
             yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
     if run.executions is not None and grasp.id in run.executions:
-        yield execute_command(run.executions, GRASPS, grasp.id)
-    yield from reach_commands(run.reaches, grasp, GRASPS)
+        yield sections.execute_command(run.executions, GRASPS, grasp.id)
+    yield from sections.reach_commands(run.reaches, grasp, GRASPS)
 
 
 def millimetres(point: Array) -> str:
@@ -268,14 +255,18 @@ ROWS = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class Card:
     """A card in the gallery of the first page: a grasp, and its copies by symmetry."""
 
     run: RunFolder
     grasp: Grasp
+    script: str
+    """Name of the script with the object's drawing."""
     page: str
-    picture: str
+    """Path of the grasp's page, relative to the report's folder, as that of the picture."""
     copies: tuple[Copy, ...] = ()
+    picture: str = ""
+    """Path of the picture; empty until it is drawn."""
 
 
 def cards_of(run: RunFolder) -> tuple[Copies, ...]:
@@ -290,7 +281,7 @@ def cards_of(run: RunFolder) -> tuple[Copies, ...]:
     ended: dict[object, list[int]] = {}
     for place, grasp in enumerate(grasps):
         executed = said_of_execution(run.executed(grasp.id)) if run.executions else None
-        reached = said_of_reach(run.reaches, grasp)[0]
+        reached = sections.said_of_reach(run.reaches, grasp)[0]
         ended.setdefault((run.said(grasp.id), executed, reached), []).append(place)
     cards = list[Copies]()
     for places in ended.values():
@@ -302,7 +293,7 @@ def cards_of(run: RunFolder) -> tuple[Copies, ...]:
     return tuple(sorted(cards, key=lambda card: card.first))
 
 
-def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int = 0) -> str:
+def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 0) -> str:
     """Write the text of the report's first page."""
     verdicts = [verdict for run in runs for verdict in run.tested or ()]
     executed = [run.executions for run in runs if run.executions and run.executions.grasps]
@@ -328,8 +319,10 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Shown], waiting: int =
         limits=bool(limits.pairs),
         mismatches=[f"{each.id}: {line}" for each in verdicts for line in each.mismatches],
         controls=_controls(verdicts),
-        executions=[described_executions(each) for each in executed],
-        executed_columns=[(each.shown.heading, each.meaning) for each in execution_figures()],
+        executions=[sections.described_executions(each) for each in executed],
+        executed_columns=[
+            (each.shown.heading, each.meaning) for each in sections.execution_figures()
+        ],
         judged=_judged(runs),
         possible=[
             {"object": run.saved.body.name, **_described_possible(run.possible)}
@@ -367,7 +360,7 @@ def _described_possible(best: Best) -> Record:
     }
 
 
-def _card(shown: Shown) -> dict[str, Any]:
+def _card(shown: Card) -> dict[str, Any]:
     grasp, verdict = shown.grasp, shown.run.verdict(shown.grasp.id)
     said, tone = shown.run.said(grasp.id)
     return {
@@ -384,10 +377,12 @@ def _card(shown: Shown) -> dict[str, Any]:
         "quality": grasp.ferrari_canny[0],
         "share": shown.run.possible.shares.get(grasp.id) if shown.run.possible else None,
         "critical_friction": grasp.critical_friction,
-        "executed": execution_row(shown.run.executed(grasp.id)) if shown.run.executions else None,
-        "reached": said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,
+        "executed": sections.execution_row(shown.run.executed(grasp.id))
+        if shown.run.executions
+        else None,
+        "reached": sections.said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,
         "weakest": None if verdict is None else _weakest(verdict),
-        "by_hand": held_by_hand(shown.run.reaches, grasp),
+        "by_hand": sections.held_by_hand(shown.run.reaches, grasp),
     }
 
 
@@ -409,7 +404,7 @@ def _described(run: RunFolder) -> dict[str, Any]:
         )
         said += "" if tested.complete else "; the run was interrupted"
     said += "."
-    said += f" {described_reaches(run.reaches)}" if run.reaches else ""
+    said += f" {sections.described_reaches(run.reaches)}" if run.reaches else ""
     if run.left_out:
         said += (
             f" {len(run.saved.grasps)} are shown, those with problems among them; "
@@ -438,7 +433,7 @@ def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
         used = {"friction": run.executions.friction, **record_of(run.executions.settings)}
         yield from _lines({"execution": used})
     if run.reaches is not None:
-        yield from reach_settings(run.reaches)
+        yield from sections.reach_settings(run.reaches)
     found = versions() if run.tested is None else run.tested.versions
     for name, version in found.items():
         yield f"version of {name}", str(version)
