@@ -129,7 +129,7 @@ class Suite(Settings):
     def tested(self, name: str) -> check.Checked:
         """Simulate one grasp again, and compare the result with the baseline."""
         now, before = self.compared, self.kept
-        done = check.check_one(before, now, self.where, self._how(before), name)
+        done = check.check(before, now, self.where, self._how(before), name=name)
         return check.demanded(done) if self.survives else done
 
     def bless(self) -> Baseline:

@@ -15,7 +15,9 @@ import json
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from heapq import merge
 from itertools import groupby, islice
+from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -329,21 +331,19 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
 
 def by_object(chosen: Selection) -> Iterator[Rows]:
     """Yield the rows of each object in turn."""
-    streams = {name: _groups(chosen, name) for name in chosen.tables}
-    heads = {name: next(streams[name], None) for name in chosen.tables}
-    while waiting := [head[0] for head in heads.values() if head is not None]:
-        first = min(waiting)
-        own = {name: head[1] for name, head in heads.items() if head and head[0] == first}
-        yield Rows(**own)
-        heads |= {name: next(streams[name], None) for name in own}
+    streams = [_begun(chosen, name) for name in chosen.tables]
+    for _, same in groupby(merge(*streams, key=itemgetter(0)), key=itemgetter(0)):
+        rows: dict[Name, list[Any]] = {}
+        for _, name, row in same:
+            rows.setdefault(name, []).append(row)
+        yield Rows(**{name: tuple(each) for name, each in rows.items()})
 
 
-def _groups(chosen: Selection, name: Name) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Yield rows grouped by the part of their first key that all rows of an object share."""
+def _begun(chosen: Selection, name: Name) -> Iterator[tuple[str, Name, Any]]:
+    """Yield rows with the part of their first key that all rows of an object share."""
     key = KEYS[name][0]
-    beginnings = groupby(chosen.rows(ROWS[name]), key=lambda row: str(getattr(row, key))[:SHORT])
-    for beginning, rows in beginnings:
-        yield beginning, tuple(rows)
+    for row in chosen.rows(ROWS[name]):
+        yield str(getattr(row, key))[:SHORT], name, row
 
 
 FOLDER = "meshes"
