@@ -140,13 +140,13 @@ def _reach_facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
     if found.simulated is not None:
         yield from _figures(found.simulated, "With its motors: ")
     if (executed := found.executed) is not None:
+        yield from _figures(executed, "Executed with the hand: ")
         if executed.reason is not None:
             yield "Not executed", executed.reason, ""
-        yield from _of_execution(executed, "Executed with the hand: ")
+        yield from _enough(executed)
 
 
-def _of_execution(found: ExecutedGrasp, part: str) -> Iterable[Fact]:
-    yield from _figures(found, part)
+def _enough(found: ExecutedGrasp) -> Iterable[Fact]:
     if found.enough is not None:
         yield "What would be enough", str(found.enough), ""
 
@@ -258,7 +258,9 @@ def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Ite
         return
     sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))
     yield "Squeeze, finger by finger", f"{sizes} N", ""
-    yield from _of_execution(found, "")
+    for figure in execution_figures():
+        yield figure.shown.heading, figure.cell(found), figure.meaning
+    yield from _enough(found)
 
 
 def records_table(records: Sequence[object], kind: type) -> Record:
