@@ -23,7 +23,6 @@ from grasp_core.values import Grasp
 from scenes.drawing import pages
 from scenes.drawing.pages import NOTHING, Fact, as_text, grasp_data, grasp_facts, number
 from scenes.drawing.sheets import night_style, svg_of
-from sim_validate.closure.controls import ControlVerdict
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best import MEASURES, Best, Rated
@@ -126,14 +125,14 @@ def grasp_page(
         object_script=object_script,
         facts=list(_facts(run, grasp, verdict)),
         contacts=list(_contacts(shown)),
-        certified=_certified(run, grasp),
+        run=run,
+        certified=about_grasp(run.certified, grasp.id),
         sizes={  # by which torques are divided: the object's radius, the grasp's size
             "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
             "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
         },
         trial_columns=[(each.shown.heading, each.meaning) for each in TRIAL_FIGURES],
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
-        controls=[] if verdict is None else [_control(each) for each in verdict.controls],
         commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(
             grasp_data(run.saved.body, shown, run.friction, sections.held_in(run.reaches, grasp))
@@ -193,20 +192,6 @@ def _contacts(grasp: Grasp) -> Iterable[Record]:
         }
 
 
-def _certified(run: RunFolder, grasp: Grasp) -> str:
-    found = about_grasp(run.certified, grasp.id)
-    if run.certified is None or found is None:
-        return ""
-    friction = f"{run.certified.friction:g}"
-    if not run.shades:
-        return f"Certified regions are for friction {friction}: not shown."
-    if found.regions is None:
-        return f"No certified regions: {found.reason}."
-    where = f" Proof: {found.proof.file}." if found.proof else ""
-    discs = number(MILLI * found.disc_radius_m) if found.disc_radius_m is not None else NOTHING
-    return f"Regions are certified for friction {friction}: discs of {discs} mm.{where}"
-
-
 def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
     size, limit, found = wrench_size(verdict, trial), trial.predicted_limit, trial.simulated_limit
     return {
@@ -219,17 +204,6 @@ def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
         "outcome": trial.hold.outcome.value.replace("_", " "),
         "tone": GOOD if as_predicted(trial) else BAD,
         "figures": [each.cell(trial) for each in TRIAL_FIGURES],
-    }
-
-
-def _control(each: ControlVerdict) -> Record:
-    ended = (f"{trial.name}: {trial.hold.outcome.value}" for trial in each.tried)
-    return {
-        "name": each.control.name.replace("_", " "),
-        "friction": number(each.control.friction),
-        "outcomes": ", ".join(ended).replace("_", " "),
-        "tone": GOOD if each.let_go else BAD,
-        "said": "let go" if each.let_go else "held" if each.held else "undecided",
     }
 
 
@@ -303,7 +277,9 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 
     return page(
         "index.html",
         names=", ".join(dict.fromkeys(run.saved.body.name for run in runs)),
-        runs=[_described(run) for run in runs],
+        runs=runs,
+        reached=[sections.described_reaches(run.reaches) for run in runs],
+        about=[list(_about(run)) for run in runs],
         cards=cards,
         waiting=waiting,
         hands=any(run.reaches is not None for run in runs),
@@ -390,34 +366,6 @@ def _weakest(verdict: Verdict) -> float | None:
     """Find the smallest wrench limit of a grasp [N], with torques divided by the grasp's size."""
     found = [trial.predicted_limit * wrench_size(verdict, trial) for trial in verdict.wrenches]
     return min(filter(math.isfinite, found), default=None)
-
-
-def _described(run: RunFolder) -> dict[str, Any]:
-    tested = run.tested
-    said = f"{len(run.saved.grasps) + run.left_out} grasps at friction {run.friction:g}"
-    if tested is not None:
-        counts = tested.summary
-        said += (
-            f"; {counts['grasps_held']} of {counts['grasps']} held, "
-            f"{counts['controls_let_go']} of {counts['controls']} negative controls were let go, "
-            f"{counts['mismatches']} results contradict the analysis"
-        )
-        said += "" if tested.complete else "; the run was interrupted"
-    said += "."
-    said += f" {sections.described_reaches(run.reaches)}" if run.reaches else ""
-    if run.left_out:
-        said += (
-            f" {len(run.saved.grasps)} are shown, those with problems among them; "
-            "`graspproof report` draws all."
-        )
-    gate = () if tested is None else tested.gate.checks
-    return {
-        "name": run.saved.body.name,
-        "summary": " ".join([said, *run.saved.body.notes]),
-        "about": list(_about(run)),
-        "gate": gate,
-        "gate_passed": sum(check.passed for check in gate),
-    }
 
 
 def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
