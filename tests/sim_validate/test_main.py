@@ -387,8 +387,8 @@ WORDS = {" ".join(line.split()[: COMMAND_WORDS.get(line.split()[0], 1)]) for lin
 def test_help_on_a_command_shows_examples_that_can_be_typed(monkeypatch, capsys, words):
     assert main([*words.split(), "--help"]) == Exit.GOOD
     shown = capsys.readouterr().out.partition("\nexamples:\n")[2].splitlines()
-    own = [line for line in EXAMPLES if f"{line} ".startswith(f"{words} ")]
-    assert [line.strip() for line in shown] == [f"graspproof {line}" for line in own]
+    own = [f"  graspproof {line}" for line in EXAMPLES if f"{line} ".startswith(f"{words} ")]
+    assert shown == own
     asked = []
     monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
     for line in shown:
