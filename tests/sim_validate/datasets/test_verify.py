@@ -10,13 +10,9 @@ import trimesh
 
 import grasp_core as gc
 from scenes.example_objects import example_object
+from sim_validate import load_dataset
 from sim_validate.datasets.build import build
-from sim_validate.datasets.open_dataset import (
-    load_dataset,
-    mesh_text,
-    read_manifest,
-    write_manifest,
-)
+from sim_validate.datasets.open_dataset import mesh_text, read_manifest, write_manifest
 from sim_validate.datasets.verify import Sample, drawn, verify
 from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
