@@ -278,8 +278,15 @@ class Present:
         return replace(found, since=since)
 
 
-def present(saved: Plan, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
-    """Carry grasps over to their part as it is now; they stay as they are if it has not changed."""
+def present(
+    saved: Plan, path: Path, folders: Iterable[Path], asked: IfChanged = CARRY,
+    named: Path | None = None,
+) -> Present:  # fmt: skip
+    """Carry the grasps of a file over to their part as it is now, if its mesh file has changed.
+
+    Folders, or the name of the mesh file, are as `source_of` takes them.
+    """
+    source = source_of(saved, path, folders, named, asked.scale)
     if source.note and asked.missing == "fail":
         raise ChangedPartError(
             f"{path}: the mesh file that its grasps were planned from, {saved.body.name!r} with "

@@ -33,10 +33,9 @@ from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, Reach
 from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
 from sim_validate.kit import processes
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
+from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import GRASPS, asked_grasps
 from sim_validate.settings import ExecutionSettings
 
@@ -116,9 +115,10 @@ def _reach(
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
     results, count = processes.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
-    shown = reporter.counted("reaching", results, count, "reached", lambda each: each.reach.reached)
-    path = command.out and command.out / Reaches.FILE
-    return finished(shown, count, partial(_collected, job), path, reporter)
+    return reporter.collected(
+        "reaching", results, count, ("reached", lambda each: each.reach.reached),
+        partial(_collected, job), command.out,
+    )  # fmt: skip
 
 
 def _collected(job: ReachJob, found: tuple[ReachedGrasp, ...], *, complete: bool) -> Reaches:

@@ -23,7 +23,13 @@ from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scene import build_hand_scene
-from scenes.mujoco.tested import HandServos, fingertip_scene, hand_scene, planned_postures
+from scenes.mujoco.tested import (
+    HandServos,
+    TestedScene,
+    fingertip_scene,
+    hand_scene,
+    planned_postures,
+)
 from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.limits import loads_as_they_are
@@ -74,18 +80,13 @@ def judge_by(
     scene = fingertip_scene(
         body, given, found.friction, found.mass_of(body), found.physics, setup.fingers
     )
-    return Judgement(
-        grasp=given.id if isinstance(given, Grasp) else "",
-        protocol=found.name,
-        friction=friction,
-        mass_kg=scene.mass_kg,
-        push_n=float(scene.pushes_n.max()),
-        runs=their_verdict(found, scene, setup.threads),
-        ours=our_verdict(
-            body, contacts, friction, found.forces(scene.mass_kg), setup,
-            partial(setup.scene, body, given, friction),
-        ),
+    ours = our_verdict(
+        body, contacts, friction, found.forces(scene.mass_kg), setup,
+        partial(setup.scene, body, given, friction),
     )  # fmt: skip
+    return _judged(
+        found, scene, friction, setup, ours, given.id if isinstance(given, Grasp) else ""
+    )
 
 
 def judge_hand_by(
@@ -136,16 +137,18 @@ def judge_hand_by(
     scene = hand_scene(
         hand, body, postures, found.friction, found.mass_of(body), found.physics, servos
     )
-    return Judgement(
-        grasp=reach.grasp,
-        protocol=found.name,
-        hand=hand.name,
-        friction=friction,
-        mass_kg=scene.mass_kg,
-        push_n=float(scene.pushes_n.max(initial=0.0)),
-        runs=their_verdict(found, scene, setup.threads),
-        ours=_ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup),
-    )
+    ours = _ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup)
+    return _judged(found, scene, friction, setup, ours, reach.grasp, hand.name)
+
+
+def _judged(
+    protocol: PublishedProtocol, scene: TestedScene, friction: float, setup: Setup,
+    ours: OurVerdict, grasp: str, hand: str = "",
+) -> Judgement:  # fmt: skip
+    """Run the test, and put its verdict beside ours."""
+    runs = their_verdict(protocol, scene, setup.threads)
+    push_n = float(scene.pushes_n.max(initial=0.0))
+    return Judgement(grasp, protocol.name, friction, scene.mass_kg, push_n, runs, ours, hand)
 
 
 def _ours(

@@ -18,7 +18,7 @@ from grasp_core.families.free import Absence, place_free
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.quality.measures import Measure, resisted_loads
 from grasp_core.regions.certify_regions import certify_regions
-from sim_validate.planning.regions_json import SHAPES, proof_arrays, regions_of
+from sim_validate.planning.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
 from tests.tampering import (
     best_grasps,

@@ -24,17 +24,19 @@ from sim_validate.report.agreement import (
     limits_in,
     quadrants_in,
 )
-from sim_validate.report.grasp_charts import (
+from sim_validate.report.charts import (
     directions_of_map,
+    fidelity_panel,
+    friction_used,
     margin_figure,
     margin_panels,
     margins,
+    motion_panels,
     on_map,
     pixels,
     shadow_of,
     wrench_panels,
 )
-from sim_validate.report.run_charts import fidelity_panel, friction_used, motion_panels
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps
 
