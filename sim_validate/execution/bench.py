@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from scenes.mujoco.held import hinged, rotations
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, palm_armature
 from scenes.mujoco.mjcf_text import quaternion
-from scenes.mujoco.silent_mujoco import unlogged
-from sim_validate.engine.bench import batch, compiled, faults, mujoco, step, touched
+from sim_validate.engine.bench import Health, batch, compiled, mujoco, stepped, touched
 from sim_validate.execution.paths import WHOLE, Drive, Table
 
 FREE, PALM = 6, 12
@@ -56,7 +55,7 @@ class HeldMotion:
     """Force of the table on the object, (n, 3) [N]; other loads are taken away."""
     states: Array
     """Complete state of the simulator, from which a trial can go on, (n, size)."""
-    faults: tuple[str, ...]
+    health: Health
     tip_turns: Array | None
     """Orientations of the fingertips as the palm sees them, (n, k, 3, 3); None where they do not
     turn."""
@@ -67,7 +66,7 @@ class HeldMotion:
         return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
 
 
-SERIES = tuple(each.name for each in fields(HeldMotion) if each.name != "faults")
+SERIES = tuple(each.name for each in fields(HeldMotion) if each.name != "health")
 """Fields of a motion that have a row for each sample, where they are known."""
 
 
@@ -77,14 +76,14 @@ def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
     for name in SERIES:
         parts = getattr(first, name), getattr(second, name)
         both[name] = None if parts[0] is None else np.concatenate(parts)
-    return HeldMotion(**both, faults=first.faults + second.faults)
+    return HeldMotion(**both, health=second.health.after(first.health))
 
 
 def begun_motion(motion: HeldMotion, count: int) -> HeldMotion:
     """Return the first samples of a motion, as if nothing had gone wrong after them."""
     rows = ((name, getattr(motion, name)) for name in SERIES)
     first: dict[str, Any] = {name: None if own is None else own[:count] for name, own in rows}
-    return HeldMotion(**first, faults=())
+    return HeldMotion(**first, health=Health())
 
 
 class HeldBench:
@@ -158,67 +157,56 @@ class HeldBench:
     def _stepped(
         self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence[tuple[float, float]]
     ) -> tuple[HeldMotion, ...]:
-        lengths = np.array([len(drive) for drive in drives])
-        most = int(lengths.max())
-        loads, motors, commands = self._applied(drives, most)
-        applied, palm = trials.bind("xfrc_applied"), trials.bind("qfrc_applied")
-        servos, pushed = trials.bind("ctrl"), trials.bind("qfrc_constraint")
-        joints, rates = trials.bind("qpos"), trials.bind("qvel")
-        moved, speeds, forces, states = (
-            np.zeros((len(drives), most, each.shape[1]))
-            for each in (joints, rates, pushed, trials.state)
-        )
-        errors: dict[int, str] = {}
-        lost = np.zeros(len(drives), dtype=bool)
+        lengths = [len(drive) for drive in drives]
+        loads, motors, commands = self._applied(drives, max(lengths))
+        joints, lost = trials.bind("qpos"), np.zeros(len(drives), dtype=bool)
         most_m, most_rad = np.transpose(limits)
         least_cosine = np.cos(np.minimum(most_rad, math.pi))
         turns_count = bool((least_cosine > -1.0).any())
-        with unlogged():
-            for sample in range(most):
-                going = np.flatnonzero((lengths > sample) & ~lost)
-                if not len(going):
-                    break
-                applied[:, self.body] = loads[sample]
-                palm[:, FREE:PALM] = motors[sample]
-                servos[:] = commands[sample]
-                step(trials, errors, self.chunk, going)
-                moved[going, sample] = joints[going]
-                speeds[going, sample] = rates[going]
-                forces[going, sample] = pushed[going]
-                states[going, sample] = trials.state[going]
-                with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
-                    away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
-                    gone = away > most_m[going]
-                    if turns_count:
-                        gone |= _cosines(joints[going]) < least_cosine[going]
-                for trial in going[gone]:
-                    lost[trial] = True
-                    moved[trial, sample:] = joints[trial]
-                    forces[trial, sample:] = 0.0
+
+        def following(going: Indices, samples: Indices) -> Indices:
+            with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
+                away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
+                gone = away > most_m[going]
+                if turns_count:
+                    gone |= _cosines(joints[going]) < least_cosine[going]
+            lost[going] = gone
+            return np.where(gone, max(lengths), samples + 1)
+
+        told = [
+            (trials.bind("xfrc_applied")[:, self.body], loads),
+            (trials.bind("qfrc_applied")[:, FREE:PALM], motors), (trials.bind("ctrl"), commands),
+        ]  # fmt: skip
+        kept = [joints, trials.bind("qvel"), trials.bind("qfrc_constraint"), trials.state]
+        done = stepped(self.model, trials, self.chunk, told, kept, lengths, following)
+        moved, speeds, forces, states = done.series
+        for trial in np.flatnonzero(lost):  # it stays where it was lost
+            last = done.counts[trial] - 1
+            moved[trial, last:], forces[trial, last:] = moved[trial, last], 0.0
         return tuple(
             self._motion(
                 moved[trial, :length], speeds[trial, :length], forces[trial, :length],
-                states[trial, :length], faults(trials, trial, errors.get(trial, "")),
+                states[trial, :length], done.health[trial],
             )
             for trial, length in enumerate(lengths)
         )  # fmt: skip
 
     def _applied(self, drives: Sequence[Drive], most: int) -> tuple[Array, Array, Array]:
-        """Return loads, forces of the palm and commands, by sample and trial; zero after an end."""
+        """Return loads, forces of the palm and commands, (trials, n, ...); zero after an end."""
         layout = self.scene.layout
-        loads = np.zeros((most, len(drives), 6))
-        motors = np.zeros((most, len(drives), PALM - FREE))
-        commands = np.zeros((most, len(drives), self.model.nu))
+        loads = np.zeros((len(drives), most, 6))
+        motors = np.zeros((len(drives), most, PALM - FREE))
+        commands = np.zeros((len(drives), most, self.model.nu))
         for place, drive in enumerate(drives):
             n = len(drive)
-            loads[:n, place] = drive.wrenches
-            loads[:n, place, :3] += layout.object_kg * (drive.gravity - layout.gravity)
-            motors[:n, place] = drive.accelerations * palm_armature(layout)
-            commands[:n, place] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
+            loads[place, :n] = drive.wrenches
+            loads[place, :n, :3] += layout.object_kg * (drive.gravity - layout.gravity)
+            motors[place, :n] = drive.accelerations * palm_armature(layout)
+            commands[place, :n] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
         return loads, motors, commands
 
     def _motion(
-        self, joints: Array, speeds: Array, forces: Array, states: Array, faults: tuple[str, ...]
+        self, joints: Array, speeds: Array, forces: Array, states: Array, health: Health
     ) -> HeldMotion:
         # where the simulator diverges: what is beyond all bounds has no cosine and no square
         joints, speeds, forces = (
@@ -239,7 +227,7 @@ class HeldBench:
         finger_forces = np.einsum("kij,nkj->ni", layout.axes, contact)
         return HeldMotion(
             joints[:, :3], joints[:, 3:7], palm, fingers, tips, contact, pressed,
-            forces[:, :3] - finger_forces, states, faults, turns,
+            forces[:, :3] - finger_forces, states, health, turns,
         )  # fmt: skip
 
 

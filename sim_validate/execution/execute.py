@@ -368,14 +368,14 @@ def _judged(
     trial: Trial, motion: HeldMotion, predicted: tuple[float, float], bench: HeldBench,
     settings: ExecutionSettings,
 ) -> ExecutionTrial:  # fmt: skip
-    if motion.faults:
+    if motion.health.fault:
         found = DIVERGED
     else:
         layout = bench.scene.layout
         found = outcome(motion, layout, trial.drive, layout.friction, trial.begun)
     kept = found.displacement_m <= settings.most_m and found.turn_rad <= settings.most_rad
     held = "slipped" if found.slipped else "stuck"
-    lost = "diverged" if motion.faults else "dropped"
+    lost = "diverged" if motion.health.fault else "dropped"
     return ExecutionTrial(
         kind=trial.kind,
         name=trial.name,

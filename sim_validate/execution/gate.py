@@ -169,12 +169,12 @@ class HeldCase:
 
 def met(name: str, motion: HeldMotion, ratio: float) -> Check:
     """Check that a figure of a motion, over what is known in closed form, is one."""
-    return near(name, None if motion.faults else ratio, TOLERANCE)
+    return near(name, None if motion.health.fault else ratio, TOLERANCE)
 
 
 def little(name: str, motion: HeldMotion, value: float, most: float = TOLERANCE) -> Check:
     """Check that a figure of a motion is at most as large as it may be."""
-    return Check(name, math.nan if motion.faults else value, 0.0, most)
+    return Check(name, math.nan if motion.health.fault else value, 0.0, most)
 
 
 def require_faithful_execution(
@@ -494,7 +494,7 @@ def struck_box(case: HeldCase) -> Check:
     here, there = (seen(motion, scene.layout).moved for motion in motions)
     changed = float(np.abs(here - there).max()) / max(float(np.abs(there).max()), SMALLEST)
     name = "motion of a box struck off its fingers that short steps change, over the largest"
-    faulty = any(motion.faults for motion in motions)
+    faulty = any(motion.health.fault for motion in motions)
     return Check(name, math.nan if faulty else changed, 0.0, CHANGED)
 
 

@@ -8,6 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from sim_validate.engine.bench import Health
 from sim_validate.execution import execute
 from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.execute import (
@@ -114,7 +115,7 @@ def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
 
     def diverging(trial, motion, *more):
         if trial.name == "knock -y":
-            motion = replace(motion, faults=("a number is not finite",))
+            motion = replace(motion, health=Health(finite=False))
         return judged(trial, motion, *more)
 
     monkeypatch.setattr(execute, "_judged", diverging)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scenes.mujoco.held import hinged, rotations
+from sim_validate.engine.bench import Health
 from sim_validate.execution.bench import HeldMotion
 from sim_validate.execution.paths import Table, idle
 from sim_validate.execution.slips import (
@@ -46,7 +47,7 @@ def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
         forces=forces,
         table=np.zeros((COUNT, 3)),
         states=np.zeros((COUNT, 0)),
-        faults=(),
+        health=Health(),
     )
 
 
