@@ -31,10 +31,9 @@ from sim_validate.closure.controls import (
 )
 from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
-from sim_validate.engine.bench import Bench
+from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.limits import PlannedLoad, planned_loads
 from sim_validate.engine.rig import Rig, Watched, squeezed
-from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
 from sim_validate.planning.asked_objects import GRASPS, grasp_with_id, some

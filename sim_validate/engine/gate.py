@@ -22,7 +22,7 @@ With mu the friction and N the normal force of a contact:
 
 The loads and frictions at which the boxes slip are found and judged as those of grasps are, by
 holds, ramps and releases, but every trial has its full length: that trials of grasps may end early
-presumes that nothing slips later (`early_ends`). So thresholds too loose to notice a slip are
+presumes that nothing slips later (`traces`). So thresholds too loose to notice a slip are
 refused, like settings that slip falsely. The cases have the friction and the size of the object
 under test.
 
@@ -53,7 +53,7 @@ from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, first_touch
+from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, Load, Schedule, first_touch
 from sim_validate.engine.limits import (
     SimulatedLimit,
     bisected,
@@ -64,7 +64,6 @@ from sim_validate.engine.limits import (
     released_friction,
 )
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.schedules import Load, Schedule
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import holds
 

@@ -46,9 +46,8 @@ from grasp_core.quality.wrench_limits import (
 from grasp_core.values import Contact
 from scenes.mujoco.layout import SQUEEZE
 from scenes.settings import HARD, Softness
-from sim_validate.engine.bench import Bench
+from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import Trace, holds
 from sim_validate.settings import FrictionProtocol

@@ -7,12 +7,9 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.mujoco.layout import Layout
-from sim_validate.engine import schedules
-from sim_validate.engine.bench import Bench, Motion
-from sim_validate.engine.early_ends import EarlyEnds, Thresholds
-from sim_validate.engine.schedules import Load, Schedule
+from sim_validate.engine.bench import Bench, Load, Motion, Schedule
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.traces import Trace, traces
+from sim_validate.engine.traces import EarlyEnds, Thresholds, Trace, traces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +41,7 @@ class Rig:
     """Whether the object also settled in that motion, so that friction may be lowered at once."""
     whole: bool = False
     """Whether all trials have the protocols' full length; else each ends as soon as its answer is
-    known (see `early_ends`)."""
+    known (see `traces`)."""
 
     def hold(
         self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
@@ -78,7 +75,7 @@ class Rig:
         usual = protocol.settling_friction * self.friction
         settling = settling_frictions or [usual] * len(loads)
         return [
-            schedules.hold(self.idle, load, (high, self.friction), self.bench.sample_s, protocol)
+            Schedule.hold(self.idle, load, (high, self.friction), self.bench.sample_s, protocol)
             for load, high in zip(loads, settling, strict=True)
         ]
 
@@ -88,7 +85,7 @@ class Rig:
         """Raise each load between two shares of itself; return the motions and the shares (n,)."""
         sample_s, protocols = self.bench.sample_s, (self.setup.hold, self.setup.limit)
         rises = [
-            schedules.ramp(self.idle, load, shares, self.friction, sample_s, protocols)
+            Schedule.ramp(self.idle, load, shares, self.friction, sample_s, protocols)
             for load in limits
         ]
         return self._traces([schedule for schedule, _ in rises]), rises[0][1]
@@ -97,7 +94,7 @@ class Rig:
         """Let the unloaded object settle, so that it need not before each release."""
         assert self.closed is not None  # noqa: S101 - rigid fingers have not closed
         protocol = self.setup.friction
-        trial = schedules.settle(self.idle, settling_friction, self.bench.sample_s, protocol)
+        trial = Schedule.settle(self.idle, settling_friction, self.bench.sample_s, protocol)
         (motion,) = self.bench.run([trial], self.closed.state)
         return replace(self, closed=motion.after(self.closed), settled=True)
 
@@ -112,7 +109,7 @@ class Rig:
         """Schedule a release to each friction."""
         sample_s, protocol = self.bench.sample_s, self.setup.friction
         return [
-            schedules.release(self.idle, (settling_friction, friction), sample_s, protocol,
+            Schedule.release(self.idle, (settling_friction, friction), sample_s, protocol,
                               settled=self.settled)
             for friction in frictions
         ]  # fmt: skip
@@ -157,5 +154,5 @@ def squeezed(
 ) -> Rig:  # fmt: skip
     """Close the fingers of a compiled scene on the unloaded object."""
     high = settling_friction or setup.hold.settling_friction * friction
-    (closed,) = bench.run([schedules.squeeze(forces, high, bench.sample_s, setup.hold)])
+    (closed,) = bench.run([Schedule.squeeze(forces, high, bench.sample_s, setup.hold)])
     return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed)

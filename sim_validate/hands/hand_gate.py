@@ -29,11 +29,10 @@ from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import limit_of
 from scenes.example_objects import example_object
 from scenes.mujoco.hand_scene import HandScene, build_hand_scene, limited
-from sim_validate.engine.bench import Bench
+from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.gate import Check, Gate
 from sim_validate.engine.limits import ramped_limits, resisted_by
 from sim_validate.engine.rig import squeezed
-from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Setup
 
 HALF, HEIGHT, TIP, TORQUE = 0.03, 0.08, 0.01, 0.35

@@ -26,11 +26,10 @@ from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, 
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import WrenchVerdict
-from sim_validate.engine.bench import Bench
+from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.gate import Check, require_faithful
 from sim_validate.engine.limits import part, planned_loads
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls

@@ -22,8 +22,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.declared import Declared
 from grasp_core.kinds import Measured, Number
 from scenes.mujoco.tested import TestedScene
-from sim_validate.engine.bench import batch, compiled, mujoco, stepped
-from sim_validate.engine.schedules import samples
+from sim_validate.engine.bench import batch, compiled, mujoco, samples, stepped
 from sim_validate.engine.traces import rotation_angles
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run
 
