@@ -5,7 +5,9 @@ torques of the motors (see `scenes.mujoco.held_hand`). Servos are told its torqu
 is replanned. Palm and links touch the object where it comes to them.
 """
 
-from grasp_core.closure.contacts import contacts_sha256
+from dataclasses import dataclass
+from functools import partial
+
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.best_squeeze import searched
@@ -19,7 +21,7 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
 from scenes.mujoco.held_mjcf import HeldScene
-from sim_validate.execution.execute import asked_settings, execution_of, surface_reach
+from sim_validate.execution.execute import asked_settings, execution_of, result_of, surface_reach
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.hands.validate_hand import MOST_PUSH_N
 from sim_validate.settings import ExecutionSettings
@@ -60,17 +62,8 @@ def execute_hand(
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
     settings = asked_settings("execute_hand", settings, mass_kg, hand_execution_settings)
-    settings = settings.for_body(body)
-
-    def scene_of(own: ExecutionSettings, best: BestSqueeze) -> HeldScene:
-        near = surface_reach(body, best.grip, own)
-        return held_hand_scene(hand, body, reach, best.grip, own, near)
-
-    return execution_of(
-        body, settings,
-        lambda own, loads: hand_squeeze(hand, body, reach, friction, own, loads),
-        scene_of, threads=threads, enough=enough,
-    )  # fmt: skip
+    holder = HandHolder(hand, body, reach, friction)
+    return execution_of(holder, settings.for_body(body), threads=threads, enough=enough)
 
 
 def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
@@ -78,40 +71,50 @@ def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
     return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N)
 
 
-def hand_squeeze(
-    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings,
-    loads: LoadSet | None = None,
-) -> BestSqueeze:  # fmt: skip
-    """Choose the squeeze that carries most, or needs least push for loads, within the torques."""
-    check_body(body)
-    stance = stance_of(hand, reach)
-    if not force_closure(stance.contacts, friction=friction).closed:
-        raise InputError(
-            f"the contacts of {reach.grasp} are not in force closure at friction {friction}"
-        )
-    motors = strong_motors(hand, reach)
-    loose = unsqueezed(
-        body, stance.contacts, friction, tip_radius_m=stance.tip_radii,
-        stiffness=finger_springs(motors, settings.tip_stiffness_n_per_m),
-    )  # fmt: skip
-    start = hand_grip(hand, stance, loose, servo_stiffness(motors, settings.tip_stiffness_n_per_m))
-    most = settings.push_n if loads is None else None
-    best = searched(start, loads or any_direction(settings.object_kg), most, motors)
-    if best.scale == 0.0:
-        raise NoForcesError(
-            "no squeeze within the motors' torques carries any part of the weight in every "
-            "direction; use stronger motors, another pose, or more friction"
-        )
-    return best
+@dataclass(frozen=True, slots=True, eq=False)
+class HandHolder:
+    """A hand that stands in a grasp, and holds the object by its motors (see `Holder`)."""
+
+    hand: Hand
+    body: Polyhedron
+    reach: HandReach
+    friction: float
+
+    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
+        """Choose the squeeze that carries most, or needs least push for loads, by its torques."""
+        hand, body, reach = self.hand, self.body, self.reach
+        check_body(body)
+        stance, spring = stance_of(hand, reach), settings.tip_stiffness_n_per_m
+        if not force_closure(stance.contacts, friction=self.friction).closed:
+            raise InputError(
+                f"the contacts of {reach.grasp} are not in force closure at friction "
+                f"{self.friction}"
+            )
+        motors = strong_motors(hand, reach)
+        loose = unsqueezed(
+            body, stance.contacts, self.friction, tip_radius_m=stance.tip_radii,
+            stiffness=finger_springs(motors, spring),
+        )  # fmt: skip
+        start = hand_grip(hand, stance, loose, servo_stiffness(motors, spring))
+        most = settings.push_n if loads is None else None
+        best = searched(start, loads or any_direction(settings.object_kg), most, motors)
+        if best.scale == 0.0:
+            raise NoForcesError(
+                "no squeeze within the motors' torques carries any part of the weight in every "
+                "direction; use stronger motors, another pose, or more friction"
+            )
+        return best
+
+    def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
+        """Build the scene in which a squeeze is executed."""
+        near = surface_reach(self.body, best.grip, settings)
+        return held_hand_scene(self.hand, self.body, self.reach, best.grip, settings, near)
 
 
 def executed_by_hand(
     hand: Hand, body: Polyhedron, reach: HandReach, friction: float, settings: ExecutionSettings
 ) -> ExecutedGrasp:
     """Execute one grasp with a hand; a grasp that cannot be executed is a result with a reason."""
-    about = reach.grasp, "", contacts_sha256(reach.contacts or ())
-    try:
-        found = execute_hand(hand, body, reach, friction, settings)
-    except (InputError, NoForcesError) as error:
-        return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
-    return ExecutedGrasp(*about, found)
+    execution = partial(execute_hand, hand, body, reach, friction, settings)
+    refused = (InputError, NoForcesError)
+    return result_of(reach.grasp, "", reach.contacts or (), execution, refused)

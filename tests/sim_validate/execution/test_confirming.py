@@ -13,9 +13,8 @@ from sim_validate.execution import execute
 from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.execute import (
     FINE_S,
-    chosen_squeeze,
+    Fingertips,
     confirming_bench,
-    held_scene,
     run_again,
     run_trials,
 )
@@ -57,8 +56,9 @@ def test_a_loss_of_a_step_that_is_too_long_does_not_count(bar, monkeypatch):
 def test_a_run_of_short_steps_alone_agrees(bar):
     """It is what `run_again` continues, from the first sample on."""
     body, grasp = bar
-    best = chosen_squeeze(body, grasp, 0.4, LIGHT)
-    scene = held_scene(body, best.grip, LIGHT)
+    fingers = Fingertips(body, grasp.contacts, 0.4)
+    best = fingers.squeeze(LIGHT)
+    scene = fingers.scene(LIGHT, best)
     short = replace(scene.physics, timestep=FINE_S)
     alone = sv.execute(body, grasp, 0.4, LIGHT, physics=short)
     confirmed = sv.execute(body, grasp, 0.4, LIGHT)
@@ -73,8 +73,9 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
     """Motions are joined where they were parted, with the speed that a stop begins with."""
     body, grasp = planned("box")
     settings = sv.ExecutionSettings(MASSES[kind], trials=(kind,), max_mm=5e3, max_deg=180.0)
-    best = chosen_squeeze(body, grasp, 0.5, settings)
-    scene = held_scene(body, best.grip, settings)
+    fingers = Fingertips(body, grasp.contacts, 0.5)
+    best = fingers.squeeze(settings)
+    scene = fingers.scene(settings, best)
     bench = HeldBench(scene)
     lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
     trials, _ = trials_of(body, scene.layout, settings, lowest)
@@ -97,8 +98,9 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
 
 def test_steps_that_are_short_already_are_not_made_shorter(bar):
     body, grasp = bar
-    best = chosen_squeeze(body, grasp, 0.4, LIGHT)
-    scene = held_scene(body, best.grip, LIGHT)
+    fingers = Fingertips(body, grasp.contacts, 0.4)
+    best = fingers.squeeze(LIGHT)
+    scene = fingers.scene(LIGHT, best)
     bench = confirming_bench(HeldBench(scene))
     assert bench is not None
     assert bench.step_s == pytest.approx(FINE_S)
@@ -143,8 +145,9 @@ def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
     """Contacts may slip within samples only; then no sample has one on its cone."""
     body, grasp = planned("box")
     settings = sv.ExecutionSettings(0.1, trials=("weight",))
-    best = chosen_squeeze(body, grasp, 0.5, settings)
-    scene = held_scene(body, best.grip, settings)
+    fingers = Fingertips(body, grasp.contacts, 0.5)
+    best = fingers.squeeze(settings)
+    scene = fingers.scene(settings, best)
     bench = HeldBench(scene)
     lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
     trials, _ = trials_of(body, scene.layout, settings, lowest)
