@@ -39,6 +39,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -128,6 +129,14 @@ class Case:
     def body(self, name: str) -> Polyhedron:
         """Scale an example object to the size under test."""
         return sized(name, self.radius_m)
+
+    def checks(self) -> tuple[Check, ...]:
+        """Measure all figures on pads, as controls always are, and on the mesh if asked for."""
+        checks = known_answers(replace(self, setup=replace(self.setup, surface="pads")))
+        if self.setup.surface != "mesh":
+            return checks
+        meshes = (*mesh_touches(self), *known_answers(self))
+        return checks + tuple(replace(each, name=f"on a mesh: {each.name}") for each in meshes)
 
     def squeezed(
         self, body: Polyhedron, contacts: Sequence[Contact], forces: Array, friction: float
@@ -509,6 +518,25 @@ class Gate(Declared):
             )
 
 
+class Cases(Protocol):
+    """Settings with which a simulator is checked on cases with known answers."""
+
+    def checks(self) -> tuple[Check, ...]:
+        """Measure all figures."""
+        ...
+
+
+@lru_cache(maxsize=256)
+def measured(cases: Cases) -> Gate:
+    """Check the simulator on known cases, once per process for the same settings."""
+    return Gate(cases.checks(), versions()["mujoco"])
+
+
+def two_digits(value: float) -> float:
+    """Round to two digits, so that what is nearly alike shares one measurement."""
+    return float(f"{value:.1e}")
+
+
 def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
@@ -521,18 +549,7 @@ def require_faithful(
 def measured_gate(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
-    """Check the simulator on known cases, once per process for the same settings."""
+    """Check the simulator on the known cases of closure trials."""
     fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
     setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
-    # Two digits of the radius let objects of nearly the same size share one measurement.
-    return _measured(Case(setup, friction, float(f"{radius_m:.1e}")))
-
-
-@lru_cache(maxsize=256)
-def _measured(case: Case) -> Gate:
-    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
-    checks = known_answers(pads)
-    if case.setup.surface == "mesh":
-        meshes = (*mesh_touches(case), *known_answers(case))
-        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
-    return Gate(checks, versions()["mujoco"])
+    return measured(Case(setup, friction, two_digits(radius_m)))

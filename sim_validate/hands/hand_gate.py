@@ -16,8 +16,7 @@ the two fingers along a load oppose it, by their servos of stiffness k:
 """
 
 import math
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,12 +24,11 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link
 from grasp_core.hands.reach import HandReach
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import limit_of
 from scenes.example_objects import example_object
 from scenes.mujoco.hand_scene import HandScene, build_hand_scene, limited
 from sim_validate.engine.bench import Bench, Load
-from sim_validate.engine.gate import Check, Gate
+from sim_validate.engine.gate import Check, measured, two_digits
 from sim_validate.engine.limits import ramped_limits, resisted_by
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Setup
@@ -52,20 +50,26 @@ OUTWARD = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -0.0, -0.0], [-0.0,
 """Outward normals at the contacts, (4, 3)."""
 
 
+@dataclass(frozen=True, slots=True)
+class KnownHand:
+    """The settings and the friction with which the simulator is checked on the known hand."""
+
+    setup: Setup
+    friction: float
+
+    def checks(self) -> tuple[Check, ...]:
+        """Measure what it resists, and how far it gives way, over the exact figures."""
+        body, reach, setup = cube(), stance(self.friction), self.setup
+        scene = build_hand_scene(hinged_hand(), body, reach, self.friction, physics=setup.physics)
+        return (*_limits(scene, body, reach, setup), _displaced(scene, setup))
+
+
 def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
     """Check the simulator on the known hand, and refuse settings under which a check fails."""
     plain = replace(setup, threads=1, timeout_s=math.inf)
-    gate = Gate(known_hand(plain, float(f"{friction:.1e}")), versions()["mujoco"])
+    gate = measured(KnownHand(plain, two_digits(friction)))
     gate.require("no hand is simulated")
     return gate.checks
-
-
-@lru_cache(maxsize=32)
-def known_hand(setup: Setup, friction: float) -> tuple[Check, ...]:
-    """Measure what the known hand resists, and how far it gives way, over the exact figures."""
-    body, reach = cube(), stance(friction)
-    scene = build_hand_scene(hinged_hand(), body, reach, friction, physics=setup.physics)
-    return (*_limits(scene, body, reach, setup), _displaced(scene, setup))
 
 
 def cube() -> Polyhedron:
