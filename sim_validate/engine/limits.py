@@ -19,7 +19,7 @@ must move. Where two fingers alone need mu*, the others must push as well: other
 turns about the line between the two far above mu*. Therefore the forces are planned for a friction
 just above mu*, with the smallest push as large as possible.
 
-`planned_loads` chooses the wrenches that a grasp is tested with, and plans finger forces for them.
+An `Analysis` chooses the wrenches that a grasp is tested with, and plans finger forces for them.
 """
 
 from collections.abc import Callable, Sequence
@@ -266,56 +266,76 @@ class PlannedLoad:
     """The friction coefficient that the planned forces need, with the torques of soft contacts."""
 
 
-def planned_loads(
-    body: Polyhedron,
-    contacts: Sequence[Contact],
-    friction: float,
-    idle: Load,
-    agenda: Agenda,
-    setup: Setup,
-    *,
-    motors: Motors | None = None,
-) -> tuple[PlannedLoad, ...]:
-    """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
-    resisted, share = resisted_by(body, contacts, friction, setup, motors), setup.hold.load_share
-    relative = [
-        _load(name, found, share * found.limit, idle, body, contacts, setup)
-        for name, found in _relative(resisted, body.radius, agenda)
-    ]
-    named = [(each.name, each.wrench) for each in agenda.wrenches]
-    own = loads_as_they_are(body, contacts, friction, idle, named, setup, motors=motors)
-    return (*relative, *own)
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """Contacts on an object as the analysis sees them: what they resist, with which forces."""
 
+    body: Polyhedron
+    contacts: Sequence[Contact]
+    friction: float
+    setup: Setup
+    motors: Motors | None
+    """Motors that make the contact forces; None for fingertips."""
 
-def loads_as_they_are(
-    body: Polyhedron,
-    contacts: Sequence[Contact],
-    friction: float,
-    idle: Load,
-    wrenches: Sequence[tuple[str, Array]],
-    setup: Setup,
-    *,
-    motors: Motors | None = None,
-) -> tuple[PlannedLoad, ...]:
-    """Plan finger forces for wrenches that are applied as given, not at a share of a limit."""
-    resisted = resisted_by(body, contacts, friction, setup, motors)
-    return tuple(
-        _load(name, limit_of(resisted, wrench), 1.0, idle, body, contacts, setup)
-        for name, wrench in wrenches
-    )
+    @property
+    def resisted(self) -> WrenchBody:
+        """The body of wrenches that are resisted, with torques about the centre of mass."""
+        positions, normals = stacked(self.contacts)
+        frictions, setup = contact_frictions(self.friction, len(self.contacts)), self.setup
+        return WrenchBody(
+            positions - self.body.center_of_mass, normals, frictions,
+            setup.fingers.max_normal_force_n, self.motors,
+            torsions=contact_torsions(setup.physics.torsion_m, frictions),
+        )  # fmt: skip
 
+    def limit(self, wrench: Array) -> WrenchLimit:
+        """Find the largest multiple of a wrench that is resisted."""
+        return limit_of(self.resisted, wrench)
 
-def resisted_by(
-    body: Polyhedron, contacts: Sequence[Contact], friction: float, setup: Setup,
-    motors: Motors | None = None,
-) -> WrenchBody:  # fmt: skip
-    """Return the body of wrenches that contacts resist, with torques about the centre of mass."""
-    positions, normals = stacked(contacts)
-    frictions = contact_frictions(friction, len(contacts))
-    return WrenchBody(
-        positions - body.center_of_mass, normals, frictions, setup.fingers.max_normal_force_n,
-        motors, torsions=contact_torsions(setup.physics.torsion_m, frictions),
-    )  # fmt: skip
+    def planned(self, idle: Load, agenda: Agenda) -> tuple[PlannedLoad, ...]:
+        """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
+        share = self.setup.hold.load_share
+        relative = [
+            self._load(name, found, share * found.limit, idle)
+            for name, found in _relative(self.resisted, self.body.radius, agenda)
+        ]
+        own = [(each.name, each.wrench) for each in agenda.wrenches]
+        return (*relative, *self.as_they_are(idle, own))
+
+    def as_they_are(
+        self, idle: Load, wrenches: Sequence[tuple[str, Array]]
+    ) -> tuple[PlannedLoad, ...]:
+        """Plan finger forces for wrenches that are applied as given, not at a share of a limit."""
+        resisted = self.resisted
+        return tuple(
+            self._load(name, limit_of(resisted, wrench), 1.0, idle) for name, wrench in wrenches
+        )
+
+    def _load(self, name: str, found: WrenchLimit, multiple: float, idle: Load) -> PlannedLoad:
+        """Plan a multiple of a wrench, with forces between those at rest and those at the limit.
+
+        The friction that they need is the largest ratio of a tangential to a normal force.
+        """
+        wrench = to_digits(multiple * found.wrench)
+        predicted = found.limit / multiple
+        limit = Load(predicted * wrench, to_digits(found.forces))
+        share = 1.0 / predicted if predicted > 0.0 else 0.0
+        load = Load(wrench, part(idle, limit, share).forces if share else idle.forces)
+        positions, normals = stacked(self.contacts)
+        along, across = normal_and_tangential(load.forces, normals)
+        pushing = along > NO_PUSH * along.max()
+        along, across = along[pushing], across[pushing]
+        if found.torques is not None:  # the normal force counts as far as the torque leaves it
+            share = min(share, 1.0)
+            # the torques about the normals, of least norm, that balance the load at rest
+            arms = positions - self.body.center_of_mass
+            missing = idle.wrench[3:] + cross(arms, idle.forces).sum(axis=0)
+            resting = np.asarray(np.linalg.lstsq(normals.T, -missing, rcond=None)[0], dtype=float)
+            torques = (1.0 - share) * resting + share * found.torques
+            turning = np.abs(torques[pushing]) / self.setup.physics.torsion_m
+            along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
+        required = rounded((across / along).max())
+        return PlannedLoad(name, load, predicted, limit, required)
 
 
 def _relative(
@@ -330,32 +350,3 @@ def _relative(
     units = scale * drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
     others = [(RANDOM.format(place), limit_of(resisted, unit)) for place, unit in enumerate(units)]
     return [*zip(AXIS_NAMES, axes, strict=True), (WEAKEST, weakest), *others]
-
-
-def _load(
-    name: str, found: WrenchLimit, multiple: float, idle: Load, body: Polyhedron,
-    contacts: Sequence[Contact], setup: Setup,
-) -> PlannedLoad:  # fmt: skip
-    """Plan a multiple of a wrench, with forces between those at rest and those at the limit.
-
-    The friction that they need is the largest ratio of a tangential to a normal force.
-    """
-    wrench = to_digits(multiple * found.wrench)
-    predicted = found.limit / multiple
-    limit = Load(predicted * wrench, to_digits(found.forces))
-    share = 1.0 / predicted if predicted > 0.0 else 0.0
-    load = Load(wrench, part(idle, limit, share).forces if share else idle.forces)
-    positions, normals = stacked(contacts)
-    along, across = normal_and_tangential(load.forces, normals)
-    pushing = along > NO_PUSH * along.max()
-    along, across = along[pushing], across[pushing]
-    if found.torques is not None:  # the normal force counts as far as the contact's torque leaves
-        share = min(share, 1.0)
-        # the torques about the normals, of least norm, that balance the load at rest
-        missing = idle.wrench[3:] + cross(positions - body.center_of_mass, idle.forces).sum(axis=0)
-        resting = np.asarray(np.linalg.lstsq(normals.T, -missing, rcond=None)[0], dtype=np.float64)
-        torques = (1.0 - share) * resting + share * found.torques
-        turning = np.abs(torques[pushing]) / setup.physics.torsion_m
-        along = np.sqrt(np.maximum(along**2 - turning**2, (NO_PUSH * along) ** 2))
-    required = rounded((across / along).max())
-    return PlannedLoad(name, load, predicted, limit, required)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_core.arrays import Array
+from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.layout import Layout
 from sim_validate.engine.bench import Bench, Load, Motion, Schedule
 from sim_validate.engine.setup import Setup
@@ -156,3 +157,11 @@ def squeezed(
     high = settling_friction or setup.hold.settling_friction * friction
     (closed,) = bench.run([Schedule.squeeze(forces, high, bench.sample_s, setup.hold)])
     return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed)
+
+
+def closed_on(
+    scene: Scene, setup: Setup, friction: float, settling_friction: float | None = None
+) -> Rig:
+    """Close the fingers of a scene on the unloaded object, with the squeeze of its layout."""
+    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
+    return squeezed(bench, setup, scene.layout.squeeze_forces, friction, settling_friction)

@@ -18,12 +18,9 @@ from grasp_core.declared import Declared
 from grasp_core.figures import Shown
 from grasp_core.files.records import Key
 from grasp_core.kinds import Friction
-from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
-from grasp_core.quality.wrench_limits import WrenchLimit, limit_of
-from grasp_core.values import Contact
-from sim_validate.engine.limits import PlannedLoad, resisted_by
-from sim_validate.engine.setup import Setup
+from grasp_core.quality.wrench_limits import WrenchLimit
+from sim_validate.engine.limits import Analysis, PlannedLoad
 
 EXCESS = 0.05
 """Share of the applied load, at least, that no forces of a control can balance."""
@@ -56,19 +53,10 @@ class HandControl(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HandCase:
+class HandCase(Analysis):
     """A hand's contacts and motors, from which its controls are made."""
 
-    body: Polyhedron
-    contacts: tuple[Contact, ...]
-    friction: float
     motors: Motors
-    setup: Setup
-
-    def limit(self, wrench: Array) -> WrenchLimit:
-        """Find the largest multiple of a wrench that the hand resists."""
-        body = resisted_by(self.body, self.contacts, self.friction, self.setup, self.motors)
-        return limit_of(body, wrench)
 
 
 def hand_controls(

@@ -29,8 +29,8 @@ from scenes.example_objects import example_object
 from scenes.mujoco.hand_scene import HandScene, build_hand_scene, limited
 from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.gate import Check, measured, two_digits
-from sim_validate.engine.limits import ramped_limits, resisted_by
-from sim_validate.engine.rig import squeezed
+from sim_validate.engine.limits import Analysis, ramped_limits
+from sim_validate.engine.rig import closed_on, squeezed
 from sim_validate.engine.setup import Setup
 
 HALF, HEIGHT, TIP, TORQUE = 0.03, 0.08, 0.01, 0.35
@@ -110,9 +110,8 @@ def _limits(
         "about the axis across them": (np.eye(6)[5], 4.0 * friction * HALF * press),
         "against one finger": (np.eye(6)[0], (1.0 + 2.0 * friction) * press),
     }
-    bench = Bench(scene)
-    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
-    resisted = resisted_by(body, reach.contacts or (), friction, setup, scene.layout.motors)
+    rig = closed_on(scene, setup, friction)
+    resisted = Analysis(body, reach.contacts or (), friction, setup, scene.layout.motors).resisted
     loads = [
         Load(size * wrench, limit_of(resisted, wrench).forces) for wrench, size in exact.values()
     ]

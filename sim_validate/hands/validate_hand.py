@@ -26,10 +26,10 @@ from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, 
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import WrenchVerdict
-from sim_validate.engine.bench import Bench, Load
+from sim_validate.engine.bench import Load
 from sim_validate.engine.gate import Check, require_faithful
-from sim_validate.engine.limits import part, planned_loads
-from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.limits import part
+from sim_validate.engine.rig import closed_on
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge
 from sim_validate.hands.hand_controls import HandCase, HandControl, hand_controls
@@ -165,46 +165,29 @@ def validate_hand(
         raise InputError(f"the contacts of {reach.grasp} are not in force closure at {friction}")
     gate = require_faithful(setup, friction, body.radius)
     checks = (*gate.checks, *require_faithful_hands(setup, friction))
-    layout, rig = scene.layout, _rig(scene, setup, friction)
-    loads = planned_loads(
-        body, contacts, layout.friction, rig.idle, agenda, setup, motors=layout.motors
-    )
+    layout, high = scene.layout, setup.hold.settling_friction * friction
+    rig = closed_on(scene, setup, layout.friction, high)
+    case = HandCase(body, contacts, layout.friction, setup, layout.motors)
+    loads = case.planned(rig.idle, agenda)
     wrenches, tried = held_wrenches(rig, loads, agenda), tuple[HandControlVerdict, ...]()
     if agenda.controls:
-        case = HandCase(body, contacts, layout.friction, layout.motors, setup)
         weakest = next(planned for planned in loads if planned.name == WEAKEST)
         names = tuple(joint.name for joint in layout.hand.joints)
         tried = tuple(
-            HandControlVerdict(control, _held(scene, setup, friction, control, weakest.limit))
+            HandControlVerdict(control, _held(scene, setup, high, control, weakest.limit))
             for control in hand_controls(case, weakest, names)
         )
     return HandVerdict(
-        hand.name,
-        reach.grasp,
-        friction,
-        layout.radius_m,
-        wrenches,
-        tried,
-        setup,
-        agenda,
-        checks,
+        hand.name, reach.grasp, friction, layout.radius_m, wrenches, tried, setup, agenda, checks,
         scene,
-    )
-
-
-def _rig(scene: HandScene, setup: Setup, friction: float) -> Rig:
-    """Close the hand; high friction meanwhile is that of the grasp, whatever a control's is."""
-    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-    high = setup.hold.settling_friction * friction
-    layout = scene.layout
-    return squeezed(bench, setup, layout.squeeze_forces, layout.friction, high)
+    )  # fmt: skip
 
 
 def _held(
-    scene: HandScene, setup: Setup, friction: float, control: HandControl, limit: Load
+    scene: HandScene, setup: Setup, high: float, control: HandControl, limit: Load
 ) -> HoldVerdict:
-    """Hold what a control must let go of."""
-    rig = _rig(limited(scene, control.limits, control.friction), setup, friction)
-    high = setup.hold.settling_friction * friction
+    """Hold what a control must let go of; high friction first is the grasp's, not the control's."""
+    weak = limited(scene, control.limits, control.friction)
+    rig = closed_on(weak, setup, weak.layout.friction, high)
     (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
     return judge(trace, scene.layout, setup.hold)
