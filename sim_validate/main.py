@@ -70,7 +70,7 @@ ACTIONS: dict[type[Any], str] = {
     Analyze: "planning.analyze:analyze_file",
     Transfer: "planning.transfer:transfer_file",
     Reach: "protocols.command:judge_reach",
-    Hand: "hands.hand_command:show_hand",
+    Hand: "hands.command:show_hand",
     dataset_flags.Build: "datasets.command:build_dataset",
     dataset_flags.Import: "datasets.command:import_dataset",
     dataset_flags.Verify: "datasets.command:verify_dataset",

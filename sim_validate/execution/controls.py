@@ -29,9 +29,8 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.held import HeldLayout
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench, HeldMotion
+from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome, seen, slides
 from sim_validate.execution.paths import Drive, joined
-from sim_validate.execution.slips import SLID, outcome, seen, slides
 from sim_validate.execution.verdict import ExecutionControl
 
 FRICTION = 0.9

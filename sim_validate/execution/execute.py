@@ -43,11 +43,15 @@ from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
 from sim_validate.execution.bench import (
+    IDLE,
     HeldBench,
     HeldMotion,
+    Outcome,
     begun_motion,
     facing,
+    first_trouble,
     motions_joined,
+    outcome,
 )
 from sim_validate.execution.controls import run_controls
 from sim_validate.execution.gate import require_faithful_execution
@@ -59,7 +63,6 @@ from sim_validate.execution.predictions import (
     planned,
     predicted_losses,
 )
-from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
 from sim_validate.execution.trials import Trial
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes

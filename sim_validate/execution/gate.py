@@ -64,9 +64,8 @@ from sim_validate.engine.gate import (
     two_digits,
 )
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench, HeldMotion
+from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome, seen, slides
 from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
-from sim_validate.execution.slips import SLID, outcome, seen, slides
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN

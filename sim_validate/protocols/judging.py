@@ -31,8 +31,7 @@ from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
-from sim_validate.hands.hand_gate import require_faithful_hands
-from sim_validate.hands.validate_hand import hand_setup
+from sim_validate.hands.validate_hand import hand_setup, require_faithful_hands
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import their_verdict
 from sim_validate.protocols.verdict import Judgement, OurVerdict

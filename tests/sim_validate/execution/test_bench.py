@@ -9,9 +9,8 @@ import grasp_core as gc
 import scenes
 from scenes.mujoco.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.bench import HeldBench, outcome, seen
 from sim_validate.execution.paths import Pose, Table, idle, joined
-from sim_validate.execution.slips import outcome, seen
 from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import (
     MASS,

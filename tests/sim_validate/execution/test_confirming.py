@@ -10,7 +10,7 @@ import scenes
 import sim_validate as sv
 from sim_validate.engine.bench import Health
 from sim_validate.execution import execute
-from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.bench import HeldBench, outcome
 from sim_validate.execution.execute import (
     FINE_S,
     Fingertips,
@@ -19,7 +19,6 @@ from sim_validate.execution.execute import (
     run_trials,
 )
 from sim_validate.execution.predictions import held_dynamics
-from sim_validate.execution.slips import outcome
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import trial_in_words
 from tests.sim_validate.execution.held_rigs import planned

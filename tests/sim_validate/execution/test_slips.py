@@ -7,17 +7,17 @@ import pytest
 
 from scenes.mujoco.held import hinged, rotations
 from sim_validate.engine.bench import Health
-from sim_validate.execution.bench import HeldMotion
-from sim_validate.execution.paths import Table, idle
-from sim_validate.execution.slips import (
+from sim_validate.execution.bench import (
     SLID,
     TOUCHED,
+    HeldMotion,
     Seen,
     _first_slip,
     outcome,
     seen,
     slides,
 )
+from sim_validate.execution.paths import Table, idle
 from tests.judges import random_rotation
 from tests.scenes.mujoco.test_turns import quaternions, turn_about
 from tests.sim_validate.execution.held_rigs import box_scene
