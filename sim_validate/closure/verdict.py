@@ -17,9 +17,8 @@ from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared, InNotebooks
-from grasp_core.figures import Compared, Shown, figure, less, more, scalars
-from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
-from grasp_core.grasp_tables import ById, frame_of
+from grasp_core.figures import Compared, Shown, figure, less, more
+from grasp_core.files.records import FLAT, UNRECORDED, recorded
 from grasp_core.kinds import Friction, Many, Measured, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -31,7 +30,7 @@ from sim_validate.engine.gate import Gate
 from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
-from sim_validate.kit.files import AboutObject
+from sim_validate.kit.files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 
 AGREEMENT = 0.02
@@ -351,20 +350,13 @@ def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Verdicts(RecordFile, ById[Verdict]):
-    """The verdicts on an object's grasps, as `verdicts.json` holds them.
-
-    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
-    """
+class Verdicts(AboutGrasps[Verdict]):
+    """The verdicts on an object's grasps, as `verdicts.json` holds them."""
 
     ITEMS = "verdicts"
     FILE = "verdicts.json"
     SCHEMA = 2
 
-    object: AboutObject
-    friction: Friction
-    complete: bool
-    """Whether every grasp that was asked for was tested."""
     gate: Gate
     """How the simulator did on cases with known answers."""
     verdicts: tuple[Verdict, ...]
@@ -378,11 +370,6 @@ class Verdicts(RecordFile, ById[Verdict]):
         """Collect verdicts on the grasps of an object for a file."""
         return cls(AboutObject.of(body), friction, complete, gate, verdicts)
 
-    @property
-    def object_sha256(self) -> str:
-        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
-        return self.object.content_sha256
-
     @recorded
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps that held, of negative controls that let go, and contradictions."""
@@ -395,17 +382,6 @@ class Verdicts(RecordFile, ById[Verdict]):
             "controls_let_go": sum(control.let_go for control in controls),
             "mismatches": sum(len(verdict.mismatches) for verdict in self.verdicts),
         }
-
-    def to_dataframe(self) -> Any:
-        """Return a `pandas.DataFrame` with a row for each verdict, indexed by the grasp's id.
-
-        It has a column for each figure of a verdict that is a number or a word; of the mismatches,
-        how many there are.
-
-        Raises:
-            InputError: The library pandas is not installed.
-        """
-        return frame_of([scalars(each) for each in self.verdicts], [v.id for v in self.verdicts])
 
 
 def load_verdicts(path: str | Path) -> Verdicts:
