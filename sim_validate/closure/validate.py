@@ -56,16 +56,17 @@ from sim_validate.engine.gate import (
     require_faithful,
     require_touch,
 )
-from sim_validate.engine.limits import (
+from sim_validate.engine.rig import (
     Analysis,
     CriticalFriction,
     PlannedLoad,
+    Rig,
     SimulatedLimit,
     bisected_limits,
+    closed_on,
     ramped_limits,
     released_friction,
 )
-from sim_validate.engine.rig import Rig, closed_on
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
 from sim_validate.kit.processes import Shared, each, processes

@@ -27,7 +27,7 @@ from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.layout import FingerDrive
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
-from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
+from sim_validate.engine.rig import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
 from sim_validate.kit.files import AboutGrasps, AboutObject

@@ -55,7 +55,8 @@ from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, Load, Schedule, first_touch
-from sim_validate.engine.limits import (
+from sim_validate.engine.rig import (
+    Rig,
     SimulatedLimit,
     bisected,
     bisected_limits,
@@ -63,8 +64,8 @@ from sim_validate.engine.limits import (
     part,
     ramped_limits,
     released_friction,
+    squeezed,
 )
-from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import holds
 

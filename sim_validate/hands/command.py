@@ -31,9 +31,14 @@ from sim_validate.engine.setup import Agenda
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
-from sim_validate.hands.execute_hand import executed_by_hand, hand_execution_settings
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
-from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
+from sim_validate.hands.trials import (
+    MOST_PUSH_N,
+    HandVerdict,
+    executed_by_hand,
+    hand_execution_settings,
+    validate_hand,
+)
 from sim_validate.kit import processes
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut

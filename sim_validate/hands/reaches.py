@@ -24,7 +24,7 @@ from grasp_core.kinds import Direction, HandClearance, NotNegative, Seed, Starts
 from grasp_core.provenance import versions
 from grasp_core.settings import Settings
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.hands.validate_hand import HandVerdict
+from sim_validate.hands.trials import HandVerdict
 from sim_validate.kit.files import AboutGrasps
 from sim_validate.settings import ExecutionSettings
 

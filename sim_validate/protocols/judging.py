@@ -25,13 +25,12 @@ from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scene import build_hand_scene
 from scenes.mujoco.tested import HandServos, fingertip_scene, hand_scene, planned_postures
 from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.limits import Analysis
-from sim_validate.engine.rig import closed_on
+from sim_validate.engine.rig import Analysis, closed_on
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
-from sim_validate.hands.validate_hand import hand_setup, require_faithful_hands
+from sim_validate.hands.trials import hand_setup, require_faithful_hands
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import their_verdict
 from sim_validate.protocols.verdict import Judgement, OurVerdict

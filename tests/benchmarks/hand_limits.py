@@ -21,8 +21,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from sim_validate.engine.limits import Analysis, part, ramped_limits
-from sim_validate.engine.rig import closed_on
+from sim_validate.engine.rig import Analysis, closed_on, part, ramped_limits
 from sim_validate.engine.traces import holds
 from tests.benchmarks.objects import scaled
 

@@ -9,7 +9,7 @@ import scenes
 import sim_validate as sv
 from scenes.mujoco.closure_scene import build_scene
 from sim_validate.engine.bench import Bench, Schedule
-from sim_validate.engine.limits import bisected, forces_just_above, released_friction
+from sim_validate.engine.rig import bisected, forces_just_above, released_friction
 from sim_validate.engine.setup import Setup
 from sim_validate.settings import FrictionProtocol
 from tests.marks import more

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
 from sim_validate.engine.bench import Load, Schedule
-from sim_validate.engine.limits import part
+from sim_validate.engine.rig import part
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import USABLE, WATCHED, EarlyEnds, Outcome, Thresholds, judge
 from sim_validate.settings import FrictionProtocol, HoldProtocol

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from sim_validate.engine.bench import Load, Schedule, smooth
-from sim_validate.engine.limits import OVERLOAD, part
+from sim_validate.engine.rig import OVERLOAD, part
 from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 

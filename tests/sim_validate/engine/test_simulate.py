@@ -8,8 +8,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.arrays import to_digits
 from sim_validate.engine.bench import CHUNK, Bench, Load, Schedule
-from sim_validate.engine.limits import part
-from sim_validate.engine.rig import squeezed
+from sim_validate.engine.rig import part, squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.errors import InputError
-from sim_validate.hands.execute_hand import HandHolder, hand_execution_settings
+from sim_validate.hands.trials import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, stood
 

@@ -10,7 +10,7 @@ import sim_validate as sv
 from grasp_core.errors import InputError, UnfaithfulError
 from scenes.settings import PhysicsSettings
 from sim_validate.closure.verdict import AGREEMENT
-from sim_validate.hands.validate_hand import KnownHand, hand_setup
+from sim_validate.hands.trials import KnownHand, hand_setup
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 DOWN = (0.0, 0.6, -0.8)
