@@ -6,7 +6,7 @@ other. They are also what `verdicts.json` holds.
 
 import importlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -70,6 +70,37 @@ class WrenchVerdict(Declared):
         if self.let_go_at and abs(self.let_go_at.share - 1.0) > AGREEMENT:
             return f"{self.name}: let go at {self.let_go_at.share:.4g} of the predicted limit"
         return ""
+
+
+class HoldsWrenches(Declared):
+    """Base of the verdicts on what a grasp, or a hand in it, holds."""
+
+    __slots__ = ()
+    wrenches: tuple[WrenchVerdict, ...]
+    agenda: Agenda
+
+    @property
+    def failures(self) -> tuple[WrenchVerdict, ...]:
+        """The wrenches that were not held, in order."""
+        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
+
+    @property
+    def _weakest(self) -> WrenchVerdict:
+        return next(trial for trial in self.wrenches if trial.name == WEAKEST)
+
+    def _largest_n(self, radius_m: float) -> float:
+        """Return the size of the weakest wrench at its predicted limit, torques over a radius."""
+        weakest, scale = self._weakest, np.array([1.0] * 3 + [radius_m] * 3)
+        return weakest.predicted_limit * float(np.linalg.norm(weakest.wrench / scale))
+
+    def _contradictions(self) -> Iterator[str]:
+        """Yield where the trials of wrenches contradict the analysis, and limits not found."""
+        yield from (each.contradiction for each in self.wrenches if each.contradiction)
+        if self.agenda.limits != "none":
+            yield from (
+                f"{each.name}: the limit was not found near the predicted one"
+                for each in self.wrenches if each.let_go_at is None
+            )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +197,7 @@ CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Verdict(Declared, InNotebooks):
+class Verdict(HoldsWrenches, InNotebooks):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
     id: Annotated[str, Shown("grasp", compared=None)]
@@ -231,24 +262,13 @@ class Verdict(Declared, InNotebooks):
 
         Torques are divided by the object's radius.
         """
-        weakest = self._weakest
-        scaled = weakest.wrench / np.array([1.0] * 3 + [self.scale.object_radius_m] * 3)
-        return weakest.predicted_limit * float(np.linalg.norm(scaled))
+        return self._largest_n(self.scale.object_radius_m)
 
     @figure
     def simulated_limit_n(self) -> Annotated[float | None, Compared(less)]:
         """The one found in simulation [N]; None if it was not measured or not found."""
         found = self._weakest.let_go_at
         return None if found is None else self.limit_n * found.share
-
-    @property
-    def _weakest(self) -> WrenchVerdict:
-        return next(trial for trial in self.wrenches if trial.name == WEAKEST)
-
-    @property
-    def failures(self) -> tuple[WrenchVerdict, ...]:
-        """The wrenches that were not held, in order."""
-        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
 
     @recorded
     def outcome(self) -> Annotated[Outcome, Shown("outcome", compared=ENDED)]:
@@ -278,12 +298,9 @@ class Verdict(Declared, InNotebooks):
     @recorded
     def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
         """Where simulation contradicts the analysis, one sentence each."""
-        found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
+        found = list(self._contradictions())
         if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
             found.append(f"critical friction: {fault}")
-        if self.agenda.limits != "none":
-            found += [f"{trial.name}: the limit was not found near the predicted one"
-                      for trial in self.wrenches if trial.let_go_at is None]  # fmt: skip
         if self.robustness is not None:
             found += self.robustness.contradictions
         return tuple(found)

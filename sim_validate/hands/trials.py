@@ -64,12 +64,12 @@ from scenes.mujoco.held_hand import finger_springs, held_hand_scene, servo_stiff
 from scenes.mujoco.held_mjcf import HeldScene
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
-from sim_validate.closure.verdict import WrenchVerdict
+from sim_validate.closure.verdict import HoldsWrenches, WrenchVerdict
 from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.gate import Check, measured, require_faithful, two_digits
 from sim_validate.engine.rig import Analysis, PlannedLoad, closed_on, part, ramped_limits, squeezed
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge
+from sim_validate.engine.traces import LET_GO, HoldVerdict, judge
 from sim_validate.execution.execute import asked_settings, execution_of, result_of, surface_reach
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.settings import ExecutionSettings
@@ -284,7 +284,7 @@ class HandControlVerdict(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class HandVerdict(Declared):
+class HandVerdict(HoldsWrenches):
     """The result of simulating a hand in a grasp: what it held, and whether that was predicted."""
 
     hand: str
@@ -307,20 +307,13 @@ class HandVerdict(Declared):
         if WEAKEST not in {trial.name for trial in self.wrenches}:
             raise InputError(f"wrenches must have one that is named {WEAKEST!r}, got none")
 
-    @property
-    def failures(self) -> tuple[WrenchVerdict, ...]:
-        """The wrenches that were not held, in order."""
-        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
-
     @recorded
     def weakest_n(self) -> Annotated[float, Shown("weakest wrench N", ".3g")]:
         """Size of the weakest wrench that was found, at its predicted limit, torques over radius.
 
         It is what contacts and motors resist by the analysis.
         """
-        trial = next(each for each in self.wrenches if each.name == WEAKEST)
-        scale = np.array([1.0] * 3 + [self.radius_m] * 3)
-        return trial.predicted_limit * float(np.linalg.norm(trial.wrench / scale))
+        return self._largest_n(self.radius_m)
 
     @recorded
     def held(self) -> Annotated[bool, Shown("held")]:
@@ -340,11 +333,7 @@ class HandVerdict(Declared):
     @recorded
     def mismatches(self) -> tuple[str, ...]:
         """Where simulation contradicts the analysis, one sentence each."""
-        found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
-        if self.agenda.limits != "none":
-            found += [f"{trial.name}: the limit was not found near the predicted one"
-                      for trial in self.wrenches if trial.simulated_limit is None]  # fmt: skip
-        return tuple(found)
+        return tuple(self._contradictions())
 
     @recorded
     def good(self) -> bool:
