@@ -160,6 +160,7 @@ def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
 
 
 AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
+AT_AZIMUTHS = [f", at {azimuth:g} deg" for azimuth in AZIMUTHS_DEG]
 SIDES = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
 """Signs of the places of four contacts, two on each of two opposite faces."""
 SLIP_TOLERANCE = 0.005
@@ -209,7 +210,8 @@ def _incline(case: Case) -> list[Check]:
         Load(resting.wrench + np.concatenate([pull, torque]), resting.forces)
         for pull, torque in zip(pulls, torques, strict=True)
     ]
-    return _slips("slope at which a box slides, over friction", bisected_limits(rig, limits))
+    name = "slope at which a box slides, over friction"
+    return _slips(name, bisected_limits(rig, limits), AT_AZIMUTHS)
 
 
 def _pulled_box(case: Case) -> list[Check]:
@@ -222,11 +224,7 @@ def _pulled_box(case: Case) -> list[Check]:
         Load(np.array([0, *(largest * way), 0, 0, 0]), forces - np.array([0, *(largest * way / 4)]))
         for way in _ways()
     ]
-    name = "pull at which a held box slips, over 4 mu N"
-    return [
-        *_slips(f"{name}, by holds", bisected_limits(rig, limits)),
-        *_slips(f"{name}, by ramps", ramped_limits(rig, limits)),
-    ]
+    return _by_both("pull at which a held box slips, over 4 mu N", rig, limits, AT_AZIMUTHS)
 
 
 def _held_across(case: Case, body: Polyhedron, length: float, lever: float) -> Rig:
@@ -256,11 +254,7 @@ def _twisted_box(case: Case) -> list[Check]:
         rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in SIDES]),
     )
     name = "twist at which a held box turns, over 4 N sqrt((mu a)^2 + mu_t^2)"
-    return [
-        near(f"{name}, by {way}", found and found.share, SLIP_TOLERANCE)
-        for way, search in (("holds", bisected_limits), ("ramps", ramped_limits))
-        for found in search(rig, [limit])
-    ]
+    return _by_both(name, rig, [limit], [""])
 
 
 def _ways() -> list[Array]:
@@ -268,11 +262,17 @@ def _ways() -> list[Array]:
     return list(np.column_stack([np.cos(turns), np.sin(turns)]))
 
 
-def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
+def _by_both(name: str, rig: Rig, limits: Sequence[Load], ways: Sequence[str]) -> list[Check]:
+    """Find the loads at which a box slips by holds and by ramps."""
+    held, ramped = bisected_limits(rig, limits), ramped_limits(rig, limits)
+    return [*_slips(f"{name}, by holds", held, ways), *_slips(f"{name}, by ramps", ramped, ways)]
+
+
+def _slips(name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str]) -> list[Check]:
     """Compare the loads at which a box slips with those of statics, one check per direction."""
     return [
-        near(f"{name}, at {azimuth:g} deg", at and at.share, SLIP_TOLERANCE)
-        for azimuth, at in zip(AZIMUTHS_DEG, found, strict=True)
+        near(f"{name}{way}", at and at.share, SLIP_TOLERANCE)
+        for way, at in zip(ways, found, strict=True)
     ]
 
 

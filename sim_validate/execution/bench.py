@@ -191,7 +191,8 @@ class HeldBench:
                 away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
                 gone = away > most_m[going]
                 if turns_count:
-                    gone |= _cosines(joints[going]) < least_cosine[going]
+                    palm = hinged(joints[going, 10 : PALM + 1]).transpose(0, 2, 1)
+                    gone |= cosines(palm @ rotations(joints[going, 3:7])) < least_cosine[going]
             lost[going] = gone
             return np.where(gone, max(lengths), samples + 1)
 
@@ -253,9 +254,8 @@ class HeldBench:
         )  # fmt: skip
 
 
-def _cosines(joints: Array) -> Array:
-    """Return the cosines of the object's turns against the palm, (n,)."""
-    turned = hinged(joints[:, 10 : PALM + 1]).transpose(0, 2, 1) @ rotations(joints[:, 3:7])
+def cosines(turned: Array) -> Array:
+    """Return the cosines of the angles of rotations, (n,)."""
     return 0.5 * (np.einsum("nii->n", turned) - 1.0)
 
 
@@ -336,8 +336,7 @@ def outcome(
 ) -> Outcome:
     """Say what became of the object since a sample of a trial."""
     found = seen(motion, layout)
-    relative = found.turned[begun:] @ found.turned[begun].T
-    cosines = 0.5 * (np.einsum("nii->n", relative) - 1.0)
+    turned = cosines(found.turned[begun:] @ found.turned[begun].T)
     touching = found.forces[-1, :, 0] > 0.0
     slid = float(slides(found, layout, begun).max(initial=0.0))
     leaving = None if drive.table is None else _slid(found, layout, begun) / layout.radius_m
@@ -348,7 +347,7 @@ def outcome(
         displacement_m=float(
             np.linalg.norm(found.moved[begun:] - found.moved[begun], axis=1).max()
         ),
-        turn_rad=float(np.arccos(np.clip(cosines, -1.0, 1.0)).max()),
+        turn_rad=float(np.arccos(np.clip(turned, -1.0, 1.0)).max()),
         dropped=not touching.any(),
         slipped=slipped,
         first_slip=min(multiple, 1.0) if slipped else multiple,

@@ -48,6 +48,7 @@ from sim_validate.execution.bench import (
     HeldMotion,
     Outcome,
     begun_motion,
+    cosines,
     facing,
     first_trouble,
     motions_joined,
@@ -135,9 +136,9 @@ def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[
 
     Gives a distance [m] and an angle [rad].
     """
-    palm = hinged(motion.palm[begun : begun + 1, 3:])[0]
-    turned = palm.T @ rotations(motion.turned[begun : begun + 1])[0]
-    angle = math.acos(min(max(0.5 * (float(np.trace(turned)) - 1.0), -1.0), 1.0))
+    palm = hinged(motion.palm[begun : begun + 1, 3:]).transpose(0, 2, 1)
+    (cosine,) = cosines(palm @ rotations(motion.turned[begun : begun + 1]))
+    angle = math.acos(min(max(float(cosine), -1.0), 1.0))
     away = float(np.linalg.norm(motion.moved[begun] - motion.palm[begun, :3]))
     return settings.most_m + away, settings.most_rad + angle
 

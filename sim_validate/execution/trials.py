@@ -24,6 +24,7 @@ from grasp_core.arrays import Array, Indices, to_digits
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.sheets import solid_angles
 from grasp_core.solvers.ties import largest_first
 from scenes.mujoco.held import TOUCH, HeldLayout, rotations
 from scenes.mujoco.mjcf_text import quaternion
@@ -137,7 +138,8 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
         triangles = points[hull.simplices[own]]
         # the origin, dropped along the normal, falls into one of the triangles
         if any(_is_inside(corners, normals[first]) for corners in triangles):
-            share = float(sum(_solid_angle(corners) for corners in triangles) / (4.0 * np.pi))
+            angles = solid_angles(triangles.transpose(2, 1, 0), np.zeros((1, 3)))
+            share = float(np.abs(angles).sum() / (4.0 * np.pi))
             found.append(Rest(normals[first], float(offsets[first]) * body.radius, share))
     order = largest_first([rest.likelihood for rest in found])
     return tuple(found[place] for place in order)
@@ -154,14 +156,6 @@ def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
 def _is_inside(corners: Array, normal: Array) -> bool:
     sides = np.cross(np.roll(corners, -1, axis=0) - corners, -corners) @ normal
     return bool((sides >= 0.0).all() or (sides <= 0.0).all())
-
-
-def _solid_angle(corners: Array) -> float:
-    """Return the solid angle of a triangle seen from the origin (Van Oosterom & Strackee 1983)."""
-    a, b, c = corners
-    x, y, z = np.linalg.norm(corners, axis=1)
-    along = x * y * z + (a @ b) * z + (b @ c) * x + (c @ a) * y
-    return float(abs(2.0 * np.arctan2(a @ np.cross(b, c), along)))
 
 
 AXES = ("x", "y", "z")
