@@ -54,7 +54,6 @@ from sim_validate.execution.bench import (
     motions_joined,
     outcome,
 )
-from sim_validate.execution.controls import run_controls
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive, parted
 from sim_validate.execution.predictions import (
@@ -64,7 +63,7 @@ from sim_validate.execution.predictions import (
     planned,
     predicted_losses,
 )
-from sim_validate.execution.trials import Trial
+from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
 from sim_validate.settings import ExecutionSettings
@@ -267,19 +266,18 @@ def simulated(
     holder: Holder, settings: ExecutionSettings, best: BestSqueeze, threads: int
 ) -> Execution:
     """Simulate the trials of an execution with the squeeze that was chosen, and judge each."""
-    plan = planned(holder, settings, best)
-    scene, frequency = plan.scene, plan.dynamics.lowest_frequency
+    scene, dynamics, trials, skipped = planned(holder, settings, best)
     require_faithful_execution(scene.layout, scene.physics, settings, settings.push_n)
     lost_m = max(LOST * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
-    predicted = predicted_losses(plan.dynamics, plan.trials, settings)
+    predicted = predicted_losses(dynamics, trials, settings)
     return Execution(
         mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
-        trials=tuple(_judged_trials(bench, plan.trials, predicted, settings)),
-        controls=run_controls(bench, best, frequency),
-        skipped=plan.skipped,
+        trials=tuple(_judged_trials(bench, trials, predicted, settings)),
+        controls=run_controls(bench, best, dynamics.lowest_frequency),
+        skipped=skipped,
         physics=scene.physics,
         tip_radius_m=best.grip.tip_radius_m,
     )
@@ -460,8 +458,9 @@ def worth_seeing(found: Execution) -> tuple[ExecutionTrial, ...]:
 
 def film(job: ExecutionJob, name: str, path: Path) -> Path:
     """Simulate one trial of an execution again and draw it."""
-    plan = planned(job.holder, job.settings, job.holder.squeeze(job.settings))
-    scene, named = plan.scene, {trial.name: trial for trial in plan.trials}
+    best = job.holder.squeeze(job.settings)
+    scene, _, trials, _ = planned(job.holder, job.settings, best)
+    named = {trial.name: trial for trial in trials}
     one_of(name, tuple(named), "name")
     (motion,) = run_trials(HeldBench(scene), [named[name]])
     stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.moved) // FRAMES))

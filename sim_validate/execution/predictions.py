@@ -271,22 +271,14 @@ class Holder(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Planned:
-    """The scene of a squeeze that was chosen, and the trials that it goes through."""
-
-    scene: HeldScene
-    dynamics: HeldDynamics
-    trials: tuple[Trial, ...]
-    skipped: tuple[Skipped, ...]
-
-
-def planned(holder: Holder, settings: ExecutionSettings, best: BestSqueeze) -> Planned:
-    """Plan the trials of an execution with a squeeze."""
+def planned(
+    holder: Holder, settings: ExecutionSettings, best: BestSqueeze
+) -> tuple[HeldScene, HeldDynamics, tuple[Trial, ...], tuple[Skipped, ...]]:
+    """Plan an execution: its scene and dynamics, its trials, and those that are left out."""
     scene = holder.scene(settings, best)
     dynamics = held_dynamics(best.grip, scene.layout)
     trials = trials_of(holder.body, scene.layout, settings, dynamics.lowest_frequency)
-    return Planned(scene, dynamics, *trials)
+    return scene, dynamics, *trials
 
 
 def found_enough(holder: Holder, settings: ExecutionSettings) -> Enough:
@@ -389,8 +381,8 @@ def _predicted(
 ) -> tuple[float, float]:
     """Predict the multiples of first slip and of loss, of the trial that is lost first."""
     # all misplacements have the prediction of the weight
-    alike = planned(holder, replace(settings, misplacements=1), best)
-    found = predicted_losses(alike.dynamics, alike.trials, settings)
+    _, dynamics, trials, _ = planned(holder, replace(settings, misplacements=1), best)
+    found = predicted_losses(dynamics, trials, settings)
     if not found:
         return math.inf, math.inf
     return found[first_best([-loss for _, loss in found])]

@@ -9,8 +9,8 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.closure.contacts import cross_matrix
 from scenes.example_objects import example_object
-from sim_validate.execution.controls import SURE, idle, slipping_load, weaker_grips
 from sim_validate.execution.execute import Fingertips
+from sim_validate.execution.trials import SURE, idle, slipping_load, weaker_grips
 from tests.grasp_core.execution.held import planned_grips
 
 FRICTION = 0.5
