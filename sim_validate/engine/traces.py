@@ -72,6 +72,8 @@ from sim_validate.engine.bench import Health, Mask, Motion, Schedule
 from sim_validate.settings import HoldProtocol
 
 MICRO = 1e6
+PLANNED = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+"""Planned pose of the object's frame: its position and its quaternion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,9 +142,7 @@ def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:
         return motion.joints[first - 1]
     if earlier is not None and len(earlier.joints):
         return earlier.joints[-1]
-    planned = np.zeros(motion.joints.shape[1])
-    planned[3] = 1.0
-    return planned
+    return np.append(PLANNED, np.zeros(motion.joints.shape[1] - len(PLANNED)))
 
 
 def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
@@ -152,10 +152,8 @@ def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
 
 
 def strayed(poses: Array, layout: Layout) -> Array:
-    """Measure displacements from the planned pose, (n,) [m]: as `displaced`, but faster."""
-    shifts = poses[:, :3] + rotated(poses[:, 3:], layout.center) - layout.center
-    turns = 2.0 * np.arctan2(_lengths(poses[:, 4:]), np.abs(poses[:, 3]))
-    return _lengths(shifts) + layout.grasp_size_m * turns
+    """Measure displacements from the planned pose, (n,) [m]."""
+    return displaced(poses, np.broadcast_to(PLANNED, poses.shape), layout)
 
 
 def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
@@ -315,8 +313,6 @@ WATCHED = 3
 must slip begins to in the first step."""
 SAME = 1e-6
 """Difference of two sizes that is rounding, relative to them."""
-PLANNED = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-"""Planned pose of the object's frame: its position and its quaternion."""
 
 
 @dataclass(frozen=True, slots=True)
