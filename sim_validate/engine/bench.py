@@ -190,14 +190,15 @@ def stepped(
             for found, view in zip(series, kept, strict=True):
                 found[rows, to] = view[rows]
             counts[going] += 1
-            samples[going] = now + 1 if following is None else following(going, now)
-            going = going[samples[going] < every[going]]
+            samples[going] = then = now + 1 if following is None else following(going, now)
+            left = then < every[going]
+            going = going if left.all() else going[left]
     late = np.isin(np.arange(count), going)
     off = clock - (begun + steps * counts * float(model.opt.timestep))
     warned = trials.warning[:count, :, 1].sum(axis=1)
     health = tuple(
         Health(
-            all(np.isfinite(each[trial]).all() for each in (trials.state, *series)),
+            all(np.isfinite(each[trial]).all() for each in (trials.state, series[0])),
             int(warned[trial]), float(off[trial]), errors.get(trial, ""), bool(late[trial]),
         )
         for trial in range(count)
