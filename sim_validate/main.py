@@ -53,7 +53,7 @@ ACTIONS: dict[type[Any], str] = {
     flags.Analyze: "planning.analyze:analyze_file",
     flags.Transfer: "planning.transfer:transfer_file",
     Reach: "protocols.command:judge_reach",
-    Hand: "hands.hand_command:show_hand",
+    Hand: "hands.command:show_hand",
     dataset_flags.Build: "datasets.command:build_dataset",
     dataset_flags.Import: "datasets.command:import_dataset",
     dataset_flags.Verify: "datasets.command:verify_dataset",

@@ -129,13 +129,17 @@ def winding_on(corners: Array, places: Indices) -> Array:
     axes = np.ascontiguousarray(corners.transpose(2, 1, 0))
     for start in range(0, len(places), step):
         asked = places[start : start + step]
-        angles = _solid_angles(axes, corners[asked].mean(axis=1))
+        angles = solid_angles(axes, corners[asked].mean(axis=1))
         angles[np.arange(len(asked)), asked] = 0.0
         found[start : start + step] = angles.sum(axis=1) / (4.0 * math.pi)
     return found
 
 
-def _solid_angles(axes: Array, points: Array) -> Array:
+def solid_angles(axes: Array, points: Array) -> Array:
+    """Return solid angles of triangles seen from points, signed (Van Oosterom & Strackee 1983).
+
+    Triangles are given by coordinates, corners and number, (3, 3, t); found are (points, t).
+    """
     x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
     lengths = np.sqrt(x * x + y * y + z * z)
     (ax, bx, cx), (ay, by, cy), (az, bz, cz), (a, b, c) = (

@@ -23,7 +23,7 @@ from grasp_core.values import Grasp
 from scenes import exports
 from scenes.settings import ScaledScene
 from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
-from sim_validate.execution.execute import ExecutionJob, chosen_squeeze, executed, held_scene
+from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -263,13 +263,14 @@ def _held(command: command_flags.Scene, saved: Plan, friction: float, reporter: 
     settings = extended(ExecutionSettings, own)
 
     def text_of(grasp: Grasp) -> str:
-        best = chosen_squeeze(saved.body, grasp, friction, settings)
+        fingers = Fingertips(saved.body, grasp.contacts, friction)
+        best = fingers.squeeze(settings)
         if best.scale < 1.0:
             reporter.warn(
                 f"{grasp.id}: the squeeze is certified for {best.scale:.3g} of the weight only, so "
                 "the object may slip; use a smaller mass, or a larger --push-n"
             )
-        return held_scene(saved.body, best.grip, settings).xml
+        return fingers.scene(settings, best).xml
 
     return text_of
 

@@ -24,14 +24,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal, Self, TypeAlias
+from typing import Any, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
+from grasp_core.figures import scalars
 from grasp_core.files.json_text import DEEPEST, check_values, shown
+from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import (
     SHOWN,
     UNFINISHED,
@@ -41,6 +43,8 @@ from grasp_core.files.text_files import (
     write_parts,
     write_text,
 )
+from grasp_core.grasp_tables import ById, Named, frame_of
+from grasp_core.kinds import Friction
 from grasp_core.objects.polyhedron import Polyhedron
 
 
@@ -58,6 +62,39 @@ class AboutObject(Declared):
     def of(cls, body: Polyhedron) -> Self:
         """Say which object this is."""
         return cls(body.name, body.source_sha256, body.content_sha256)
+
+
+Item = TypeVar("Item", bound=Named)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AboutGrasps(RecordFile, ById[Item]):
+    """Base of files about the grasps of an object.
+
+    They are sequences, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
+
+    object: AboutObject
+    friction: Friction
+    """Coulomb coefficient at every contact."""
+    complete: bool
+    """Whether every grasp that was asked for was dealt with."""
+
+    @property
+    def object_sha256(self) -> str:
+        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
+        return self.object.content_sha256
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each grasp, indexed by its id.
+
+        It has a column for each figure of a result that is a number or a word; of lists, how many
+        items they have. Figures are NaN where there is no result.
+
+        Raises:
+            InputError: The library pandas is not installed.
+        """
+        return frame_of([scalars(each) for each in self], [each.id for each in self])
 
 
 LONGEST = 500

@@ -10,7 +10,7 @@ from grasp_core.planning.result import Plan
 from sim_validate.closure.command import validate_file
 from sim_validate.engine.setup import Setup
 from sim_validate.hands import flags as hand_flags
-from sim_validate.hands.reach_command import reach_file
+from sim_validate.hands.command import reach_file
 from sim_validate.kit import command_flags, processes
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit

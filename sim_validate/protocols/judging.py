@@ -30,16 +30,13 @@ from scenes.mujoco.tested import (
     hand_scene,
     planned_postures,
 )
-from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.limits import loads_as_they_are
-from sim_validate.engine.rig import squeezed
+from sim_validate.engine.rig import Analysis, closed_on
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
-from sim_validate.hands.hand_gate import require_faithful_hands
-from sim_validate.hands.validate_hand import hand_setup
+from sim_validate.hands.trials import hand_setup, require_faithful_hands
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import their_verdict
 from sim_validate.protocols.verdict import Judgement, OurVerdict
@@ -187,20 +184,18 @@ def our_verdict(
     if not setup.closure(contacts, friction).closed:
         told = f"the contacts are proved not to be in force closure at friction {friction:g}"
         return OurVerdict(False, False, 0.0, told)
-    bench = Bench(scene(), threads=setup.threads, timeout_s=setup.timeout_s)
-    layout = bench.scene.layout
-    rig = squeezed(bench, setup, layout.squeeze_forces, friction)
+    rig = closed_on(scene(), setup, friction)
     named = [
         (" ".join(f"{part:.3g}" for part in force.tolist()) + " N",
          np.concatenate([force, np.zeros(3)]))
         for force in forces
     ]  # fmt: skip
-    loads = loads_as_they_are(body, contacts, friction, rig.idle, named, setup, motors=motors)
+    loads = Analysis(body, contacts, friction, setup, motors).as_they_are(rig.idle, named)
     margin = min((load.predicted_limit for load in loads), default=math.inf)
     held = [load.load for load in loads] or [rig.idle]
     names = [load.name for load in loads] or ["no load"]
     for name, trace in zip(names, rig.hold(held), strict=True):
-        found = judge(trace, layout, setup.hold)
+        found = judge(trace, rig.bench.scene.layout, setup.hold)
         if found.outcome is not Outcome.HELD:
             return OurVerdict(True, False, margin, f"{name}: {found.outcome.value}: {found.reason}")
     return OurVerdict(True, True, margin, "")
