@@ -9,14 +9,13 @@ subclasses of arrays may hide entries.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias, TypeGuard, cast
+from typing import Annotated, Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.checked import LARGEST_FRICTION, MOST_COUNT, shown
 from grasp_core.errors import InputError
-from grasp_core.kinds import Range, UnfitError
+from grasp_core.kinds import LARGEST_FRICTION, MOST_COUNT, Range, UnfitError, shown
 
 Array: TypeAlias = NDArray[np.float64]
 """Float array of any shape; the docstring of each value or argument gives its shape."""
@@ -50,10 +49,7 @@ def frozen(
 ) -> Array:
     """Copy `value` into a read-only float array of the given shape."""
     array = real_array(value, name)
-    fits = array.ndim == len(shape) and all(
-        want is None or want == got for want, got in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
+    if not _has_shape(array, shape):
         wanted = tuple("any" if n is None else n for n in shape)
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
     if not np.isfinite(array).all():
@@ -77,6 +73,8 @@ class Shape:
     shape: tuple[int | str | None, ...]
     units: bool = False
     """Whether vectors along the last axis have length one."""
+    slack: float = UNIT_SLACK
+    """How far a length may be from one in an array that is not taken but looked at."""
     whole: bool = False
     """Whether entries are whole numbers from 0 up."""
     least: float = -LARGEST_ENTRY
@@ -127,10 +125,22 @@ class Shape:
         return value
 
     def _fits(self, value: Any) -> bool:
+        """Return whether a value is an array of this shape and type, with entries as they must be.
+
+        Ends are not looked at.
+        """
+        if type(value) is not np.ndarray or not _has_shape(value, self._lengths):
+            return False
+        array: NDArray[Any] = value
         if self.whole:
-            known = is_indices(value, *self._lengths)
-            return known and 0 <= value.min(initial=0) <= value.max(initial=0) <= MOST_COUNT
-        return (are_units if self.units else is_array)(value, *self._lengths)
+            least, most = array.min(initial=0), array.max(initial=0)
+            return array.dtype == np.int64 and bool(0 <= least <= most <= MOST_COUNT)
+        if array.dtype != np.float64 or not np.abs(array).max(initial=0.0) <= LARGEST_ENTRY:
+            return False
+        if not self.units:
+            return True
+        lengths = np.sqrt((array * array).sum(axis=-1))
+        return bool((np.abs(lengths - 1.0) <= self.slack).all())
 
     def _check_ends(self, array: NDArray[Any]) -> None:
         free = self.least == -LARGEST_ENTRY and self.most == LARGEST_ENTRY
@@ -253,37 +263,17 @@ def rounded(value: float) -> float:
     return float(to_digits(np.array(value, dtype=np.float64)))
 
 
-def is_array(value: Any, *shape: int | None) -> TypeGuard[Array]:
-    """Return whether a value is a float64 array of finite numbers; None is any length."""
-    if not _fits(value, np.float64, shape):
+def is_array(value: Any, *shape: int | None, **rules: Any) -> bool:
+    """Return whether a value is an array as it must be by the rules of `Shape`."""
+    try:
+        Shape(*shape, **rules).exact(value)
+    except UnfitError:
         return False
-    return bool(np.abs(cast("Array", value)).max(initial=0.0) <= LARGEST_ENTRY)
+    return True
 
 
-def is_indices(value: Any, *shape: int | None) -> TypeGuard[Indices]:
-    """Return whether a value is an int64 array of a shape; None is any length."""
-    return _fits(value, np.int64, shape)
-
-
-def _fits(value: Any, kind: type, shape: tuple[int | None, ...]) -> bool:
-    if type(value) is not np.ndarray:
-        return False
-    array: NDArray[Any] = value
-    return (
-        array.dtype == kind
-        and array.ndim == len(shape)
-        and all(want in (None, got) for want, got in zip(shape, array.shape, strict=True))
+def _has_shape(array: NDArray[Any], shape: tuple[int | None, ...]) -> bool:
+    """Return whether an array is of a shape; None is any length."""
+    return array.ndim == len(shape) and all(
+        want in (None, got) for want, got in zip(shape, array.shape, strict=True)
     )
-
-
-def are_units(value: Any, *shape: int | None, slack: float = UNIT_SLACK) -> bool:
-    """Return whether a value is an array of unit vectors along its last axis."""
-    if not is_array(value, *shape):
-        return False
-    lengths = np.sqrt((value * value).sum(axis=-1))
-    return bool((np.abs(lengths - 1.0) <= slack).all())
-
-
-def are_frictions(value: Any, count: int) -> bool:
-    """Return whether a value holds one Coulomb coefficient per contact, (count,)."""
-    return is_array(value, count) and bool(((value >= 0.0) & (value <= LARGEST_FRICTION)).all())

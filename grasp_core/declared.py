@@ -21,9 +21,8 @@ from functools import cache
 from textwrap import shorten
 from typing import Annotated, Any, NamedTuple, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from grasp_core.checked import shown
 from grasp_core.errors import InputError
-from grasp_core.kinds import Take, UnfitError, takes, words
+from grasp_core.kinds import FieldError, Take, UnfitError, misfit, shown, takes
 
 HASHED = (str, int, bool)
 """Classes of the fields that a hash is made from."""
@@ -43,22 +42,7 @@ _DRAWN_WITH: list[Draw] = []
 """The function that was handed over, or none."""
 
 
-class FieldError(InputError):
-    """Error for a field of the wrong type or size; `name` is that of the field."""
-
-    owner: type | None = None
-    """Class of the field."""
-
-    def __init__(self, name: str, fault: str) -> None:
-        super().__init__(name, fault)
-        self.name, self.fault = name, fault
-
-    def __str__(self) -> str:
-        """Return the name of the field and what is wrong with it: 'must be .., got ..'."""
-        return f"{self.name} {self.fault}"
-
-
-class Plan(NamedTuple):
+class Checks(NamedTuple):
     """How the fields of a class are checked."""
 
     takers: tuple[tuple[str, Take], ...]
@@ -86,9 +70,10 @@ class ByValue:
         return hash((type(self).__name__, *kinds))
 
     def __repr__(self) -> str:
-        """Return a line with the figures that are short; longer fields are only counted."""
+        """Return at most `MOST` characters with the figures that are short, and sizes of others."""
         told = (field.name for field in fields(cast("Any", self)) if field.repr)
-        return short(type(self).__name__, {name: getattr(self, name) for name in told})
+        parts = (f"{name}={_size(getattr(self, name))}" for name in told)
+        return shorten(f"{type(self).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
 
 
 class Declared(ByValue):
@@ -106,7 +91,7 @@ class Declared(ByValue):
     def is_sound(self) -> bool:
         """Return whether every field is as the constructor would keep it, whoever set it."""
         try:
-            for name, take in plan(type(self), exact=True).takers:
+            for name, take in checks_of(type(self), exact=True).takers:
                 take(getattr(self, name))
             check_letters(self)
             self._check_together()
@@ -122,13 +107,12 @@ class Declared(ByValue):
 def check(value: object) -> None:
     """Check all fields of a dataclass against their kinds, and keep them in plain form."""
     kind = type(value)
-    for name, take in plan(kind).takers:
+    for name, take in checks_of(kind).takers:
         given = getattr(value, name)
         try:
             plain = take(given)
         except UnfitError as fault:
-            said = str(fault) or f"must be {words(types(kind)[name])}, got {shown_of(given)}"
-            error = FieldError(name, said)
+            error = misfit(types(kind)[name], given, name, fault)
             error.owner = kind
             raise error from None
         if plain is not given:
@@ -136,15 +120,10 @@ def check(value: object) -> None:
     check_letters(value)
 
 
-def shown_of(value: Any) -> str:
-    """Write a wrong value for a message."""
-    return shown(str(value) if hasattr(value, "__fspath__") else value)
-
-
 def check_letters(value: object) -> None:
     """Refuse arrays whose lengths differ where their shapes say the same letter."""
     sizes: dict[str, tuple[int, str]] = {}
-    for name, shape in plan(type(value)).lettered:
+    for name, shape in checks_of(type(value)).lettered:
         array = getattr(value, name)
         for letter, size in zip(shape, getattr(array, "shape", ()), strict=False):
             if isinstance(letter, str):
@@ -162,7 +141,7 @@ def types(kind: type) -> Mapping[str, Any]:
 
 
 @cache
-def plan(kind: type, *, exact: bool = False) -> Plan:
+def checks_of(kind: type, *, exact: bool = False) -> Checks:
     """Return how the fields of a class are checked."""
     takers = tuple((name, takes(each, exact=exact)) for name, each in types(kind).items())
     shapes = ((name, getattr(rule, "shape", ()))
@@ -170,7 +149,7 @@ def plan(kind: type, *, exact: bool = False) -> Plan:
     lettered = tuple(
         (name, shape) for name, shape in shapes if any(isinstance(n, str) for n in shape)
     )
-    return Plan(takers, lettered)
+    return Checks(takers, lettered)
 
 
 def rules(kind: Any) -> tuple[Any, ...]:
@@ -195,10 +174,8 @@ def trusted(kind: type[Item], /, **given: Any) -> Item:
 
 def altered(value: Item, /, **given: Any) -> Item:
     """Copy a frozen value with some other fields, which were checked before, unchecked."""
-    made, put = object.__new__(type(value)), object.__setattr__
-    for name in cast("Any", value).__dataclass_fields__:
-        put(made, name, given[name] if name in given else getattr(value, name))
-    return made
+    own = {name: getattr(value, name) for name in cast("Any", value).__dataclass_fields__}
+    return trusted(type(value), **own | given)
 
 
 def kept(value: object, name: str) -> Any:
@@ -249,12 +226,6 @@ def summary(kind: str, *said: str, **figures: object) -> str:
     """Write `Kind(words, name=figure, ..)`, like a constructor call but not meant as code."""
     parts = [*said, *(f"{name}={_figure(value)}" for name, value in figures.items())]
     return f"{kind}({', '.join(parts)})"
-
-
-def short(kind: str, figures: Mapping[str, object]) -> str:
-    """Write `Kind(name=figure, ..)` in at most `MOST` characters, longer things by their size."""
-    parts = [f"{name}={_size(value)}" for name, value in figures.items()]
-    return shorten(f"{kind}({', '.join(parts)})", MOST, placeholder=" ...)")
 
 
 def _size(value: Any) -> str:

@@ -8,6 +8,7 @@ ones, asks here which figures they have, so that a new figure appears everywhere
 import ast
 import inspect
 import math
+import operator
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,24 +27,10 @@ UNITS = {
 }  # fmt: skip
 """Units by the ends of names; the longest end counts."""
 
-
 Worse = Callable[[Any, Any], bool]
 """A function that tells whether a change is for the worse, of the figure before and after."""
-
-
-def more(before: Any, after: Any) -> bool:
-    """Return whether a figure has grown."""
-    return after > before
-
-
-def less(before: Any, after: Any) -> bool:
-    """Return whether a figure has become smaller."""
-    return after < before
-
-
-def changed(before: Any, after: Any) -> bool:
-    """Return whether a figure is another one."""
-    return before != after
+more, less, changed = operator.lt, operator.gt, operator.ne
+"""Of the figure before and after: whether it has grown, become smaller, or is another one."""
 
 
 @dataclass(frozen=True, slots=True)

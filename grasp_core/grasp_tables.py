@@ -1,22 +1,15 @@
-"""Finds, chooses and tabulates grasps by their ids, families and figures."""
+"""Finds grasps, or results about them, by their ids, and makes tables of them."""
 
 import importlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, cast, get_args, overload
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, cast, overload
 
-import numpy as np
-
-from grasp_core.checked import function, number, one_of, several, shown
 from grasp_core.errors import InputError
-from grasp_core.kinds import Method
-from grasp_core.values import Grasp
+from grasp_core.kinds import shown
 
 SHOWN_IDS = 5
 """Largest number of ids that a message lists."""
-AXES = ("x", "y", "z")
-FREE_IDS = "f-"
-"""Beginning of the ids of grasps that the free method made, whose family is that of their lines."""
 
 
 class Named(Protocol):
@@ -78,65 +71,6 @@ class ById(Generic[Item]):
         return found
 
 
-def chosen(
-    grasps: Sequence[Grasp],
-    where: Callable[[Grasp], bool] | None,
-    family: Method | Iterable[Method] | None,
-    min_radius_m: float | None,
-    min_closure_margin: float | None,
-    max_critical_friction: float | None,
-    min_ferrari_canny_n: float | None,
-) -> tuple[Grasp, ...]:
-    """Return the grasps that meet all demands; only figures that are asked for are computed."""
-    families = None
-    if family is not None:
-        families = several(
-            (family,) if isinstance(family, str) else family, _family, "family", "families"
-        )
-    for name, bound in (
-        ("min_radius_m", min_radius_m),
-        ("min_closure_margin", min_closure_margin),
-        ("max_critical_friction", max_critical_friction),
-        ("min_ferrari_canny_n", min_ferrari_canny_n),
-    ):
-        if bound is not None:
-            number(bound, name)
-    if where is not None:
-        function(where, "where")
-
-    def meets(grasp: Grasp) -> bool:
-        return (
-            (families is None or any(_is_of(grasp, each) for each in families))
-            and (min_radius_m is None or grasp.radius >= min_radius_m)
-            and (min_closure_margin is None or grasp.closure_margin >= min_closure_margin)
-            and (max_critical_friction is None or grasp.critical_friction <= max_critical_friction)
-            and (min_ferrari_canny_n is None or grasp.ferrari_canny[0] >= min_ferrari_canny_n)
-            and (where is None or bool(where(grasp)))
-        )
-
-    return tuple(filter(meets, grasps))
-
-
-def _family(given: Any) -> Method:
-    one_of(given, get_args(Method), "family")
-    return cast("Method", given)
-
-
-def _is_of(grasp: Grasp, family: Method) -> bool:
-    """Return whether a grasp is of a family, by its id where the free method made it."""
-    return grasp.id.startswith(FREE_IDS) if family == "free" else grasp.family == family
-
-
-def data_frame(grasps: Sequence[Grasp]) -> Any:
-    """Return a `pandas.DataFrame` with a row for each grasp, indexed by id.
-
-    Columns are named as in `grasps.json`, with angles in degrees: `family`, `radius_m`,
-    `span_angle_deg`, `critical_friction`, `closure_margin`, `ferrari_canny_lower_n` and `_upper_n`;
-    for each finger `face_0`, its contact `position_0_x_m`, its inward normal `normal_0_x`, etc.
-    """
-    return frame_of([_row(grasp) for grasp in grasps], [grasp.id for grasp in grasps])
-
-
 def frame_of(rows: Sequence[Mapping[str, object]], ids: Sequence[str]) -> Any:
     """Return a `pandas.DataFrame` of rows, cells by column, indexed by id."""
     try:
@@ -147,23 +81,3 @@ def frame_of(rows: Sequence[Mapping[str, object]], ids: Sequence[str]) -> Any:
             "pip install pandas"
         ) from error
     return pandas.DataFrame(list(rows), index=pandas.Index(list(ids), name="id"))
-
-
-def _row(grasp: Grasp) -> Mapping[str, object]:
-    lower, upper = grasp.ferrari_canny
-    row: dict[str, object] = {
-        "family": grasp.family,
-        "radius_m": grasp.radius,
-        "span_angle_deg": float(np.degrees(grasp.span_angle)),
-        "critical_friction": grasp.critical_friction,
-        "closure_margin": grasp.closure_margin,
-        "ferrari_canny_lower_n": lower,
-        "ferrari_canny_upper_n": upper,
-    }
-    for finger, face in enumerate(grasp.faces):
-        row[f"face_{finger}"] = face
-    for finger, contact in enumerate(grasp.contacts):
-        for axis, at, along in zip(AXES, contact.position, contact.normal, strict=True):
-            row[f"position_{finger}_{axis}_m"] = float(at)
-            row[f"normal_{finger}_{axis}"] = float(along)
-    return row

@@ -1,30 +1,43 @@
-"""Tells which values a field may hold: from the types of frozen dataclasses, and in their words.
+"""Tells which values an argument or a field may hold: by the kinds of types, and in their words.
 
 Kinds are float, int, bool, str, `Path`, `Literal`, enumerations, tuples, mappings, other classes,
 and each of them or None. `Annotated` narrows a kind by rules: `Annotated[float, Range(least=0.0)]`.
 A rule tells whether a value `holds` and, as text, what it asks for; a rule that can `take` does all
-of it, such as `grasp_core.arrays.Shape`. Nothing that is slow to import is imported here, since
-command-line help waits for it.
+of it, such as `grasp_core.arrays.Shape`. Single values that users pass are checked by `value_of`,
+the fields of frozen dataclasses in `declared`. Nothing that is slow to import is imported here,
+since command-line help waits for it.
 """
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, TypeAlias, Union, cast, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
 
-from grasp_core.checked import (
-    LARGEST,
-    LARGEST_FRICTION,
-    MOST_COUNT,
-    MOST_EDGES,
-    MOST_SEED,
-    SMALLEST,
-    Range,
-)
+from grasp_core.errors import InputError
+
+Value = TypeVar("Value")
+
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Smallest and largest length, force or similar quantity in SI units: others are mistakes."""
+LARGEST_FRICTION = 1e3
+"""Largest Coulomb coefficient; no material comes near it. A larger critical friction is reported as
+infinite, and a larger input is refused."""
+MOST_COUNT = 10**9
+"""Largest count accepted: anything larger would take longer than anybody waits."""
+MOST_SEED = 2**64 - 1
+MOST_EDGES = 10_000
+"""Largest number of edges of a pyramid that replaces a friction cone: it equals the cone to seven
+digits."""
+HUGE = 10**100
+"""Whole numbers above this are shown by their size: Python does not write the largest ones."""
+SHOWN = 60
+"""Largest number of characters of a refused value that a message shows."""
+
 
 Take = Callable[[Any], Any]
 """A function that returns a value in the plain form of a kind; `UnfitError` if it is not of it."""
@@ -32,6 +45,51 @@ Take = Callable[[Any], Any]
 
 class UnfitError(ValueError):
     """Error for a value that is not of a kind; its text says why, where the kind's words do not."""
+
+
+class FieldError(InputError):
+    """Error for an argument or a field of the wrong type or size; `name` is its name."""
+
+    owner: type | None = None
+    """Class of the field."""
+
+    def __init__(self, name: str, fault: str) -> None:
+        super().__init__(name, fault)
+        self.name, self.fault = name, fault
+
+    def __str__(self) -> str:
+        """Return the name of the field and what is wrong with it: 'must be .., got ..'."""
+        return f"{self.name} {self.fault}"
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Ends of a range of numbers; without an upper end numbers must be finite."""
+
+    above: float | None = None
+    least: float | None = None
+    below: float | None = None
+    most: float | None = None
+    where: str = ""
+    """What the ends are, for messages that name them."""
+
+    def holds(self, value: float) -> bool:
+        """Return whether a number is in the range."""
+        inside = math.isfinite(value) if self.most is None else value <= self.most
+        return (
+            inside
+            and (self.above is None or value > self.above)
+            and (self.least is None or value >= self.least)
+            and (self.below is None or value < self.below)
+        )
+
+    def __str__(self) -> str:
+        """Return the ends in words."""
+        words = {"above": "above", "least": "from", "below": "below", "most": "up to"}
+        ends = {word: getattr(self, name) for name, word in words.items()}
+        said = " ".join(f"{word} {end:g}" for word, end in ends.items()
+                        if end is not None and not math.isinf(end))  # fmt: skip
+        return said + self.where
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +204,7 @@ Measured = Annotated[float, Null(math.nan)]
 """A number that is NaN where a simulation diverged; null in files."""
 
 
+@lru_cache(maxsize=1024)
 def takes(kind: Any, *, exact: bool = False) -> Take:
     """Return the function that takes values of a kind: lists as tuples, numbers as Python's.
 
@@ -363,3 +422,75 @@ def inside(kind: Any, wanted: type) -> Any:
         return inside(get_args(kind)[0], wanted)
     parts = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
     return next((p for p in parts if isinstance(p, type) and issubclass(p, wanted)), None)
+
+
+def value_of(kind: Any, value: Any, name: str) -> Any:
+    """Return a value in the plain form of a kind; one that is not of it is an error."""
+    try:
+        return takes(kind)(value)
+    except UnfitError as fault:
+        raise misfit(kind, value, name, fault) from None
+
+
+def misfit(kind: Any, value: Any, name: str, fault: UnfitError) -> FieldError:
+    """Return the error for a value that is not of a kind."""
+    given = str(value) if hasattr(value, "__fspath__") else value
+    return FieldError(name, str(fault) or f"must be {words(kind)}, got {shown(given)}")
+
+
+def number(value: Any, name: str, **ends: Any) -> float:
+    """Check that a value is a number in a range, with the fields of `Range`."""
+    return value_of(Annotated[float, Range(**ends)], value, name)
+
+
+def path_of(value: Any, name: str) -> Path:
+    """Check that a value names a file or folder."""
+    return value_of(Path, value, name)
+
+
+def one_of(value: Any, choices: Iterable[str], name: str) -> None:
+    """Refuse a value that is not one of the given words."""
+    value_of(Literal[tuple(choices)], value, name)
+
+
+def instance(value: Any, kind: type[Value], name: str, remedy: str = "") -> Value:
+    """Check that a value is an instance of a class."""
+    if not isinstance(value, kind):
+        hint = f"; {remedy}" if remedy else ""
+        raise InputError(f"{name} must be a {kind.__name__}, got {shown(value)}{hint}")
+    return value
+
+
+def function(value: Any, name: str) -> None:
+    """Refuse a value that cannot be called."""
+    if not callable(value):
+        raise InputError(f"{name} must be a function, got {shown(value)}")
+
+
+def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> tuple[Value, ...]:
+    """Check every item of a sequence; a string is refused, not split into letters."""
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise InputError(
+            f"{name} must be a sequence of {kind}, such as a tuple, got {shown(value)}"
+        )
+    return tuple(each(thing) for thing in cast("Iterable[Any]", value))
+
+
+def shown(value: Any) -> str:
+    """Write a value for a message: short and on one line; a long value is shown by its kind."""
+    if isinstance(value, int) and abs(value) > HUGE:
+        return f"a whole number of {value.bit_length()} bits"
+    listed = cast("Iterable[Any]", value) if type(value) in {tuple, list} else None
+    plain = listed is not None and all(
+        isinstance(each, float | str | None) or (isinstance(each, int) and abs(each) <= HUGE)
+        for each in listed
+    )
+    if plain or isinstance(value, Real | str | type(None)):
+        said = repr(value)
+        if len(said) <= SHOWN:
+            return said
+        if isinstance(value, str | Real):
+            return f"{said[:SHOWN]}..."
+    size = getattr(value, "shape", None)
+    kind = type(value).__name__
+    return f"an array of shape {size}" if isinstance(size, tuple) else f"a value of type {kind}"

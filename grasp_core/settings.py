@@ -14,12 +14,10 @@ from dataclasses import MISSING, fields, replace
 from textwrap import shorten
 from typing import Any, Self, TypeVar, cast, get_args
 
-from grasp_core.checked import shown
-from grasp_core.declared import Declared, FieldError, default_of, types
+from grasp_core.declared import Declared, default_of, types
 from grasp_core.errors import InputError
-from grasp_core.kinds import UnfitError, inside, takes, words
+from grasp_core.kinds import FieldError, inside, shown
 
-Given = TypeVar("Given", bound="Settings")
 Given = TypeVar("Given", bound="Settings")
 LONGEST_LINE = 200
 """Largest number of characters of the text that shows settings."""
@@ -128,15 +126,6 @@ def extended(kind: type[Given], part: Settings, **more: Any) -> Given:
         if own is not None and isinstance(value, Settings) and not isinstance(value, own):
             given[name] = extended(own, value)
     return kind(**given)
-
-
-def value_of(kind: Any, value: Any, name: str) -> Any:
-    """Return a single value in the plain form of a kind; one that is not of it is an error."""
-    try:
-        return takes(kind)(value)
-    except UnfitError as fault:
-        said = str(fault) or f"must be {words(kind)}, got {shown(value)}"
-        raise FieldError(name, said) from None
 
 
 def as_table(settings: Settings) -> dict[str, Any]:

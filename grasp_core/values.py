@@ -12,13 +12,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Shape, UnitVector
-from grasp_core.checked import LARGEST, number, shown
-from grasp_core.declared import Declared, FieldError, counted, summary, vector
+from grasp_core.declared import Declared, counted, summary, vector
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import Key, recorded
 from grasp_core.frames import poses_along
-from grasp_core.kinds import Family, NotNegative, Null, Number, Range, Signed
+from grasp_core.kinds import (
+    Family,
+    FieldError,
+    NotNegative,
+    Null,
+    Number,
+    Range,
+    Signed,
+    shown,
+    value_of,
+)
 
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[Number, Number, Number, Number]
@@ -189,7 +198,7 @@ class Grasp(Declared):
         Raises:
             InputError: The distance is not a number from 0 up.
         """
-        number(standoff_m, "standoff_m", least=0.0, most=LARGEST)
+        value_of(NotNegative, standoff_m, "standoff_m")
         ways = self.normals if self.approach_directions is None else self.approach_directions
         return poses_along(self.positions - standoff_m * ways, ways)
 

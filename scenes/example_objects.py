@@ -16,8 +16,8 @@ from itertools import product
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import SHOWN, shown, text
 from grasp_core.errors import InputError
+from grasp_core.kinds import SHOWN, shown, value_of
 from grasp_core.objects.booleans import Solid, extrusion, hull
 from grasp_core.objects.polyhedron import Polyhedron
 
@@ -44,7 +44,7 @@ def example_object(name: str) -> Polyhedron:
     Raises:
         InputError: The name is unknown; the message suggests near names.
     """
-    text(name, "name")
+    value_of(str, name, "name")
     key = name.strip().lower().replace("_", "-")
     body = _built(key)
     if body is not None:

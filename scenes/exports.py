@@ -19,10 +19,10 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import SMALLEST, instance, number, one_of, path_of
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts, write_text
 from grasp_core.frames import poses_along
+from grasp_core.kinds import SMALLEST, instance, number, one_of, path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import FINGERS, Grasp

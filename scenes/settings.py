@@ -7,9 +7,8 @@ commands are made of them; see `grasp_core.settings`. Scenes spell out every set
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
-from grasp_core.checked import LARGEST
 from grasp_core.errors import InputError
-from grasp_core.kinds import Direction, NotNegative, Quantity, Range, Share
+from grasp_core.kinds import LARGEST, Direction, NotNegative, Quantity, Range, Share
 from grasp_core.settings import CHOSEN, Settings
 
 if TYPE_CHECKING:

@@ -13,32 +13,14 @@ from typing import Any, get_args
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
-from grasp_core.declared import FieldError
 from grasp_core.errors import GraspError, InputError
+from grasp_core.kinds import FieldError
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.flags import Baseline
 from sim_validate.datasets import flags as dataset_flags
 from sim_validate.datasets.flags import Dataset
 from sim_validate.hands.flags import Hand, Reach
-from sim_validate.kit.command_flags import (
-    Analyze,
-    Doctor,
-    Execute,
-    Export,
-    Inspect,
-    Objects,
-    Plan,
-    Regions,
-    Replay,
-    Report,
-    Run,
-    Scene,
-    Spoken,
-    Transfer,
-    Validate,
-    View,
-)
-from sim_validate.kit.examples import examples_for
+from sim_validate.kit import command_flags as flags
 from sim_validate.kit.exit_codes import (
     Exit,
     FlagsError,
@@ -47,39 +29,40 @@ from sim_validate.kit.exit_codes import (
     reason_of,
     steady_streams,
 )
-from sim_validate.kit.flag_values import REGISTRY, flags_of, with_config
+from sim_validate.kit.flag_values import REGISTRY, examples_for, flags_of, with_config
 from sim_validate.kit.processes import interrupts_noted
 
 Command = (
-    Run | Plan | Validate | Execute | Scene | Export | View | Report | Regions | Replay | Analyze
-    | Transfer | Reach | Hand | Dataset | Baseline | Inspect | Objects | Doctor
+    flags.Run | flags.Plan | flags.Validate | flags.Execute | flags.Scene | flags.Export
+    | flags.View | flags.Report | flags.Regions | flags.Replay | flags.Analyze | flags.Transfer
+    | Reach | Hand | Dataset | Baseline | flags.Inspect | flags.Objects | flags.Doctor
 )  # fmt: skip
 COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}
 """The classes of flags, by the names of their commands."""
 ACTIONS: dict[type[Any], str] = {
-    Run: "run:run_object",
-    Plan: "planning.plan:plan_file",
-    Validate: "protocols.command:judge_file",
-    Execute: "execution.command:execute_file",
-    Scene: "execution.command:write_scenes",
-    Export: "execution.command:export_grasps",
-    View: "report.command:view_grasp",
-    Report: "report.command:report_folder",
-    Regions: "planning.regions:certify_file",
-    Replay: "report.replay_command:replay_trial",
-    Analyze: "planning.analyze:analyze_file",
-    Transfer: "planning.transfer:transfer_file",
+    flags.Run: "run:run_object",
+    flags.Plan: "planning.plan:plan_file",
+    flags.Validate: "protocols.command:judge_file",
+    flags.Execute: "execution.command:execute_file",
+    flags.Scene: "execution.command:write_scenes",
+    flags.Export: "execution.command:export_grasps",
+    flags.View: "report.command:view_grasp",
+    flags.Report: "report.command:report_folder",
+    flags.Regions: "planning.regions:certify_file",
+    flags.Replay: "report.command:replay_trial",
+    flags.Analyze: "planning.analyze:analyze_file",
+    flags.Transfer: "planning.transfer:transfer_file",
     Reach: "protocols.command:judge_reach",
-    Hand: "hands.hand_command:show_hand",
+    Hand: "hands.command:show_hand",
     dataset_flags.Build: "datasets.command:build_dataset",
     dataset_flags.Import: "datasets.command:import_dataset",
     dataset_flags.Verify: "datasets.command:verify_dataset",
     dataset_flags.Export: "datasets.command:export_dataset",
     baseline_flags.Record: "baselines.command:record_baseline",
     baseline_flags.Check: "baselines.command:check_baseline",
-    Inspect: "planning.objects:inspect_object",
-    Objects: "planning.objects:list_objects",
-    Doctor: "closure.command:check_installation",
+    flags.Inspect: "planning.objects:inspect_object",
+    flags.Objects: "planning.objects:list_objects",
+    flags.Doctor: "closure.command:check_installation",
 }
 """Module and function of each command. They are named as text, because planning must not wait until
 a simulator is imported."""
@@ -99,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if "" in arguments:
             said = "an argument is empty, perhaps from a variable that is not set"
             raise FlagsError(f"{said}; leave the argument out, or give it a value")
-        flags = with_config(arguments, COMMANDS)
+        words = with_config(arguments, COMMANDS)
     except InputError as error:
         return _complain(str(error), exit_code(error))
     try:
@@ -110,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 "Four-finger force-closure grasps, proved and simulated. Every command also takes "
                 "--config FILE.toml, whose keys are flags; flags given override it."
             ),
-            args=flags,
+            args=words,
             registry=REGISTRY,
         )
     except SystemExit as stop:
@@ -131,7 +114,7 @@ def _flag_of(error: FieldError) -> str:
     return "--" + next(found, error.name).replace("_", "-")
 
 
-def _dispatch(command: Spoken) -> int:
+def _dispatch(command: flags.Spoken) -> int:
     speech = command.speech
     try:
         with interrupts_noted():

@@ -3,7 +3,7 @@
 Nothing but pytest is imported until such a file, the fixtures or the marker are used.
 """
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,7 +62,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if marker is None or "grasp_case" not in metafunc.fixturenames:
         return
     from grasp_core.errors import GraspError
-    from sim_validate.baselines.demands import grasp_cases
+    from sim_validate.baselines.suite import grasp_cases
 
     wrong = ""
     try:
@@ -221,50 +221,53 @@ def grasp_case(request: pytest.FixtureRequest) -> Any:
 
 
 @pytest.fixture
-def assert_stable(
-    request: pytest.FixtureRequest, record_property: Callable[[str, object], None]
-) -> Callable[..., "Verdict"]:
+def assert_stable(request: pytest.FixtureRequest) -> Callable[..., "Verdict"]:
     """A function that simulates a grasp and fails the test unless it holds as predicted."""
 
     def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls."""
         from sim_validate.baselines.baseline import Entry
-        from sim_validate.baselines.demands import case_of, checked, demands_of
+        from sim_validate.baselines.suite import case_of, checked, demands_of
 
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
-        name = chosen.grasp.id
-        for key, value in Entry.of(verdict).properties().items():
-            record_property(f"{name}.{key}", value)
-        _note(request.node, f"{name}.status", "unstable" if why else "stable", chosen.source)
-        if why:
-            raise UnstableError(why)
+        figures = Entry.of(verdict).properties()
+        status = "unstable" if why else "stable"
+        _require(request.node, chosen.grasp.id, status, figures, chosen.source, why)
         return verdict
 
     return check
 
 
 @pytest.fixture
-def assert_survives(
-    request: pytest.FixtureRequest, record_property: Callable[[str, object], None]
-) -> Callable[..., "Execution"]:
+def assert_survives(request: pytest.FixtureRequest) -> Callable[..., "Execution"]:
     """A function that executes a grasp and fails the test unless the object survives."""
 
     def check(*case: Any, settings: Any = None, friction: float | None = None) -> "Execution":
         """Execute a grasp with its negative controls."""
         from grasp_core.files.records import record_of
         from sim_validate.baselines.baseline import ExecutedFigures
-        from sim_validate.baselines.demands import survival
+        from sim_validate.baselines.suite import survival
 
         chosen, found, why = survival(case, friction, settings)
-        for key, value in record_of(ExecutedFigures.of(found)).items():
-            record_property(f"{found.id}.execution.{key}", value)
-        _note(request.node, f"{found.id}.status", "lost" if why else "survived", chosen.source)
-        if why or found.execution is None:
-            raise UnstableError(why)
+        kept = record_of(ExecutedFigures.of(found))
+        figures = {f"execution.{key}": value for key, value in kept.items()}
+        _require(request.node, found.id, "lost" if why else "survived", figures, chosen.source, why)
+        assert found.execution is not None  # noqa: S101 - else it says why
         return found.execution
 
     return check
+
+
+def _require(
+    item: pytest.Item, name: str, status: str, figures: Mapping[str, object], source: "Source",
+    why: str,
+) -> None:  # fmt: skip
+    """Keep what a test found out about a grasp, and fail if that is not as it must be."""
+    item.user_properties += [(f"{name}.{key}", value) for key, value in figures.items()]
+    _note(item, f"{name}.status", status, source)
+    if why:
+        raise UnstableError(why)
 
 
 def _note(

@@ -15,7 +15,7 @@ from sim_validate.kit import command_flags
 from sim_validate.kit.command_flags import Report
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit, reason_of
-from sim_validate.kit.result_folders import (
+from sim_validate.kit.files import (
     REPORT,
     alone_in,
     remove_results,

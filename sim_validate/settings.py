@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Literal, Self, TypeAlias, get_args
 
-from grasp_core.declared import FieldError
 from grasp_core.errors import InputError
 from grasp_core.kinds import (
+    FieldError,
     MaxCones,
     NotNegative,
     Quantity,

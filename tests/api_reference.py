@@ -13,11 +13,15 @@ from typing import Any
 from docstring_parser import DocstringStyle, parse
 
 from grasp_core.settings import Settings
+from sim_validate.closure.verdict import HoldsWrenches
+from sim_validate.kit.files import AboutGrasps
 
 PAGE = Path(__file__).parent.parent / "docs" / "api.md"
 PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
 UNTOLD = ("Key", "Shape", "Shown", "UNRECORDED", "FLAT")
 """Rules of types that the page leaves out."""
+BASES = (AboutGrasps, HoldsWrenches)
+"""Bases whose members are told with those of each class."""
 INTRODUCTION = """\
 # Python reference
 
@@ -42,6 +46,8 @@ def page() -> str:
 
 def entry(short: str, name: str, thing: Any) -> str:
     """What is said of one public name."""
+    if inspect.isclass(thing) and thing.__name__ != name:
+        return f"\n### class `{short}.{name}`\n\nAnother name of `{short}.{thing.__name__}`.\n"
     if inspect.isclass(thing):
         members = "".join(f"{line}\n" for line in members_of(thing))
         end = f"\n{members}" if members else ""
@@ -94,9 +100,9 @@ class Shown(ast.NodeTransformer):
 
 
 def members_of(kind: type) -> Iterator[str]:
-    """Fields with what is said below each, then properties and methods; inherited settings too."""
+    """Fields with what is said below each, then properties and methods; and those of bases too."""
     for parent in kind.__bases__:
-        if issubclass(parent, Settings) and parent is not Settings:
+        if parent in BASES or (issubclass(parent, Settings) and parent is not Settings):
             again = tuple(f"* `{name}:" for name in vars(kind).get("__annotations__", {}))
             yield from (line for line in members_of(parent) if not line.startswith(again or "-"))
     yield from own_members_of(kind)

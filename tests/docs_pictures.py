@@ -21,8 +21,7 @@ from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, pn
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.report.agreement import Agreement
-from sim_validate.report.grasp_charts import margin_figure, wrench_figure
-from sim_validate.report.run_charts import fidelity_panel, motion_panels
+from sim_validate.report.charts import fidelity_panel, margin_figure, motion_panels, wrench_figure
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"

@@ -134,6 +134,14 @@ def picks_positively_span(axes, half_angle, sides):
     return spans
 
 
+def balancing_weights(vectors):
+    """Weights of sum w_i v_i = 0, sum |w_i| = 1, by Cramer's rule; positive if vectors span."""
+    minors = np.stack([np.delete(vectors, i, axis=-2) for i in range(4)], axis=-3)
+    signed = np.linalg.det(minors) * [1.0, -1.0, 1.0, -1.0]
+    total = np.abs(signed).sum(axis=-1, keepdims=True)
+    return signed / total * np.sign(signed.sum(axis=-1, keepdims=True))
+
+
 def random_contacts(rng, count=4, spread=0.7):
     """Contacts around the origin whose normals point roughly inwards."""
     positions = rng.normal(size=(count, 3))

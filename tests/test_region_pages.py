@@ -13,7 +13,7 @@ import pytest
 
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.planning.regions_json import Regions
+from sim_validate.planning.regions import Regions
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "regions.md").read_text()

@@ -23,15 +23,17 @@ from grasp_core.arrays import (
     frozen_units,
     real_array,
 )
-from grasp_core.checked import LARGEST_FRICTION, instance, several, shown
 from grasp_core.errors import InputError
 from grasp_core.frames import plane_tangents
+from grasp_core.kinds import LARGEST, LARGEST_FRICTION, instance, several, shown
 from grasp_core.values import FINGERS, Contact, Grasp
 
 FEWEST = 2
 """Least number of contacts that can balance anything."""
 WRENCH = 6
 """Number of components of a wrench."""
+LOCAL = 4
+"""Number of components of a soft contact's force: three, and a torque about the normal."""
 
 
 def listed_contacts(given: Iterable[Contact], name: str) -> tuple[Contact, ...]:
@@ -123,6 +125,34 @@ def contact_frictions(friction: ArrayLike, shape: int | tuple[int, int]) -> Arra
     return mu
 
 
+def contact_torsions(torsion_m: ArrayLike, friction: Array) -> Array | None:
+    """Return one checked torsional coefficient for each contact; None if no contact has any."""
+    mu_t = frozen(frozen_each(torsion_m, len(friction), "torsion_m"), friction.shape, "torsion_m")
+    if not mu_t.any():
+        return None
+    if not 0.0 <= float(mu_t.min()) <= float(mu_t.max()) <= LARGEST:
+        raise InputError(
+            f"torsion_m must be lengths from 0 to {LARGEST:g} m, got {float(mu_t.min()):.6g} to "
+            f"{float(mu_t.max()):.6g}"
+        )
+    if ((mu_t > 0.0) & (friction == 0.0)).any():
+        raise InputError(
+            "torsion_m must be zero where friction is: a contact that slides freely turns freely; "
+            "give such contacts some friction, or no torsion"
+        )
+    return mu_t
+
+
+def torsion_lengths(torsions: Array, friction: Array) -> Array:
+    """Return the lengths mu_t / mu that make torques of contacts forces; zero without friction."""
+    return torsions / np.where(friction > 0.0, friction, 1.0)
+
+
+def are_torsions(torsions: Array, friction: Array) -> bool:
+    """Return whether some torsional coefficients are above zero, and only where friction is."""
+    return bool(torsions.any() and ((friction > 0.0) | (torsions == 0.0)).all())
+
+
 def unit_size(points: Array) -> tuple[Array, Array, Array]:
     """Return arms from the mean contact over the longest, that centre, and that length.
 
@@ -166,10 +196,18 @@ def grasp_map(positions: Array, center: Array | None = None) -> Array:
     return G.reshape(*arms.shape[:-2], WRENCH, 3 * arms.shape[-2])
 
 
+def with_torques(G: Array, normals: Array, lengths: Array) -> Array:
+    """Add a column to each contact in G, (..., 6, 3k): a torque about the normal, over a length."""
+    each = G.reshape(*G.shape[:-1], -1, 3)
+    turning = np.zeros((*each.shape[:-1], 1))
+    turning[..., 3:, :, 0] = np.swapaxes(lengths[..., None] * normals, -1, -2)
+    return np.concatenate([each, turning], axis=-1).reshape(*G.shape[:-1], -1)
+
+
 def in_frames(G: Array, frames: Array) -> Array:
-    """Rewrite a matrix on stacked forces (m, 3k) for coordinates in contact frames (k, 3, 3)."""
-    m, k = len(G), len(frames)
-    return np.einsum("mki,kij->mkj", G.reshape(m, k, 3), frames).reshape(m, 3 * k)
+    """Rewrite a matrix on stacked forces (m, k w) for coordinates in contact frames (k, w, w)."""
+    each = G.reshape(len(G), *frames.shape[:2])
+    return np.einsum("mki,kij->mkj", each, frames).reshape(G.shape)
 
 
 def cross_matrix(vector: Array) -> Array:

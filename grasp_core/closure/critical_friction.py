@@ -19,8 +19,8 @@ v_i being the velocity of contact i under the twist. Newton's method says where 
 
 A compiled search of the same kind comes first (see `margin_kernel`). The forces and the
 twist that it finds are checked like all others; where there are none, or their interval is not
-narrow, `friction_search` goes program by program, with proofs in rational arithmetic. With torsion,
-`soft_closure` searches below what hard fingers need.
+narrow, `friction_search` goes program by program, with proofs in rational arithmetic; with torsion,
+it searches below what hard fingers need.
 """
 
 import math
@@ -31,15 +31,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contacts import WRENCH, contact_arrays, normal_and_tangential, unit_size
-from grasp_core.closure.decision import KERNEL, deepest_forces
+from grasp_core.closure.contacts import (
+    WRENCH,
+    contact_arrays,
+    contact_torsions,
+    normal_and_tangential,
+    unit_size,
+)
+from grasp_core.closure.decision import KERNEL, deepest_forces, null_space
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
-from grasp_core.closure.friction_search import FRICTION_ACCURACY, SHAVED, Ends, search_interval
-from grasp_core.closure.proofs import CHECK_SLACK, RANK, proves_closure
-from grasp_core.closure.soft_closure import friction_interval
-from grasp_core.closure.soft_contacts import SoftContacts, contact_torsions
+from grasp_core.closure.friction_search import (
+    FRICTION_ACCURACY,
+    SHAVED,
+    Ends,
+    search_interval,
+    soft_ends,
+)
+from grasp_core.closure.proofs import CHECK_SLACK, ContactCones, proves_closure
 from grasp_core.compiled import compiled
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.values import Contact, Grasp
 
 NO_FORCE = 1e-100
@@ -80,8 +90,9 @@ def critical_friction(
     hard = float(_upper_ends(points[None], units[None])[0])
     if torsions is None or hard == 0.0:
         return hard
-    contacts = SoftContacts.of(points, units, np.ones(len(points)), torsions)
-    upper = min(friction_interval(contacts, hard).upper, hard)
+    arms, _, size = unit_size(points)
+    cones = ContactCones.at(arms, units, np.ones(len(points)), torsions / size)
+    upper = min(soft_ends(cones, hard).upper, hard)
     return 0.0 if upper <= REPORTED_AS_ZERO else upper
 
 
@@ -124,14 +135,14 @@ def critical_friction_interval(
     """
     points, units = contact_arrays(positions, normals)
     found, upper, forces, twists = _at_once(points[None], units[None])
-    ends = Ends(points, units, unit_size(points)[0])
+    ends = Ends.of(points, units)
     # the quick answer is proved again in rational arithmetic before it is kept
     if found[0]:
         ends.close(forces[0], float(upper[0]), exactly=True)
         ends.open(twists[0])
     if ends.settled:
-        return ends.interval()
-    slow, quick_half = search_interval(points, units), ends.interval()
+        return ends.interval(points)
+    slow, quick_half = search_interval(points, units), ends.interval(points)
     if quick_half.forces is None:
         return slow
     return replace(slow, upper=ends.upper, forces=quick_half.forces)  # as `critical_friction` says
@@ -167,13 +178,18 @@ def _at_once(points: Array, normals: Array) -> tuple[NDArray[np.bool_], Array, A
     # (1): the friction that the forces need, raised by a tenth of the width so that they lie inside
     upper = (across / np.maximum(along, NO_FORCE)).max(axis=1) * (1.0 + 0.1 * FRICTION_ACCURACY)
     near = np.flatnonzero(bounded & (upper <= highest))
-    found[near] = proves_closure(forces[near], arms[near], units[near], upper[near, None])
+    found[near] = _close(forces[near], arms[near], units[near], upper[near])
     # where these forces do not prove closure, the deepest ones at the highest allowed end may
     left = np.flatnonzero(bounded & ~found)
     upper[left] = highest[left]
     forces[left], _, _ = deepest_forces(arms[left], units[left], highest[left])
-    found[left] = proves_closure(forces[left], arms[left], units[left], highest[left, None])
+    found[left] = _close(forces[left], arms[left], units[left], highest[left])
     return found, upper, forces, twists
+
+
+def _close(forces: Array, arms: Array, normals: Array, friction: Array) -> NDArray[np.bool_]:
+    """Return which forces prove closure at one friction for all contacts of a set."""
+    return proves_closure(ContactCones.at(arms, normals, friction[..., None]), forces)
 
 
 def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> NDArray[np.bool_]:
@@ -193,12 +209,10 @@ def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> ND
 
 def _close_without_friction(arms: Array, normals: Array) -> bool:
     """Return whether pushes along the normals balance; only the most even ones are tried."""
-    along_normals = np.hstack([normals, cross(arms, normals)])
-    left, values, _ = np.linalg.svd(along_normals)
     # the projection of equal pushes onto those that balance
-    free = left[:, int((values > RANK).sum()) :]
+    free = null_space(np.hstack([normals, cross(arms, normals)]).T)
     pushes = free @ free.sum(axis=0)
     if pushes.min(initial=math.inf) <= 0.0:
         return False
     forces = (pushes / pushes.sum())[:, None] * normals
-    return bool(proves_closure(forces, arms, normals, np.full(len(arms), FRICTIONLESS)))
+    return bool(_close(forces, arms, normals, np.array(FRICTIONLESS)))

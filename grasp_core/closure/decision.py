@@ -1,40 +1,33 @@
 """Decides force closure of contacts: tries several ways to find forces or a twist that prove it.
 
-`force_closure` derives the margin program, (1) to (3) there. It is solved in compiled code (see
-`margin_kernel`), or else by the conic solver. `proofs` says what an answer proves. Margins of zero
-need a twist that lies on the cones, or one that leaves contacts at rest that balance by themselves.
+`force_closure` derives the margin program, (1) to (3) there. For hard contacts with one friction it
+is solved in compiled code (see `margin_kernel`), or else by the conic solver. `proofs` says what an
+answer proves. Margins of zero need a twist that lies on the cones, or one that leaves contacts at
+rest that balance by themselves.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices, cross
-from grasp_core.closure.contacts import (
-    WRENCH,
-    contact_frames,
-    grasp_map,
-    in_frames,
-    normal_and_tangential,
-)
+from grasp_core.arrays import Array
+from grasp_core.closure.contacts import WRENCH, in_frames, normal_and_tangential
 from grasp_core.closure.proofs import (
     CHECK_SLACK,
     RANK,
     SMALLEST_NORMAL,
-    allowed,
-    depths_in_cones,
-    generators_of,
+    ContactCones,
     proves_closure,
     refutes_closure,
     without_giants,
 )
-from grasp_core.closure.wrench_sets import WrenchSet, nearest_wrench
+from grasp_core.closure.wrench_sets import WrenchSet, contact_program, nearest_wrench
 from grasp_core.compiled import compiled
+from grasp_core.declared import trusted
 from grasp_core.errors import SolverError
-from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.conic import minimize
 
 KERNEL = "grasp_core.closure.margin_kernel"
 """Kernel of the search for critical friction, which solves the same program at many frictions."""
@@ -60,7 +53,7 @@ NEWTON_STEPS = 3
 def deepest_forces(
     arms: Array, normals: Array, friction: Array, share: float = SIGN_SHARE
 ) -> tuple[Array, Array, Array]:
-    """Balance many sets of contacts with forces as deep in the cones as possible.
+    """Balance many sets of hard contacts with forces as deep in the cones as possible.
 
     Gives forces, (g, k, 3); twists, (g, 6), on which the supports are at most the margin over the
     friction; and lower and upper bounds of the margin, (g, 2), where the forces balance. A search
@@ -74,62 +67,51 @@ def deepest_forces(
     return forces, twists / contacts, friction[:, None] / contacts * (1.0 - values)
 
 
-def margin_program(balance: Array, normals: Array, friction: Array) -> tuple[float, Array, Array]:
-    """Solve for the margin t, balancing forces (k, 3), and the twist of the dual program, (m,).
+def margin_program(cones: ContactCones, balance: Array) -> tuple[float, Array, Array]:
+    """Solve for the margin t, balancing forces (k, w), and the twist of the dual program, (m,).
 
-    The forces balance if `balance`, (m, 3k), maps them to zero. The unknowns of a contact are its
-    normal force and its tangential force over mu, so that small coefficients are solved as well as
-    large ones; without friction only the normal force is unknown.
+    The forces balance if `balance`, (m, k w), maps them to zero. The unknowns of a contact are its
+    normal force and the other parts over mu, so that small coefficients are solved as well as large
+    ones; without friction only the normal force is unknown.
     """
-    k, m = len(normals), len(balance)
-    frames = contact_frames(normals) * np.array([np.ones(k), friction, friction]).T[:, None]
-    free = allowed(friction)
-    rows = in_frames(balance, frames)[:, free]
-    pushing = np.tile([True, False, False], k)[free]
-    if (departing := departing_twist(rows, pushing * 1.0)) is not None:
-        return -math.inf, np.zeros((k, 3)), departing
-    n = int(free.sum())
-    largest = float(friction.max()) or 1.0
-    flat = friction == 0.0
-    A = np.zeros((m + 1 + n, n + 1))
-    # (1) and (2) of `force_closure` as equations
-    A[:m, :n], A[m, :n] = rows, pushing
-    order = np.argsort(~np.repeat(flat, 3)[free], kind="stable")  # frictionless rows first
-    A[m + 1 + np.arange(n), order] = -1.0
-    # (3), over mu: the normal part less t / mu bounds the tangential part over mu
-    depths = largest / np.where(flat, 1.0, np.maximum(friction, SMALLEST_NORMAL))
-    A[m + 1 :, n] = np.where(pushing, np.repeat(depths, 3)[free], 0.0)[order]
-    b, q = np.zeros(len(A)), np.zeros(n + 1)
-    b[m], q[-1] = 1.0, -1.0
-    flats = int(flat.sum())
-    solution = minimize(ConicProgram(q, A, b, m + 1, flats, (3,) * (k - flats)))
-    local = np.zeros(3 * k)
-    x = solution.x[:-1]
+    k, width = cones.normals.shape
+    n, flat = k * width, cones.friction == 0.0
+    frames = cones.frames
+    frames[:, :, 1:] *= cones.friction[:, None, None]
+    rows = in_frames(balance, frames)
+    pushing = np.eye(n)[::width].sum(axis=0)
+    used = cones.sliding.ravel()
+    if (departing := _departing_twist(rows[:, used], pushing[used])) is not None:
+        return -math.inf, np.zeros((k, width)), departing
+    # (1) and (2) of `force_closure` as equations, then (3) over mu: the normal part less t / mu
+    # bounds the other parts over mu, with t in units that keep its column of order one
+    forces, depth = np.eye(n, n + 1), np.eye(n + 1)[n]
+    equal = (rows @ forces, 0.0), (pushing[None] @ forces, 1.0)
+    largest = float(cones.friction.max()) or 1.0
+    depths = largest / np.where(flat, 1.0, np.maximum(cones.friction, SMALLEST_NORMAL))
+    answer = minimize(contact_program(-depth, 1.0 - flat, width, equal, room=depths))
     # what the solver leaves of the imbalance is taken off by least squares
-    local[free] = x - np.asarray(np.linalg.lstsq(rows, rows @ x, rcond=None)[0], dtype=np.float64)
-    forces = np.einsum("kij,kj->ki", frames, local.reshape(k, 3))
-    return largest * float(solution.x[-1]), forces, -solution.z[:m]
+    x = answer.x[:-1]
+    x = x - np.asarray(np.linalg.lstsq(rows, rows @ x, rcond=None)[0], dtype=np.float64)
+    forces = np.einsum("kij,kj->ki", frames, x.reshape(k, width))
+    return largest * float(answer.x[-1]), forces, -answer.z[: len(balance)]
 
 
-def departing_twist(rows: Array, share: Array) -> Array | None:
+def _departing_twist(rows: Array, share: Array) -> Array | None:
     """Find a twist with which every contact leaves along its normal: then no forces balance."""
     sizes = np.maximum(np.linalg.norm(rows, axis=0), SMALLEST_NORMAL)
     scaled: Array = (rows / sizes).T
     twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)
     missed = np.abs(rows.T @ twist + share) / np.maximum(sizes, 1.0)
-    if not np.isfinite(missed).all() or missed.max() > CHECK_SLACK * (
-        1.0 + float(np.abs(twist).max())
-    ):
-        return None
-    return twist
+    allowed = CHECK_SLACK * (1.0 + float(np.abs(twist).max()))
+    return twist if np.isfinite(missed).all() and missed.max() <= allowed else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
     """The margin program's solution, and the verdict on force closure that it proves.
 
-    Only `closed` is proved: True by `forces`, False by `twist`, (6,), and None by neither. Forces
-    are (k, 3), or local coordinates of soft contacts, (k, 4).
+    Only `closed` is proved: True by `forces`, (k, w), False by `twist`, (6,), and None by neither.
     """
 
     margin: float
@@ -138,137 +120,122 @@ class Answer:
     closed: bool | None
 
 
-def decide(arms: Array, normals: Array, friction: Array) -> Answer:
-    """Decide force closure of contacts at unit size, in compiled code or by the conic solver."""
-    answer = _decided_quickly(arms, normals, friction)
-    return answer or _decided_by_programs(arms, normals, friction)
+def decide(cones: ContactCones) -> Answer:
+    """Decide force closure of one set of contacts, in compiled code or by the conic solver."""
+    return _decided_quickly(cones) or _decided_by_programs(cones)
 
 
-def _decided_by_programs(arms: Array, normals: Array, friction: Array) -> Answer:
+def _decided_by_programs(cones: ContactCones) -> Answer:
     try:
-        margin, forces, twist = margin_program(grasp_map(arms), normals, friction)
+        margin, forces, twist = margin_program(cones, cones.maps)
     except SolverError:
         # nearly parallel normals: no solution, or none to within rounding; the twist towards the
         # nearest wrench may refute closure
-        _, facing = nearest_wrench(WrenchSet.at(arms, normals, friction))
-        closed = False if refutes_closure(facing, arms, normals, friction) else None
-        return Answer(-math.inf, np.zeros_like(arms), facing, closed)
-    if proves_closure(forces, arms, normals, friction):
+        G = in_frames(cones.maps, cones.frames)
+        _, twist = nearest_wrench(trusted(WrenchSet, G=G, friction=cones.friction, norm="l1"))
+        closed = False if refutes_closure(cones, twist) else None
+        return Answer(-math.inf, np.zeros_like(cones.normals), twist, closed)
+    if proves_closure(cones, forces):
         return Answer(margin, forces, twist, closed=True)
-    if margin < 0.0 and refutes_closure(twist, arms, normals, friction):
+    if margin < 0.0 and refutes_closure(cones, twist):
         return Answer(margin, forces, twist, closed=False)
-
-    def pushed(twist: Array) -> tuple[Array, Array]:
-        velocities = twist[:3] + cross(twist[3:], arms)
-        along, across = normal_and_tangential(velocities, normals)
-        slides = velocities - along[:, None] * normals
-        sideways = slides / np.maximum(across, SMALLEST_NORMAL)[:, None]
-        forces = normals + friction[:, None] * sideways
-        return along + friction * across, np.hstack([forces, cross(arms, forces)])
-
-    def held(some: Indices) -> Array:
-        return generators_of(arms[some], normals[some], friction[some]).T
-
-    def solved(twists: Array, rest: Indices) -> tuple[float, Array, Array]:
-        margin, forces, reduced = margin_program(
-            twists.T @ grasp_map(arms[rest]), normals[rest], friction[rest]
-        )
-        return margin, depths_in_cones(forces, normals[rest], friction[rest]), reduced
-
     # at a margin of zero, (2) holds once the twist is taken onto the cones
-    if abs(margin) < DECIDED:
-        touching = touching_twist(twist, pushed)
-        if refutes_closure(touching, arms, normals, friction):
-            return Answer(0.0, forces, touching, closed=False)
+    others = [_touching_twist(cones, twist)] if abs(margin) < DECIDED else []
     # some contacts may balance by themselves: the margin is zero then, and only the others depart
-    sparing = sparing_twist(depths_in_cones(forces, normals, friction), held, solved)
-    if sparing is not None and refutes_closure(sparing, arms, normals, friction):
-        return Answer(0.0, forces, sparing, closed=False)
+    sparing = _sparing_twist(cones, cones.depths(forces))
+    if sparing is not None:
+        others += [sparing, _touching_twist(cones, sparing)]
+    for each in others:
+        if refutes_closure(cones, each):
+            return Answer(0.0, forces, each, closed=False)
     return Answer(margin, forces, twist, closed=None)
 
 
-def _decided_quickly(arms: Array, normals: Array, friction: Array) -> Answer | None:
-    """Return compiled code's answer if it is proved; it needs one positive friction for all."""
-    if not (friction[0] > 0.0 and (friction == friction[0]).all()):
+def _decided_quickly(cones: ContactCones) -> Answer | None:
+    """Return compiled code's answer if it is proved, for hard contacts with one friction."""
+    alike = (cones.friction > 0.0).all() and np.ptp(cones.friction) == 0.0
+    if cones.torsion is not None or not alike:
         return None
-    closed, separated, margins, forces, twists = decided_at_once(
-        arms[None], normals[None], float(friction[0])
-    )
+    one = ContactCones.at(cones.arms[None], cones.inward[None], cones.friction[None])
+    closed, separated, margins, forces, twists = decided_at_once(one)
     if not (closed[0] or separated[0]):
         return None
     return Answer(float(margins[0]), forces[0], twists[0], closed=bool(closed[0]))
 
 
 def decided_at_once(
-    arms: Array, normals: Array, friction: float
+    cones: ContactCones,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array, Array]:
-    """Decide what compiled code can prove of many sets of contacts with one positive friction.
+    """Decide what compiled code can prove of many sets of hard contacts with positive frictions.
 
     Gives which sets are proved closed, and which separated; the margins, and the forces (g, k, 3)
     and twists (g, 6) that prove it.
     """
-    every = np.full(len(arms), friction)
-    forces, twists, margins = deepest_forces(arms, normals, every, PRECISE)
+    friction = cones.friction[:, 0]
+    forces, twists, margins = deepest_forces(cones.arms, cones.inward, friction, PRECISE)
     forces, twists = without_giants(forces, 2), without_giants(twists, 1)
     lower, upper = margins.T
     with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
         close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
         close &= np.abs(lower) <= FAR * friction
         closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
-    every = every[:, None]
-    closed[closed] = proves_closure(forces[closed], arms[closed], normals[closed], every[closed])
-    separated[separated] = refutes_closure(
-        twists[separated], arms[separated], normals[separated], every[separated]
-    )
+    closed[closed] = proves_closure(cones.only(closed), forces[closed])
+    separated[separated] = refutes_closure(cones.only(separated), twists[separated])
     return closed, separated, lower, forces, twists
 
 
-def touching_twist(twist: Array, pushed: Callable[[Array], tuple[Array, Array]]) -> Array:
+def _touching_twist(cones: ContactCones, twist: Array) -> Array:
     """Change a twist so that supports that are nearly zero are zero up to rounding.
 
     Where the margin is exactly zero, as with symmetric normals at just their critical friction, the
-    solver's twist passes the cones by its own tolerance; Newton's method takes it onto them.
-    `pushed` gives the supports, (k,), and their gradients, (k, 6): each is the wrench of the force
-    in the cone that works most along the twist.
+    solver's twist passes the cones by its own tolerance; Newton's method takes it onto them. The
+    gradient of a support is the wrench of the force in the cone that works most along the twist.
     """
+    maps = cones.maps.reshape(WRENCH, *cones.normals.shape)
     twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
     for _ in range(NEWTON_STEPS):
-        excess, gradients = pushed(twist)
+        velocities = cones.velocities(twist)
+        along, across = normal_and_tangential(velocities, cones.normals)
+        sideways = velocities - along[:, None] * cones.normals
+        sideways = sideways / np.maximum(across, SMALLEST_NORMAL)[:, None]
+        working = cones.normals + cones.friction[:, None] * sideways
+        gradients: Array = np.einsum("wkj,kj->kw", maps, working)
+        excess: Array = along + cones.friction * across
         touched = excess > -TOUCHING
         step, *_ = np.linalg.lstsq(gradients[touched], excess[touched], rcond=RANK)
         twist = twist - np.asarray(step, dtype=np.float64)
     return twist
 
 
-def sparing_twist(
-    depths: Array,
-    held: Callable[[Indices], Array],
-    solved: Callable[[Array, Indices], tuple[float, Array, Array]],
-) -> Array | None:
+def _sparing_twist(cones: ContactCones, depths: Array) -> Array | None:
     """Find a separating twist where some contacts balance each other.
 
     Their forces are inside their cones, by `depths`, so the margin is zero however far the others
-    are from completing closure. A separating twist must leave the balanced contacts at rest, all
-    that `held` gives of them. Among such twists, (6, m), the margin program is `solved` again for
-    the other contacts, until its optimum is negative or no contact is left.
+    are from completing closure. A separating twist must leave the balanced contacts at rest, in all
+    that they feel. Among such twists, (6, m), the margin program is solved again for the other
+    contacts, until its optimum is negative or no contact is left.
     """
-    rest, twists = np.arange(len(depths)), np.eye(WRENCH)
+    twists = np.eye(WRENCH)
     while True:  # each turn takes balanced contacts from the rest, or returns
         balanced = depths > INTERIOR
         if not balanced.any():
             return None
         # a force inside its cone can work along all that its contact feels, so that must be zero
-        twists = twists @ null_space(held(rest[balanced]) @ twists)
-        rest = rest[~balanced]
+        twists = twists @ null_space(cones.only(balanced).generators.T @ twists)
+        cones = cones.only(~balanced)
         if not twists.shape[1]:
             return None
-        if not rest.size:
+        if balanced.all():
             return twists[:, 0]
-        margin, depths, reduced = solved(twists, rest)
+        try:
+            margin, forces, reduced = margin_program(cones, twists.T @ cones.maps)
+        except SolverError:
+            return None
         if margin < -DECIDED:
             return twists @ reduced
         if margin > DECIDED:
             return None
+        depths = cones.depths(forces)
 
 
 def null_space(rows: Array) -> Array:

@@ -22,8 +22,8 @@ Both answers are certificates: `verify` uses sums, norms and one singular value.
 the optimum, forces from below and twists from above (see `proofs`).
 
 Many sets of contacts are decided at once in compiled code, and checked as `verify` checks one; what
-it leaves open is decided one by one. Soft contacts also transmit a torque about their normal:
-`soft_contacts` has their cones of four dimensions and their proofs, `soft_closure` their program.
+it leaves open is decided one by one. Soft contacts also transmit a torque about their normal; with
+it all of the above holds in one dimension more (see `proofs`).
 
 Source: Sudsang & Ponce 1995, Definition 1 and Proposition 1, with the condition on the rank
 made explicit; the cone program is standard.
@@ -47,24 +47,24 @@ from grasp_core.arrays import (
     Shape,
     UnitVectors,
     Wrench,
-    cross,
     of_order_one,
 )
-from grasp_core.checked import LARGEST
-from grasp_core.closure import proofs, soft_closure, soft_contacts
 from grasp_core.closure.contacts import (
+    are_torsions,
     contact_arrays,
     contact_frictions,
+    contact_torsions,
     normal_and_tangential,
     to_center,
     to_origin,
+    torsion_lengths,
     unit_size,
 )
 from grasp_core.closure.decision import decide, decided_at_once
-from grasp_core.closure.soft_contacts import SoftContacts, are_torsions, contact_torsions
+from grasp_core.closure.proofs import ContactCones, margin_ceiling, proved_margin
 from grasp_core.declared import Declared, trusted
 from grasp_core.errors import UndecidedError
-from grasp_core.kinds import Range
+from grasp_core.kinds import LARGEST, Range
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6
@@ -154,33 +154,25 @@ class ClosureCertificate(Declared):
         arms, center, size = unit_size(self.positions)
         # `verify` asks only for unit length to nine digits, so the directions are taken exactly
         normals = self.normals / np.linalg.norm(self.normals, axis=1, keepdims=True)
-        soft = None
-        if self.torsion_m is not None:
-            soft = SoftContacts.of(self.positions, normals, self.friction, self.torsion_m)
-        if self.closed:
-            if self.forces is None:
+        torsion = None if self.torsion_m is None else self.torsion_m / size
+        cones = ContactCones.at(arms, normals, self.friction, torsion)
+        if not self.closed:
+            if self.separating_wrench is None:
+                return math.inf
+            # the twist of (4), whose length means nothing
+            twist = to_center(of_order_one(self.separating_wrench)[0], center, size)
+            return float(_upper_bound(cones, twist, caution))
+        forces = self.forces
+        if forces is None or (self.torques is None) is not (torsion is None):
+            return -math.inf
+        if torsion is not None and self.torques is not None:
+            lengths = size * torsion_lengths(torsion, self.friction)[:, None]
+            turning = self.torques[:, None]
+            if np.abs(np.where(lengths > 0.0, 0.0, turning)).max() > SUMMED * size:
                 return -math.inf
-            if soft is not None:
-                return self._proved_with_torques(soft, self.forces, caution)
-            return float(_lower_bound(self.forces, arms, normals, self.friction, caution))
-        if self.separating_wrench is None:
-            return math.inf
-        # the twist of (4), whose length means nothing
-        twist = to_center(of_order_one(self.separating_wrench)[0], center, size)
-        if soft is not None:
-            ceiling = soft_contacts.margin_ceiling(soft, twist, caution)
-            return -math.inf if ceiling <= FAR_BELOW else ceiling
-        return float(_upper_bound(twist, arms, normals, self.friction, caution))
-
-    def _proved_with_torques(self, contacts: SoftContacts, forces: Array, caution: float) -> float:
-        torques = self.torques
-        if torques is None:
-            return -math.inf
-        local = contacts.local(forces, torques)
-        missed = max(contacts.missed(forces, torques), abs(float(local[:, 0].sum()) - 1.0))
-        if not missed <= SUMMED:
-            return -math.inf
-        return soft_contacts.proved_margin(contacts, local, caution)
+            turning = np.divide(turning, lengths, out=np.zeros_like(turning), where=lengths > 0.0)
+            forces = np.hstack([forces, turning])
+        return float(_lower_bound(cones, forces, caution))
 
 
 def force_closure(
@@ -209,19 +201,16 @@ def force_closure(
     mu = contact_frictions(friction, len(points))
     torsions = contact_torsions(torsion_m, mu)
     arms, center, size = unit_size(points)
+    cones = ContactCones.at(arms, units, mu, None if torsions is None else torsions / size)
+    answer = decide(cones)
     forces, wrench, torques = None, None, None
-    if torsions is None:
-        answer = decide(arms, units, mu)
-        if answer.closed:
-            # (2) exactly: scaling forces leaves (1) and the sign of (3) alone
-            forces = answer.forces / float(np.einsum("ki,ki->", answer.forces, units))
-    else:
-        contacts = SoftContacts.of(points, units, mu, torsions)
-        answer = soft_closure.decide(contacts)
-        if answer.closed:
-            local = answer.forces / float(answer.forces[:, 0].sum())
-            forces, torques = contacts.in_space(local)
-    if answer.closed is False:
+    if answer.closed:
+        # (2) exactly: scaling forces leaves (1) and the sign of (3) alone
+        scaled = answer.forces / float(np.einsum("ki,ki->", answer.forces, cones.normals))
+        forces = np.array(scaled[:, :3])
+        if torsions is not None:
+            torques = scaled[:, 3] * torsion_lengths(torsions, mu)
+    elif answer.closed is False:
         wrench = to_origin(answer.twist, center, size)
     if answer.closed is not None:
         for array in (points, units, forces, wrench, torques):
@@ -292,45 +281,37 @@ def _decided(
         never, nothing = np.zeros(count, dtype=bool), np.full(count, math.nan)
         return never, nothing, np.zeros_like(positions), np.zeros((count, 6))
     arms, centers, sizes = unit_size(positions)
-    closed, separated, _, forces, twists = decided_at_once(arms, normals, friction)
+    closed, separated, _, forces, twists = decided_at_once(
+        ContactCones.at(arms, normals, np.full(positions.shape[:2], friction))
+    )
     lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
     straight = (np.abs(lengths - 1.0) <= UNIT_SLACK).all(axis=(1, 2))
-    closed, separated, units = closed & straight, separated & straight, normals / lengths
+    closed, separated = closed & straight, separated & straight
+    cones = ContactCones.at(arms, normals / lengths, np.full(positions.shape[:2], friction))
     pushes = np.einsum("gki,gki->g", forces, normals)
     forces = forces / np.where(closed, pushes, 1.0)[:, None, None]
     wrenches = to_origin(twists, centers, sizes)
-    found, mu = np.full(count, math.nan), np.array([friction])
-    proved, lower = (
-        _lower_bound(forces[closed], arms[closed], units[closed], mu, caution)
-        for caution in (CAUTION, 1.0)
-    )
-    found[closed] = np.where((proved > 0.0) & (proved <= lower), proved, math.nan)
+    # the bounds at a caution of one, which `verify` asks for, are farther away
+    found = np.full(count, math.nan)
+    proved = _lower_bound(cones.only(closed), forces[closed], CAUTION)
+    found[closed] = np.where(proved > 0.0, proved, math.nan)
     back = to_center(wrenches, centers, sizes)[separated]  # as `verify` does
-    proved, upper = (
-        _upper_bound(back, arms[separated], units[separated], mu, caution)
-        for caution in (CAUTION, 1.0)
-    )
-    found[separated] = np.where((proved <= 0.0) & (proved >= upper), proved, math.nan)
+    proved = _upper_bound(cones.only(separated), back, CAUTION)
+    found[separated] = np.where(proved <= 0.0, proved, math.nan)
     return closed & ~np.isnan(found), found, forces, wrenches
 
 
-def _lower_bound(
-    forces: Array, arms: Array, normals: Array, friction: Array, caution: float
-) -> Array:
+def _lower_bound(cones: ContactCones, forces: Array, caution: float) -> Array:
     """Compute the margins that forces prove; minus infinity where they miss (1) or (2)."""
-    wrenches = np.concatenate([forces.sum(axis=-2), cross(arms, forces).sum(axis=-2)], axis=-1)
-    along, across = normal_and_tangential(forces, normals)
-    met = np.abs(wrenches).max(axis=-1) <= SUMMED
+    along, across = normal_and_tangential(forces, cones.normals)
+    met = np.abs(cones.wrench(forces)).max(axis=-1) <= SUMMED
     met &= np.abs(along.sum(axis=-1) - 1.0) <= SUMMED
     # without friction `proved_margin` sees only normal parts, so slides are checked here
-    met &= (np.where(friction == 0.0, across, 0.0) <= SUMMED).all(axis=-1)
-    margins = proofs.proved_margin(forces, arms, normals, friction, caution)
-    return np.where(met, margins, -math.inf)
+    met &= (np.where(cones.friction == 0.0, across, 0.0) <= SUMMED).all(axis=-1)
+    return np.where(met, proved_margin(cones, forces, caution), -math.inf)
 
 
-def _upper_bound(
-    twist: Array, arms: Array, normals: Array, friction: Array, caution: float
-) -> Array:
+def _upper_bound(cones: ContactCones, twist: Array, caution: float) -> Array:
     """Bound margins by twists; minus infinity is reported far below zero."""
-    ceilings = proofs.margin_ceiling(twist, arms, normals, friction, caution)
+    ceilings = margin_ceiling(cones, twist, caution)
     return np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)

@@ -31,16 +31,9 @@ from typing import Annotated, TypeVar
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
-from grasp_core.checked import LARGEST_FRICTION
-from grasp_core.closure.contacts import (
-    FEWEST,
-    WRENCH,
-    grasp_map,
-    normal_and_tangential,
-    unit_size,
-)
+from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
 from grasp_core.declared import Declared
-from grasp_core.kinds import Range
+from grasp_core.kinds import LARGEST_FRICTION, Range
 
 Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]

@@ -25,6 +25,15 @@ balanced forces push at all contacts, or the wrenches do not span; that is, iff 
 every contact depart straight along its normal, or leaves it at rest:
 
     v_i = -c_i n_i,  c_i >= 0.                                                              (2)
+
+Soft contacts keep their torsion whatever the friction. In four dimensions, with torques over mu_t
+instead of lengths mu_t / mu (see `proofs`), forces (f, u) and velocities (v, w) bound it by
+
+    mu  <=  max_i |f_t| / sqrt((n.f)^2 - u^2),                                              (3)
+    mu  >=  min_i sqrt((n.v)^2 - w^2) / |tangential part of v|,                             (4)
+
+which are the bounds of hard contacts where u and w are zero. Hard contacts need no less friction,
+so the search begins below theirs. It is proved in floating point at the frictions that are kept.
 """
 
 import math
@@ -32,8 +41,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross
-from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH, grasp_map, normal_and_tangential, unit_size
 from grasp_core.closure.decision import Answer, decide, margin_program, null_space
 from grasp_core.closure.friction_interval import (
@@ -45,8 +53,15 @@ from grasp_core.closure.friction_interval import (
     closing_forces,
     separates,
 )
-from grasp_core.closure.proofs import RANK, SMALLEST_NORMAL, proves_closure
+from grasp_core.closure.proofs import (
+    RANK,
+    SMALLEST_NORMAL,
+    ContactCones,
+    margin_ceiling,
+    proves_closure,
+)
 from grasp_core.errors import SolverError
+from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 
 LARGEST_VARIABLE = 1e4
@@ -193,37 +208,30 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
 def search_interval(points: Array, units: Array) -> FrictionInterval:
     """Find the interval of the critical friction, as narrow as accuracy or proofs allow."""
     for strict in (False, True):
-        found = _searched(Ends(points, units, unit_size(points)[0], strict)).interval()
+        found = _searched(Ends.of(points, units, strict=strict)).interval(points)
         if found.verify():
             return found
     return FrictionInterval(0.0, math.inf, points, units, None, None)
 
 
+def soft_ends(cones: ContactCones, highest: float) -> "Ends":
+    """Find the ends for soft contacts; hard ones have the critical friction `highest`."""
+    ends = Ends(cones.at_friction(1.0))
+    _try(ends, min(2.0 * highest, LARGEST_FRICTION))
+    if math.isfinite(ends.upper):
+        _close_in(ends, max(min(FIRST_TRIAL, 0.5 * highest), FRICTIONLESS))
+    return ends
+
+
 def _searched(ends: "Ends") -> "Ends":
-    arms, units = ends.arms, ends.units
+    arms, units = ends.cones.arms, ends.cones.inward
     hopeless = hopeless_twist(arms, units)
     if hopeless is not None:
         ends.opened(hopeless, math.inf)
     if ends.lower == math.inf:
         return ends
     _try_little(ends)
-    trial = max(FIRST_TRIAL, 2.0 * ends.lower)
-    for _ in range(MOST_TRIALS):
-        if ends.settled:
-            break
-        trial = min(trial, LARGEST_FRICTION)
-        answer = _asked(arms, units, trial)
-        ends.close(answer.forces, trial)
-        ends.open(answer.twist)
-        if ends.lower < trial < ends.upper:
-            _try_evened(ends, trial, answer.forces)
-        ends.decided(trial)
-        # the slope of the margin over mu with respect to the logarithm of mu
-        velocities = answer.twist[:3] + cross(answer.twist[3:], arms)
-        along = np.einsum("ki,ki->k", answer.forces, units)
-        slides = answer.forces - along[:, None] * units
-        slope = float(np.einsum("ki,ki->", velocities, slides))
-        trial = ends.next_trial(trial, answer.margin, slope)
+    _close_in(ends, max(FIRST_TRIAL, 2.0 * ends.lower))
     if ends.forces is None and ends.lower < LARGEST_FRICTION:
         pushing = pushing_forces(arms, units)
         if pushing is not None:
@@ -231,19 +239,44 @@ def _searched(ends: "Ends") -> "Ends":
     return ends
 
 
+def _close_in(ends: "Ends", trial: float) -> None:
+    """Try one friction after the other, as Newton's method says, until the ends are settled."""
+    for _ in range(MOST_TRIALS):
+        if ends.settled:
+            break
+        trial = min(trial, LARGEST_FRICTION)
+        answer = _try(ends, trial)
+        if ends.lower < trial < ends.upper:
+            _try_evened(ends, trial, answer.forces)
+        ends.decided(trial)
+        # the slope of the margin over mu with respect to the logarithm of mu
+        cones = ends.cones.at_friction(trial)
+        along, _ = normal_and_tangential(answer.forces, cones.normals)
+        slides = answer.forces - along[:, None] * cones.normals
+        slope = float((cones.velocities(answer.twist) * slides)[:, :3].sum())
+        trial = ends.next_trial(trial, answer.margin, slope)
+
+
+def _try(ends: "Ends", friction: float) -> Answer:
+    """Move the ends as far as the margin program's answer at a friction proves."""
+    answer = _asked(ends.cones, friction)
+    ends.close(answer.forces, friction)
+    ends.open(answer.twist)
+    return answer
+
+
 def _try_little(ends: "Ends") -> None:
     """Look for a proof of closure at very small friction, or else for a first lower end."""
-    (every, twist), friction = rounds(ends.arms, ends.units), FRICTIONLESS
+    units = ends.cones.inward
+    (every, twist), friction = rounds(ends.cones.arms, units), FRICTIONLESS
     if twist is not None:
         ends.open(twist)
     # friction is doubled: ten times from `FRICTIONLESS` to `LITTLE`
     while every and friction <= LITTLE and ends.forces is None:
-        ends.close(combined(every, friction, ends.units), friction, exactly=True)
+        ends.close(combined(every, friction, units), friction, exactly=True)
         friction *= 2.0
     if ends.forces is None and ends.lower < FRICTIONLESS:
-        answer = _asked(ends.arms, ends.units, FRICTIONLESS)
-        ends.close(answer.forces, FRICTIONLESS)
-        ends.open(answer.twist)
+        _try(ends, FRICTIONLESS)
 
 
 def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
@@ -252,16 +285,15 @@ def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
     Near a threshold, some contacts push so much less than others that a solver cannot tell their
     depth from zero. In units of their own pushes, they are as deep.
     """
-    G, alike = grasp_map(ends.arms), np.full(len(ends.arms), friction)
+    cones = ends.cones.at_friction(friction)
     for _ in range(3):
-        pushes, _ = normal_and_tangential(forces, ends.units)
+        pushes, _ = normal_and_tangential(forces, cones.normals)
         pushes = np.maximum(pushes, 1e-10 * np.abs(pushes).max())
         if not pushes.min() > 0.0:
             return
-        scaled = np.repeat(pushes, 3)
-        rows = np.linalg.qr((G * scaled).T)[0].T
+        rows = np.linalg.qr((cones.maps * np.repeat(pushes, cones.width)).T)[0].T
         try:
-            _, forces, _ = margin_program(rows, ends.units, alike)
+            _, forces, _ = margin_program(cones, rows)
         except SolverError:
             return
         forces = pushes[:, None] * forces
@@ -270,29 +302,32 @@ def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
             return
 
 
-def _asked(arms: Array, units: Array, friction: float) -> Answer:
+def _asked(cones: ContactCones, friction: float) -> Answer:
     """Solve the margin program; where that fails, return zeros, which prove nothing."""
     try:
-        return decide(arms, units, np.full(len(arms), friction))
+        return decide(cones.at_friction(friction))
     except SolverError:
-        return Answer(math.nan, np.zeros_like(arms), np.zeros(WRENCH), closed=None)
+        return Answer(math.nan, np.zeros_like(cones.normals), np.zeros(WRENCH), closed=None)
 
 
 @dataclass(slots=True)
 class Ends:
     """The proved ends of an interval of friction, and where to try next."""
 
-    points: Array
-    units: Array
-    arms: Array
-    """Arms of the contacts at unit size, (k, 3)."""
+    cones: ContactCones
+    """The contacts at a friction of one."""
+    points: Array | None = None
+    """Positions of hard contacts, (k, 3) [m], for proofs in rational arithmetic; None of soft ones,
+    whose proofs are in floating point."""
     strict: bool = True
     """Whether each step is proved in rational arithmetic; otherwise floats are used, whose proofs
     rounding may invalidate."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None
+    """Forces (k, w) that prove the upper end, at that friction."""
     twist: Array | None = None
+    """Twist at unit size that proves the lower end."""
     share: float = 0.5
     """Share of the upper end to try next while no lower end is known."""
     trials: int = 0
@@ -302,6 +337,12 @@ class Ends:
     spread: float = 0.0
     """Distance from `center` at which the next proofs are tried."""
 
+    @classmethod
+    def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
+        """Begin with nothing proved of hard contacts."""
+        arms, _, _ = unit_size(points)
+        return cls(ContactCones.at(arms, units, np.ones(len(arms))), points, strict)
+
     @property
     def settled(self) -> bool:
         """Return whether the interval is as narrow as asked for, or as proofs allow."""
@@ -310,14 +351,15 @@ class Ends:
         beyond = max(self.lower, self.spread) >= LARGEST_FRICTION
         return self.upper <= FRICTIONLESS or narrow or around or beyond
 
-    def interval(self) -> FrictionInterval:
-        """Return the proved interval, with forces that balance as well as floats can."""
-        forces, contacts = self.forces, (self.points, self.units)
+    def interval(self, points: Array) -> FrictionInterval:
+        """Return the proved interval of hard contacts, with forces that balance as floats can."""
+        forces, contacts = self.forces, (points, self.cones.inward)
+        twist = None if self.twist is None else at_the_first(self.twist, points)
         if forces is not None:
             exact = closing_forces(forces, *contacts, self.upper)
             if exact is not None and closes(exact, *contacts, self.upper):
                 forces = exact
-        return FrictionInterval(self.lower, self.upper, *contacts, forces, self.twist)
+        return FrictionInterval(self.lower, self.upper, *contacts, forces, twist)
 
     def decided(self, friction: float) -> None:
         """Look farther away from a friction at which nothing was proved, or give up there."""
@@ -331,20 +373,29 @@ class Ends:
 
     def close(self, forces: Array, friction: float, *, exactly: bool = False) -> None:
         """Lower the upper end to the friction that forces need, or at which they were found."""
-        along, across = normal_and_tangential(forces, self.units)
-        if not along.min() > 0.0:
+        along, _ = normal_and_tangential(forces, self.cones.normals)
+        torques = forces[:, 3:] / friction  # over the lengths at a friction of one
+        room = (along - np.abs(torques).sum(axis=1)) * (along + np.abs(torques).sum(axis=1))
+        if not (along.min() > 0.0 and room.min() > 0.0):
             return
-        needed = float((across / along).max()) * (1.0 + ADDED)
+        _, across = normal_and_tangential(forces[:, :3], self.cones.inward)
+        # by (3), and a little more
+        needed = float((across / np.sqrt(room)).max()) * (1.0 + ADDED)
         tried = [needed + share * (friction - needed) for share in PROOF_SHARES]
         for enough in (friction,) if exactly else (*tried, friction):
             enough = max(enough, FRICTIONLESS)
             if not (enough <= friction and enough < self.upper):
                 continue
-            alike = np.full(len(self.arms), enough)
-            easy = not self.strict and proves_closure(forces, self.arms, self.units, alike)
-            if easy or closes(forces, self.points, self.units, enough):
-                self.upper, self.forces = enough, forces
+            there = np.hstack([forces[:, :3], torques * enough])
+            if self._closes(there, enough):
+                self.upper, self.forces = enough, there
                 return
+
+    def _closes(self, forces: Array, friction: float) -> bool:
+        easy = self.points is None or not self.strict
+        if easy and proves_closure(self.cones.at_friction(friction), forces):
+            return True
+        return self.points is not None and closes(forces, self.points, self.cones.inward, friction)
 
     def open(self, twist: Array) -> None:
         """Raise the lower end to the friction up to which a twist separates."""
@@ -352,16 +403,20 @@ class Ends:
         if not 0.0 < length < math.inf:
             return
         for slow in RESTING:
-            still, friction = _put_to_rest(twist / length, self.arms, self.units, slow)
+            still, friction = _put_to_rest(twist / length, self.cones, slow)
             friction *= 1.0 - SHAVED
             if self.lower < friction < self.upper:
                 self.opened(still, friction)
 
     def opened(self, twist: Array, friction: float) -> None:
         """Raise the lower end to a friction, where a twist separates there."""
-        twist = at_the_first(twist, self.points)
-        easy = not self.strict and friction < math.inf
-        if easy or separates(twist, self.points, self.units, friction):
+        if self.points is None:
+            proved = bool(margin_ceiling(self.cones.at_friction(friction), twist) <= 0.0)
+        else:
+            proved = not self.strict and friction < math.inf
+            at_first = at_the_first(twist, self.points)
+            proved = proved or separates(at_first, self.points, self.cones.inward, friction)
+        if proved:
             self.lower, self.twist = friction, twist
 
     def next_trial(self, friction: float, margin: float, slope: float) -> float:
@@ -372,7 +427,11 @@ class Ends:
         self.trials += 1
         root = friction - margin / slope if slope > 0.0 and math.isfinite(margin) else math.nan
         if self.lower < root < self.upper and self.trials % HALVING:
-            return slightly_past(root, friction, self.lower, self.upper)
+            # past itself, towards the wider side of the interval
+            past = NUDGE * FRICTION_ACCURACY * root + (root - friction) ** 2 / root
+            if self.upper - root > root - self.lower:
+                return root + min(past, 0.5 * (self.upper - root))
+            return root - min(past, 0.5 * (root - self.lower))
         if self.lower > 0.0:
             # in the middle, measured by the cones' half-angles
             highest = min(self.upper, 4.0 * LARGEST_FRICTION)
@@ -381,25 +440,20 @@ class Ends:
         return max(2.0 * self.share * self.upper, FRICTIONLESS)
 
 
-def _put_to_rest(twist: Array, arms: Array, normals: Array, slow: float) -> tuple[Array, float]:
+def _put_to_rest(twist: Array, cones: ContactCones, slow: float) -> tuple[Array, float]:
     """Put slow contacts to rest under a unit twist, which separates at most up to a friction."""
-    rows = grasp_map(arms).T.reshape(-1, 3, WRENCH)
-    slowest = np.linalg.norm(rows @ twist, axis=1) <= slow
-    resting = rows[slowest].reshape(-1, WRENCH)
-    if resting.size:
+    slowest = np.linalg.norm(cones.velocities(twist), axis=1) <= slow
+    if slowest.any():
+        resting = cones.only(slowest).maps.T
         for _ in range(2):  # once more for what rounding leaves
             twist = twist - np.linalg.lstsq(resting, resting @ twist, rcond=NEARLY_AT_REST)[0]
-    along, across = normal_and_tangential(rows[~slowest] @ twist, normals[~slowest])
     if not np.linalg.norm(twist) > 1e-3:  # noqa: PLR2004 - what is left is only rounding
         return twist, 0.0
+    velocities = cones.velocities(twist)[~slowest]
+    along, across = normal_and_tangential(velocities[:, :3], cones.inward[~slowest])
+    turning = np.abs(velocities[:, 3:]).sum(axis=1)
+    # (4), of contacts that depart
+    departing = np.sqrt(np.maximum(-along - turning, 0.0) * np.maximum(turning - along, 0.0))
     with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
-        ratios = -along / np.maximum(across, SMALLEST_NORMAL)
+        ratios = departing / np.maximum(across, SMALLEST_NORMAL)
     return twist, float(ratios.min(initial=2.0 * LARGEST_FRICTION))
-
-
-def slightly_past(root: float, trial: float, lower: float, upper: float) -> float:
-    """Move a root by Newton's method past itself, towards the wider side of an interval."""
-    past = NUDGE * FRICTION_ACCURACY * root + (root - trial) ** 2 / root
-    if upper - root > root - lower:
-        return root + min(past, 0.5 * (upper - root))
-    return root - min(past, 0.5 * (root - lower))

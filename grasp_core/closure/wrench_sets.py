@@ -16,7 +16,7 @@ velocity; so the circular cones need no pyramid.
 
 Soft contacts have a fourth local component, u = m mu_i / mu_ti for the torque m about the normal
 and the torsional coefficient mu_ti, that is, a torque over the length mu_ti / mu_i. Their cones,
-|(t, u)| <= mu_i n, are circular too, in one dimension more; see `soft_contacts`.
+|(t, u)| <= mu_i n, are circular too, in one dimension more; see `proofs`.
 
 Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular cones.
 """
@@ -29,19 +29,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Frictions, Shape, frozen
-from grasp_core.checked import one_of, positive, shown
 from grasp_core.closure.contacts import (
+    LOCAL,
     WRENCH,
     check_spread,
     contact_arrays,
     contact_frames,
     contact_frictions,
+    contact_torsions,
     grasp_map,
     in_frames,
+    torsion_lengths,
+    with_torques,
 )
-from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
 from grasp_core.declared import Declared, trusted
 from grasp_core.errors import InputError
+from grasp_core.kinds import Quantity, one_of, shown, value_of
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Contact, Grasp
@@ -49,6 +52,8 @@ from grasp_core.values import Contact, Grasp
 Norm: TypeAlias = Literal["l1", "linf"]
 """How contact forces are bounded: by the sum of normal forces (`l1`) or one by one (`linf`)."""
 
+Rows: TypeAlias = tuple[Array, Array | float]
+"""Rows A and their right-hand sides b of b - A x."""
 NO_SLIDE = 1e-290
 """Speed along the surface below which the direction of sliding is undefined."""
 SAME_FRAME = 1e-9
@@ -65,7 +70,7 @@ much where torques are over a thousandth of the scale (see `measures`)."""
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
     """Compute levers of contacts about a centre, divided by the torque scale."""
-    scale = positive(torque_scale, "torque_scale")
+    scale = value_of(Quantity, torque_scale, "torque_scale")
     spread = np.ptp(points, axis=0)
     check_spread(spread)
     apart = points - points.mean(axis=0)
@@ -223,15 +228,6 @@ class WrenchSet(Declared):
         return bool((bounded & in_cones & (pushes.min(axis=1) >= -slack)).all())
 
 
-def with_torques(G: Array, normals: Array, lengths: Array) -> Array:
-    """Add a column to each contact in `G`, (6, 3k): a torque about the normal, over a length."""
-    k = len(normals)
-    every = np.zeros((WRENCH, k, LOCAL))
-    every[:, :, :3] = G.reshape(WRENCH, k, 3)
-    every[3:, :, 3] = (lengths[:, None] * normals).T
-    return every.reshape(WRENCH, LOCAL * k)
-
-
 def _across(local: Array) -> Array:
     """Compute the lengths of what is not normal in local forces, (..., 3) or (..., 4)."""
     slides = np.hypot(local[..., 1], local[..., 2])
@@ -247,6 +243,33 @@ def _are_torques(columns: Array, normals: Array) -> bool:
     return not forces.any() and bool(straight and (levers >= 0.0).all())
 
 
+def contact_program(
+    objective: Array, friction: Array, width: int, equal: Sequence[Rows],
+    least: Sequence[Rows] = (), cones: Sequence[Rows] = (), room: Array | None = None,
+) -> ConicProgram:  # fmt: skip
+    """Build a conic program over the local forces of contacts, side by side, and other numbers.
+
+    What is listed as (A, b) makes b - A x zero, not negative, or a vector in a cone of its own. The
+    friction cones come last. Without friction a cone is a ray: the other parts of the force are
+    zero. With `room` r, (k,), the first of the other numbers, t, brings forces by r_i t into the
+    cones, |f_t| <= mu f_n - r_i t.
+    """
+    n, count, flat = width * len(friction), len(objective), friction == 0.0
+    parts = np.eye(n, count).reshape(-1, width, count)
+    inside = -parts
+    inside[:, 0] *= np.where(flat, 1.0, friction)[:, None]
+    if room is not None:
+        inside[:, 0, n] = room
+    zeros = [*equal, (parts[flat, 1:].reshape(-1, count), 0.0)]
+    positive = [*least, (inside[flat, 0], 0.0)]
+    every = [*zeros, *positive, *cones, (inside[~flat].reshape(-1, count), 0.0)]
+    A = np.concatenate([rows for rows, _ in every])
+    b = np.concatenate([np.full(len(rows), right) for rows, right in every])
+    equations, bounds = (sum(len(rows) for rows, _ in kind) for kind in (zeros, positive))
+    lengths = (*(len(rows) for rows, _ in cones), *(width,) * int((~flat).sum()))
+    return ConicProgram(objective, A, b, equations, bounds, lengths)
+
+
 def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     """Find forces, whose normal parts sum to one, of the wrench nearest to zero.
 
@@ -254,24 +277,15 @@ def nearest_wrench(wrenches: WrenchSet) -> tuple[Array, Array]:
     the distance. The program always has a solution.
     """
     m, n = wrenches.G.shape
-    k, width = len(wrenches.friction), wrenches.width
-    parts, sides = force_rows(wrenches.friction, width)
-    # rows: normal parts sum to one, are not negative, distance >= |wrench|, friction cones
-    rows = [parts.sum(axis=0), -parts, np.zeros(n), -wrenches.G / wrenches.size, sides]
-    distance, b = np.zeros(k + m + n + 2), np.zeros(k + m + n + 2)
-    distance[k + 1], b[0] = -1.0, 1.0
-    A, q = np.column_stack([np.vstack(rows), distance]), np.append(np.zeros(n), 1.0)
-    answer = minimize(ConicProgram(q, A, b, 1, k, (m + 1, *(width,) * k)))
-    facing = answer.z[k + 2 : k + m + 2]
-    return into_cones(answer.x[:n], wrenches.friction), facing
-
-
-def force_rows(friction: Array, width: int) -> tuple[Array, Array]:
-    """Return rows of programs over n local forces: normal parts, (k, n), and cones, (n, n)."""
-    n = width * len(friction)
-    sides = -np.eye(n)
-    sides[::width, ::width] = -np.diag(friction)
-    return np.eye(n)[::width], sides
+    forces, distance = np.eye(n, n + 1), np.eye(n + 1)[n]
+    pushes = forces[:: wrenches.width].sum(axis=0)
+    reached = np.vstack([-distance, -wrenches.G @ forces / wrenches.size])
+    program = contact_program(
+        distance, wrenches.friction, wrenches.width, [(pushes[None], 1.0)], cones=[(reached, 0.0)]
+    )
+    answer = minimize(program)
+    start = program.zeros + program.nonnegatives + 1
+    return into_cones(answer.x[:n], wrenches.friction), answer.z[start : start + m]
 
 
 def into_cones(forces: Array, friction: Array) -> Array:

@@ -16,7 +16,6 @@ from functools import cache
 import numpy as np
 
 from grasp_core.arrays import Array, frozen
-from grasp_core.values import ForceCone
 
 PYRAMID_SIDES = 16
 """Number of sides of a pyramid, unless a program asks for more."""
@@ -27,15 +26,10 @@ def inscribed_share(sides: int = PYRAMID_SIDES) -> float:
     return math.cos(math.pi / sides)
 
 
-def inscribed_facets(cone: ForceCone, toward: Array, sides: int = PYRAMID_SIDES) -> Array:
-    """Compute inward unit normals g of a pyramid in a cone, which holds all v with g.v >= 0."""
-    return pyramid_facets(cone.axis, cone.half_angle, toward, sides)
-
-
 def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
-    """Compute inward unit normals of pyramids in equally wide cones, (..., sides, 3).
+    """Compute inward unit normals g of pyramids in equally wide cones, (..., sides, 3).
 
-    Takes `axes`, `toward` (..., 3). See `inscribed_facets` for what such a pyramid is.
+    A pyramid holds all v with g.v >= 0. Takes `axes`, `toward` (..., 3).
     """
     first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)

@@ -41,28 +41,18 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.values import FINGERS
 
-KERNEL = "grasp_core.cones.spanning_kernel"
-CAPS = (0.3, 0.5, 0.7, 0.9)
-"""Angles up to which axes may lean while they are balanced, in friction angles."""
+KERNEL = "grasp_core.cones.tilting_kernel"
 TOWARD = (0.5, 0.9)
 """Angles up to which axes may lean to meet in a point, in friction angles."""
-SWEEPS = 8
 MOVES = 60
 SLIGHT = 1e-6
-"""Size below which improvements and directions decide nothing: vertices that are off by 1e-9 of an
-object turn the normals of its small faces by a hundred times that."""
-PACE = (0.2, 1.3, 0.9, SLIGHT)
-"""Length of the first random move, in friction angles, its factors after a success and a failure,
-and the least improvement."""
+"""The same as in `tilting_kernel`."""
 BESIDE = 0.1
 """Sine of the angle between two axes above which one can serve to find a direction across the
 other."""
 FLAT = 0.5
 """Spread of normals across a plane, as a share of their next larger spread, below which they nearly
 lie in the plane."""
-SIDES = [tuple(s * np.array(p)) for s in (1, -1)
-         for p in ((1, 1, -1, -1), (1, -1, 1, -1), (1, -1, -1, 1))]  # fmt: skip
-"""Signs that put two fingers on either side of a plane."""
 CHUNK = 20_000
 """Number of quadruples that are searched at once, which needs some tens of megabytes."""
 
@@ -113,11 +103,9 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
     ways = ways * np.where(inward < -SLIGHT, -1.0, 1.0)[..., None]  # away from points outside
     best, half_angles = normals, np.full(len(normals), -np.inf)
     for cap in TOWARD:
-        axes = [
-            _into_cap(ways[:, finger], normals[:, finger], cap * thetas[:, finger])
-            for finger in range(FINGERS)
-        ]
-        found, reached = _improved(np.stack(axes, axis=1), normals, thetas)
+        axes = np.empty_like(ways)
+        compiled(KERNEL).lean_each(*map(np.ascontiguousarray, (ways, normals, thetas)), cap, axes)
+        found, reached = _improved(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best = np.where(better[:, None, None], found, best)
         half_angles = np.where(better, reached, half_angles)
@@ -125,65 +113,28 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
 
 
 def _search(normals: Array, thetas: Array) -> TiltedCones:
-    best, half_angles = normals.copy(), half_angle(normals, normals, thetas)
-    for cap in CAPS:
-        axes = _balanced(normals, cap * thetas)
-        reached = half_angle(axes, normals, thetas)
-        better = reached > half_angles + SLIGHT
-        best[better], half_angles[better] = axes[better], reached[better]
+    normals, thetas = np.ascontiguousarray(normals), np.ascontiguousarray(thetas)
+    kernel, best = compiled(KERNEL), TiltedCones(normals.copy(), np.empty(len(normals)))
+    kernel.half_angles(best.axes, normals, thetas, best.half_angles)
+    kernel.balance(tuple(best), normals, thetas)
     # singular values: the third is the normals' spread across the plane they lie in most nearly
     sizes = np.linalg.svd(normals, compute_uv=False)
     flat = np.flatnonzero(sizes[:, 2] < FLAT * sizes[:, 1])
-    best[flat], half_angles[flat] = _bent(
-        best[flat], half_angles[flat], normals[flat], thetas[flat]
-    )
-    return _improved(best, normals, thetas)
+    bent = best.axes[flat], best.half_angles[flat]
+    kernel.bend(bent, normals[flat], thetas[flat], _across(normals[flat]))
+    best.axes[flat], best.half_angles[flat] = bent
+    return _improved(best.axes, normals, thetas)
 
 
-def _bent(axes: Array, reached: Array, normals: Array, thetas: Array) -> tuple[Array, Array]:
-    """Bend axes out of a plane in which the normals nearly lie, two to either side, if better."""
+def _across(normals: Array) -> Array:
+    """Return the direction across the plane in which the normals nearly lie, (q, 3)."""
     _, _, directions = np.linalg.svd(normals)
     across = directions[:, 2]
     turns = np.cross(normals[:, :1], normals[:, 1:])
     which = np.argmax(np.linalg.norm(turns, axis=-1) > BESIDE, axis=1)
     # the side of the plane is tied to the normals, so that a turned object gets turned axes
     handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
-    across = across * np.where(handed < 0.0, -1.0, 1.0)[:, None]
-    cones = np.array(axes, order="C"), np.array(reached)
-    given = map(np.ascontiguousarray, (normals, thetas, across))
-    pace = np.array([SLIGHT, *CAPS[:-1]])
-    compiled(KERNEL).bend(cones, *given, np.array(SIDES), pace)
-    return cones
-
-
-def half_angle(axes: Array, normals: Array, thetas: Array) -> Array:
-    """Return the largest psi that (1) allows, (q,) [rad]; negative where axes do not span."""
-    reached = np.empty(len(axes))
-    compiled(KERNEL).half_angles(*map(np.ascontiguousarray, (axes, normals, thetas)), reached)
-    return reached
-
-
-def _balanced(normals: Array, caps: Array) -> Array:
-    """Point each unit vector against the sum of the others, within caps around normals."""
-    axes = np.array(normals, order="C")
-    compiled(KERNEL).balance(axes, axes.copy(), np.ascontiguousarray(caps), SWEEPS, SLIGHT)
-    return axes
-
-
-def _into_cap(vectors: Array, centers: Array, angles: Array) -> Array:
-    """Return the unit vectors nearest to vectors (q, 3) within angles (q,) of unit centres.
-
-    A vector with no component across its centre gives the centre.
-    """
-    along = np.einsum("qi,qi->q", vectors, centers)
-    across = vectors - along[:, None] * centers
-    sideways = np.linalg.norm(across, axis=1)
-    # no further than the cap's angle, and not at all without a direction
-    turn = np.where(sideways > SLIGHT, np.minimum(np.arctan2(sideways, along), angles), 0.0)[
-        :, None
-    ]
-    aside = across / np.maximum(sideways, SLIGHT)[:, None]
-    return np.cos(turn) * centers + np.sin(turn) * aside
+    return np.asarray(across * np.where(handed < 0.0, -1.0, 1.0)[:, None], dtype=np.float64)
 
 
 def _improved(axes: Array, normals: Array, thetas: Array) -> TiltedCones:
@@ -192,7 +143,7 @@ def _improved(axes: Array, normals: Array, thetas: Array) -> TiltedCones:
     first, second = _aside(axes)
     cones = TiltedCones(np.array(axes, order="C"), np.empty(len(axes)))
     given = map(np.ascontiguousarray, (normals, thetas, np.stack([first, second])))
-    compiled(KERNEL).improve(tuple(cones), *given, moves, np.array(PACE))
+    compiled(KERNEL).improve(tuple(cones), *given, moves)
     return cones
 
 

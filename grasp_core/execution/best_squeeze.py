@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
-from grasp_core.checked import instance, positive
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.errors import NoForcesError, SolverError
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Grip, unsqueezed
@@ -36,6 +35,7 @@ from grasp_core.execution.squeeze_certificate import (
     Survival,
     no_scale,
 )
+from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
@@ -100,7 +100,7 @@ def best_squeeze(
     """
     start = unsqueezed(body, contacts, friction, stiffness=stiffness, tip_radius_m=tip_radius_m)
     instance(loads, LoadSet, "loads", "gc.any_direction makes one")
-    most = None if max_push_n is None else positive(max_push_n, "max_push_n")
+    most = None if max_push_n is None else value_of(Quantity, max_push_n, "max_push_n")
     return searched(start, loads, most, motors)
 
 
@@ -139,10 +139,9 @@ class _Round:
     multipliers: Array
     balance: Array
     max_push_n: float
-    angles: Array  # worst angle of each case, (cases,) [rad]
+    worst: Cuts  # the worst angle of each case, in their order
     scales: Array
-    """Scale at which each case slips, then at which each exceeds its limit, then at which each
-    joint does under the loads, and at rest, (2 cases + groups joints,)."""
+    """Scale at which the rows at these angles reach their limits, (rows,)."""
     upper: float
     least: float
     """Scale below which the squeeze is no answer: one where the least push is sought, else zero."""
@@ -164,8 +163,9 @@ class _Round:
 
     def more_cuts(self) -> Cuts:
         """Return the rows so far and those that the squeeze breaks most."""
-        broken = np.flatnonzero(self.scales[: len(self.angles)] < self.upper * (1.0 - ROUNDING))
-        angles = np.append(self.cuts.angles, self.angles[broken])
+        slips = self.scales[: len(self.worst.cases)]
+        broken = np.flatnonzero(slips < self.upper * (1.0 - ROUNDING))
+        angles = np.append(self.cuts.angles, self.worst.angles[broken])
         return Cuts(angles, np.append(self.cuts.cases, broken))
 
 
@@ -176,17 +176,18 @@ def _solved(
     local, multipliers = _program(survival, cuts, most)
     grip = start.squeezed(np.einsum("kij,kj->ki", start.frames, local))
     own = Survival.of(grip, loads, motors)
-    reactions = own.reactions(grip.local_squeeze)
-    angles, slips = reactions.worst_angles()
-    pushes, swing = reactions.start[:, 0], reactions.swing
-    limit = most or float((pushes + swing).max()) * (1.0 + 2.0 * SAFE[-1])
-    limits = np.where(swing > 0.0, (limit - pushes) / np.where(swing > 0.0, swing, 1.0), np.inf)
-    limits = np.where(pushes <= limit * (1.0 + ROUNDING), limits, -np.inf)
+    local = grip.local_squeeze
+    angles, slips = own.reactions(local).worst_angles()
+    worst = Cuts(angles, np.arange(len(angles)))
+    rows = own.rows(worst)
+    pushes = rows.reached(local, 1.0)[rows.d > 0.0]
+    limit = most or float(pushes.max()) * (1.0 + 2.0 * SAFE[-1])
+    # of nearly equal angles a rule takes one, so that its row may end a little later
+    scales = np.append(slips, rows.scales(local, limit)[len(slips) :])
     y, z = multipliers[:-WRENCH], multipliers[-WRENCH:]
-    upper = own.bound(cuts, y, z, limit)
-    scales = np.concatenate([slips, limits, own.joints.scales(grip.local_squeeze).ravel()])
-    upper, least = max(upper, float(scales.min())), 0.0 if most else 1.0 + SAFE[-1]
-    return _Round(grip, own, cuts, y, z, limit, angles, scales, upper, least)
+    upper = max(own.bound(own.rows(cuts), y, z, limit), float(scales.min()))
+    least = 0.0 if most else 1.0 + SAFE[-1]
+    return _Round(grip, own, cuts, y, z, limit, worst, scales, upper, least)
 
 
 def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array, Array]:
@@ -197,7 +198,7 @@ def _program(survival: Survival, cuts: Cuts, most: float | None) -> tuple[Array,
     unit = most or max(float(change.max()), float(np.abs(survival.offset).max()))
     program, answer = _optimum(survival, rows, most, unit)
     # weak motors let loads end far below the limit on pushes, which is no unit for them then
-    if most and survival.joints.rows and 0.0 < answer.value < VALUE:
+    if most and survival.torque_rows and 0.0 < answer.value < VALUE:
         unit *= answer.value / VALUE
         program, answer = _optimum(survival, rows, most, unit)
     x = nearest_optimum(program, answer)
@@ -222,7 +223,7 @@ def _optimum(
     program = LinearProgram(goal, A, np.append(b, 0.0), balance, np.zeros(WRENCH))
     answer = maximize(program)
     if not isinstance(answer, Optimum):
-        raise NoForcesError(_refusal(most, strong=not survival.joints.rows))
+        raise NoForcesError(_refusal(most, strong=not survival.torque_rows))
     return program, answer
 
 
@@ -259,16 +260,13 @@ def _certified(found: _Round, loads: LoadSet, motors: Motors | None) -> BestSque
 
 def _first_reached(found: _Round) -> tuple[int, int, Array]:
     """Find the contact or the joint that ends the scale, the other being -1, and the place z."""
-    local, joints = found.grip.local_squeeze, found.survival.joints
-    reactions = found.survival.reactions(local)
-    k, cases = found.survival.contacts, len(found.angles)
-    slips, limits, torques = np.split(found.scales, [cases, 2 * cases])
+    survival, numbers = found.survival, np.arange(len(found.scales))
+    k, cases = survival.contacts, len(found.worst.cases)
+    torques = survival.torques(numbers)[:, 0]
     # only what the loads do counts: nothing grows at rest
-    loaded = np.concatenate([slips[:k], limits[:k], torques[: len(joints.limits)]])
-    place = first_best(-loaded)
-    if place >= 2 * k:
-        return -1, place - 2 * k, joints.worst_of(place - 2 * k, local)
-    contact = place % k
-    if place < k:
-        return contact, -1, reactions.worst_of(contact, float(found.angles[contact]))
-    return contact, -1, reactions.change[contact, 0] / reactions.swing[contact]
+    loaded = np.concatenate([numbers[:k], numbers[cases : cases + k], torques.ravel()])
+    place = first_best(-found.scales[loaded])
+    way = survival.rows(found.worst).worst_of(int(loaded[place]))
+    if place < 2 * k:
+        return place % k, -1, way
+    return -1, (place - 2 * k) % len(survival.motors.limits), way

@@ -15,7 +15,10 @@ contains zero, with f = 0. The mass m is held under d if (m d, d) is in C, and h
     m is held in every orientation if S(m) contains the unit ball.                      (3)
 
 *A mass that is held.* Points v of S(m), each with its forces, whose hull contains the unit ball
-prove (3); `ball_in` of `payload` shows that by triangles.
+prove (3). If triangles of points have the origin on their inner side, and every edge belongs to two
+of them in opposite directions, then the cones over them cover all directions, and the ball whose
+radius is the least distance of their planes is inside the points' hull. No hull is computed again
+to check this: sums, cross products and a look at the edges do.
 
 *A mass that is not.* For any twist y and multipliers u of the joints,
 
@@ -67,10 +70,11 @@ use, and motors do not limit them, forces that hold the mass may not pass the ch
 certificate. Then they are sought among smaller ones, which are allowed as well.
 """
 
+import importlib
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -84,20 +88,24 @@ from grasp_core.arrays import (
     Triangles,
     UnitVectors,
     cross,
+    is_array,
     of_order_one,
 )
-from grasp_core.checked import SMALLEST, number
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.declared import Declared, summary
 from grasp_core.execution.grips import Bounded
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from grasp_core.execution.payload import FIRST, ball_in, nearest_facet, outward
-from grasp_core.kinds import Quantity, Range
+from grasp_core.kinds import SMALLEST, Quantity, Range, number
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import HELD, WrenchBody
-from grasp_core.solvers.ties import first_best
+from grasp_core.solvers.ties import first_best, on_grid
 
+UNITS_LOST = 16.0
+"""Rounding units by which the volume of a triangle's cone may be off, relative to the product of
+its sides and its distance: differences, products and sums lose about one each."""
+FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+"""Directions of the first rays, whose hull contains the origin."""
 ROUNDING = 1e-9
 """Slack of the unit ball and of the upper bound, relative to them: a thousand times what sums and
 square roots lose of either."""
@@ -123,12 +131,64 @@ and how often: a thousand times smaller ones are known a thousand times better, 
 times the largest push that is taken, 1e9 N, is one newton."""
 
 
+def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
+    """Find the hull's facet nearest to zero: normal, distance; and all triangles, (t, 3)."""
+    spatial: Any = importlib.import_module("scipy.spatial")
+    hull = spatial.ConvexHull(points)
+    equations: Array = hull.equations
+    # equally near facets are taken in the order of their normals, the same on every machine
+    equations = equations[np.lexsort(on_grid(equations[:, :3]).T)]
+    nearest = equations[first_best(equations[:, 3])]
+    return nearest[:3], -float(nearest[3]), np.asarray(hull.simplices, dtype=np.int64)
+
+
+def outward(points: Array, triangles: Indices) -> Indices:
+    """Turn triangles, (t, 3), so that the origin is on their inner side."""
+    turned = np.linalg.det(points[triangles]) < 0.0
+    return np.where(turned[:, None], triangles[:, ::-1], triangles)
+
+
+def least_distance(corners: Array) -> float:
+    """Return the least distance of the origin from planes of triangles, (t, 3, 3).
+
+    The distance is negative where a triangle has the origin on its outer side, and lower by what
+    rounding may add, which is much for corners that are nearly in line.
+    """
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    if not (lengths > 0.0).all():
+        return -np.inf
+    far = np.linalg.norm(corners, axis=2).max(axis=1)
+    # a cross product is off by some rounding units of the product of its factors
+    sides = np.linalg.norm(b - a, axis=1) * np.linalg.norm(c - a, axis=1)
+    lost = UNITS_LOST * np.finfo(np.float64).eps * far * sides
+    return float(((np.einsum("ti,ti->t", normals, a) - lost) / lengths).min())
+
+
+def ball_in(points: Array, triangles: Any) -> float:
+    """Return the radius of the ball that triangles show to be in a hull, or -inf."""
+    if not (is_array(triangles, None, 3, whole=True) and len(triangles)):
+        return -np.inf
+    if triangles.min() < 0 or triangles.max() >= len(points) or not _is_closed(triangles):
+        return -np.inf
+    return least_distance(points[triangles])
+
+
+def _is_closed(triangles: Indices) -> bool:
+    """Return whether every edge belongs to two triangles, in opposite directions."""
+    edges = [tuple(edge) for t in triangles.tolist() for edge in zip(t, t[1:] + t[:1], strict=True)]
+    known = set(edges)
+    return len(known) == len(edges) and all((b, a) in known for a, b in edges)
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class HandPayload(Declared):
     """The largest mass that a hand holds in every orientation, proved from both sides.
 
     The hand stands still, its motors carry its links too, and forces are chosen anew for each
-    orientation. Everything is along the object's axes and about its centre of mass.
+    orientation. Contacts alone are held as by a hand whose links have no weight. Everything is
+    along the object's axes and about its centre of mass.
     """
 
     lower: Amount
@@ -144,9 +204,9 @@ class HandPayload(Declared):
     triangles: Triangles
     """Triangles of that hull, by the indices of their corners, (t, 3)."""
     facet: Annotated[Array, Shape(WRENCH)]
-    """Twist y in (5), (6,)."""
+    """Twist y that proves the upper bound by (5) of `carried_mass`, (6,)."""
     motor_multipliers: Annotated[Array, Shape(None)]
-    """Multipliers u of the joints in (5), (joints,)."""
+    """Multipliers u of the joints in it, (joints,)."""
     hand: "CarryingHand"
     """The contacts, and the motors and links behind them."""
 

@@ -38,11 +38,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen
-from grasp_core.checked import LARGEST, SMALLEST, number, one_of
 from grasp_core.closure.contacts import WRENCH, cross_matrix, grasp_map
 from grasp_core.declared import ByValue, trusted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.grips import Grip, check_grip
+from grasp_core.kinds import LARGEST, SMALLEST, number, one_of
 from grasp_core.quality.motors import Motors, motors_for
 
 SETTLED = 1e-11
@@ -61,7 +61,7 @@ STEP = 0.02
 MET = 1e-9
 """How near the load of first slip is met, relative to it."""
 CORRECTIONS = 6
-"""Most steps back to the torque of a joint; each squares the error."""
+"""Most steps back to a cone or limit; each squares the error."""
 MOST_STEPS = 1000
 SMALLEST_STEP = 1e-6
 """Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
@@ -166,13 +166,21 @@ class _Limits:
     push_n: float
     motors: Motors
 
-    def torques(self, held: Held, load: Array) -> tuple[Array, Array]:
-        """Compute the torques of the joints, and their change per load, (joints,) [N m] each."""
+    def room(self, held: Held, load: Array) -> tuple[Array, Array]:
+        """Return what is left to the limits of pushes, then of torques by (2), and what load takes.
+
+        A torque grows towards the limit of the sign of its change, or falls to that of the other.
+        """
         grip, back = held.grip, held.rotation  # rows times R are turned back to the object's axes
-        change = np.einsum("kij,kj->ki", grip.frames, grip.response @ load)
-        return self.motors.torques(grip.squeeze @ back), self.motors.levers @ (
-            change @ back
-        ).ravel()
+        change = grip.response @ load
+        turned = np.einsum("kij,kj->ki", grip.frames, change) @ back
+        torques, rates = (
+            self.motors.torques(grip.squeeze @ back),
+            self.motors.levers @ turned.ravel(),
+        )
+        pushes = self.push_n - grip.local_squeeze[:, 0]
+        room = np.append(pushes, self.motors.limits - np.sign(rates) * torques)
+        return room, np.append(change[:, 0], np.abs(rates))
 
 
 def first_slip(
@@ -274,21 +282,16 @@ def slip_steps(local: Array, change: Array, friction: Array) -> Array:
 
 
 def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
-    """Find how much further a load can grow, what happens there, and to which contact."""
+    """Find how much further a load can grow, what happens there, and to which contact or joint."""
     grip = held.grip
-    local, change = grip.local_squeeze, grip.response @ load
-    slips = slip_steps(local, change, grip.friction)
-    room, grows = np.maximum(most.push_n - local[:, 0], 0.0), change[:, 0]
-    asked, rates = most.torques(held, load)
-    # (2): a torque grows towards the limit of its own sign, or falls to that of the other
-    left = np.maximum(most.motors.limits - np.sign(rates) * asked, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        limits = np.where(grows > 0.0, room / grows, np.inf)
-        torques = np.where(rates != 0.0, left / np.abs(rates), np.inf)
-    if torques.min(initial=np.inf) < min(limits.min(), slips.min()):
-        return float(torques.min()), "torque limit", int(np.argmin(torques))
-    if limits.min() < slips.min():
-        return float(limits.min()), "push limit", int(np.argmin(limits))
+    slips = slip_steps(grip.local_squeeze, grip.response @ load, grip.friction)
+    room, rates = most.room(held, load)
+    steps = np.full(len(room), np.inf)
+    np.divide(np.maximum(room, 0.0), rates, out=steps, where=rates > 0.0)
+    if steps.min() < slips.min():
+        place, pushes = int(np.argmin(steps)), len(slips)
+        limited = "push limit" if place < pushes else "torque limit"
+        return float(steps.min()), limited, place if place < pushes else place - pushes
     if math.isinf(slips.min()):
         return math.inf, "none", -1
     return float(slips.min()), "slip", int(np.argmin(slips))
@@ -323,36 +326,27 @@ def _followed(
 ) -> tuple[Held, float]:
     """Follow the equilibrium to a multiple of the load, or back to where a contact slips."""
     held = under(held, start, multiple * load)
-    over = _overshoot(held.grip, load, most.push_n)
-    if over > 0.0:  # the response grew on the way
-        multiple -= over
-        held = under(held, start, multiple * load)
-    for _ in range(CORRECTIONS):
-        torques, rates = most.torques(held, load)
-        growing = np.sign(torques) * rates
-        with np.errstate(divide="ignore", invalid="ignore"):
-            back = (np.abs(torques) - most.motors.limits) / growing
-        excess = float(np.max(np.where(growing > 0.0, back, 0.0), initial=0.0))
-        if excess <= MET * multiple:
+    for _ in range(CORRECTIONS):  # the response grew on the way
+        over = _overshoot(held, load, most)
+        if over <= MET * multiple:
             break
-        multiple -= excess
+        multiple -= over
         held = under(held, start, multiple * load)
     return held, multiple
 
 
-def _overshoot(grip: Grip, load: Array, most: float) -> float:
-    """How much less load would bring contacts that have just left their cones back into them."""
-    local, change = grip.local_squeeze, grip.response @ load
-    n, t = local[:, 0], local[:, 1:]
-    across = np.linalg.norm(t, axis=1)
-    out = across - grip.friction * n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rate = np.einsum("ki,ki->k", t, change[:, 1:]) / across - grip.friction * change[:, 0]
-        back = np.where((out > 0.0) & (rate > 0.0), out / rate, 0.0)
-        if math.isfinite(most):
-            beyond = np.where(change[:, 0] > 0.0, (n - most) / change[:, 0], 0.0)
-            back = np.maximum(back, beyond)
-    return float(np.nanmax(back, initial=0.0))
+def _overshoot(held: Held, load: Array, most: _Limits) -> float:
+    """How much less load would bring all that is beyond its cone or limit back to it."""
+    local, change, friction = held.grip.local_squeeze, held.grip.response @ load, held.grip.friction
+    across = np.linalg.norm(local[:, 1:], axis=1)
+    room, rates = most.room(held, load)
+    out = np.append(across - friction * local[:, 0], -room)
+    sliding = np.einsum("ki,ki->k", local[:, 1:], change[:, 1:]) / np.where(
+        across > 0.0, across, 1.0
+    )
+    rates = np.append(sliding - friction * change[:, 0], rates)
+    beyond = (out > 0.0) & (rates > 0.0)
+    return float(np.max(out[beyond] / rates[beyond], initial=0.0))
 
 
 def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:

@@ -46,12 +46,12 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Indices, Shape, frozen
-from grasp_core.checked import LARGEST, SMALLEST, number, positive
+from grasp_core.arrays import Array, Shape, frozen
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
+from grasp_core.kinds import LARGEST, SMALLEST, Quantity, number, value_of
 from grasp_core.solvers.ties import first_best
 
 GRAVITY_M_PER_S2 = 9.80665
@@ -104,7 +104,7 @@ def any_direction(
     Raises:
         InputError: A number is out of range, or there is nothing that has any direction.
     """
-    mass = positive(mass_kg, "mass_kg")
+    mass = value_of(Quantity, mass_kg, "mass_kg")
     most = number(acceleration_m_per_s2, "acceleration_m_per_s2", least=0.0, most=LARGEST)
     offset, axes = np.zeros(WRENCH), np.zeros((WRENCH, 3))
     if gravity is None:
@@ -146,11 +146,6 @@ class Reactions:
         """L of (4) as a quadratic form in (mu, u), (k, 3, 3)."""
         return self.change @ self.change.transpose(0, 2, 1)
 
-    def leaning(self, contacts: Indices, angles: Array) -> Array:
-        """Compute B'u - mu a of (3) for contacts and an angle of each, (r, m) [N]."""
-        v = np.stack([-self.friction[contacts], np.cos(angles), np.sin(angles)], axis=1)
-        return np.einsum("rj,rjm->rm", v, self.change[contacts])
-
     def room(self, angles: Array) -> Array:
         """Compute mu n0 - u.t0 of (3) at angles of each contact, (k, g) [N]."""
         n, t = self.start[:, 0, None], self.start[:, 1:]
@@ -186,7 +181,8 @@ class Reactions:
 
     def worst_of(self, contact: int, angle: float) -> Array:
         """Find the z at which a contact slips first in a direction, of unit length, (m,)."""
-        leaning = self.leaning(np.array([contact]), np.array([angle]))[0]
+        weights = np.array([-self.friction[contact], np.cos(angle), np.sin(angle)])
+        leaning = weights @ self.change[contact]  # B'u - mu a of (3)
         return leaning / (float(np.linalg.norm(leaning)) or 1.0)
 
     def survives(self, scale: float, multipliers: Array) -> bool:

@@ -41,13 +41,14 @@ which bounds s where c.y > 0. The residual r is zero but for rounding.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Amount, Array, Figure, Indices, Shape, of_order_one
 from grasp_core.closure.contacts import WRENCH, grasp_map, in_frames
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, trusted
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet, Reactions
 from grasp_core.kinds import NotNegative
@@ -65,73 +66,6 @@ NONE = 1e-9
 """Scale that is none, in pushes over the change of contact forces at scale one."""
 
 
-@dataclass(frozen=True, eq=False)
-class JointTorques:
-    """Torques of the joints, over their longest levers, in groups: under the loads, and at rest."""
-
-    levers: Array
-    """Rows of L for forces in the contacts' frames, over the longest lever, (joints, 3k)."""
-    limits: Array  # limits c, (joints,) [N]
-    start: Array
-    """What links and offset ask for in each group, g + L f0, (groups, joints) [N]."""
-    change: Array
-    """What the ellipsoid adds in each group, L C, (groups, joints, m) [N]."""
-
-    @classmethod
-    def of(cls, motors: Motors, frames: Array, offset: Array, change: Array) -> "JointTorques":
-        """Take the joints of contacts with frames (k, 3, 3) and the responses of all groups."""
-        k, joints = len(frames), len(motors.limits)
-        groups = len(offset) // k
-        local = in_frames(motors.levers, frames)
-        arms = np.linalg.norm(local.reshape(joints, k, 3), axis=2).max(axis=1)
-        arms = np.where(arms > 0.0, arms, 1.0)  # a joint that no contact loads
-        levers = local / arms[:, None]
-        start = motors.gravity / arms + offset.reshape(groups, 3 * k) @ levers.T
-        stacked = change.reshape(groups, 3 * k, change.shape[2])
-        return cls(levers, motors.limits / arms, start, levers @ stacked)
-
-    @property
-    def rows(self) -> int:
-        """Number of rows (3)."""
-        return 2 * self.start.size
-
-    @cached_property
-    def swing(self) -> Array:
-        """How far each torque changes at scale one, |L C|, (groups, joints) [N]."""
-        return np.linalg.norm(self.change, axis=2)
-
-    def matrix(self) -> tuple[Array, Array, Array]:
-        """Build the rows (3), R f + s c <= b, of all groups: R (rows, 3k), c (rows,), b (rows,)."""
-        one_way = np.tile(self.levers, (len(self.start), 1))
-        swing = self.swing.ravel()
-        room = np.append(self.limits - self.start, self.limits + self.start)
-        return np.vstack([one_way, -one_way]), np.append(swing, swing), room
-
-    def under(self, local: Array) -> Array:
-        """Compute the torques in the middle of the loads, (groups, joints) [N]."""
-        return self.start + self.levers @ local.ravel()
-
-    def scales(self, local: Array) -> Array:
-        """Find the scale at which each torque reaches its limit, (groups, joints)."""
-        room, swing = self.limits - np.abs(self.under(local)), self.swing
-        scales = np.where(swing > 0.0, room / np.where(swing > 0.0, swing, 1.0), np.inf)
-        return np.where(room >= -ROUNDING * self.limits, scales, -np.inf)
-
-    def shares(self, local: Array, scale: float) -> Array:
-        """Compute the largest torques up to a scale of the loads, over their limits, (joints,)."""
-        reached = np.abs(self.under(local)) + scale * self.swing
-        return (reached / self.limits).max(axis=0)
-
-    def holds(self, local: Array, scale: float) -> bool:
-        """Return whether all torques stay within their limits up to a scale of the loads."""
-        return bool((self.shares(local, scale) <= 1.0 + ROUNDING).all())
-
-    def worst_of(self, joint: int, local: Array) -> Array:
-        """Find the z, of unit length, whose load takes most torque of a joint, (m,)."""
-        way = self.change[0, joint] / self.swing[0, joint]
-        return way if self.under(local)[0, joint] >= 0.0 else -way
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Cuts(Declared):
     """Angles and cases of some rows (1)."""
@@ -147,15 +81,53 @@ class Cuts(Declared):
         return cls(angles, np.repeat(np.arange(count), STARTS))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows R f + s c <= b + N d in local squeezes f (3k,), scale s and push limit N."""
+    """Rows R f + start + s |way| <= most + N d in local squeezes f (3k,), scale s, push limit N.
 
-    R: Array
-    """(rows, 3k): rows (1), then both of (2) for all cases, then both of (3) for all joints."""
-    c: Array  # what loads of scale one take, (rows,) [N]
-    b: Array  # what the offset leaves, (rows,) [N]
+    They are rows (1), then both of (2) for all cases, then (3) in one direction and in the other,
+    each for all joints under the loads, and at rest.
+    """
+
+    R: Array  # (rows, 3k)
+    start: Array  # what offset and links add, (rows,) [N]
+    way: Array  # what the ellipsoid adds for each of its axes, (rows, m) [N]
+    most: Array  # limits that are known: those of joints, else zero, (rows,) [N]
     d: Array  # one where the row is a limit on a push, else zero, (rows,)
+
+    @cached_property
+    def c(self) -> Array:
+        """What loads of scale one take, (rows,) [N]."""
+        return np.linalg.norm(self.way, axis=1)
+
+    @property
+    def b(self) -> Array:
+        """What offset and links leave, (rows,) [N]."""
+        return self.most - self.start
+
+    @property
+    def limited(self) -> NDArray[np.bool_]:
+        """Which rows are limits on pushes from above, and on torques, (rows,)."""
+        return self.d + self.most > 0.0
+
+    def limits(self, max_push_n: float) -> Array:
+        """Return what each row may reach, (rows,) [N]."""
+        return self.most + max_push_n * self.d
+
+    def reached(self, local: Array, scale: float = 0.0) -> Array:
+        """Return the most that each row reaches under a squeeze up to a scale, (rows,) [N]."""
+        return self.R @ local.ravel() + self.start + scale * self.c
+
+    def scales(self, local: Array, max_push_n: float) -> Array:
+        """Find the scale at which each row reaches its limit under a squeeze, (rows,)."""
+        limits, taken = self.limits(max_push_n), self.c
+        room = limits - self.reached(local)
+        scales = np.where(taken > 0.0, room / np.where(taken > 0.0, taken, 1.0), np.inf)
+        return np.where(room >= -ROUNDING * limits, scales, -np.inf)
+
+    def worst_of(self, row: int) -> Array:
+        """Find the z, of unit length, whose load takes most of a row, (m,)."""
+        return self.way[row] / self.c[row]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,9 +140,8 @@ class Survival:
     """Forces (n0, t0) that the offset adds in each case, (cases, 3) [N]."""
     change: Array  # the rows (a, B) of each case, (cases, 3, m) [N]
     friction: Array  # Coulomb coefficient of each case, (cases,)
-    joints: JointTorques
-    """Torques of the joints, in a group for the cases under the loads, and one for those at rest.
-    """
+    motors: Motors
+    """Joints behind the contacts, for forces in the contacts' frames, over their longest levers."""
 
     @classmethod
     def of(cls, grip: Grip, loads: LoadSet, motors: Motors | None = None) -> "Survival":
@@ -183,45 +154,63 @@ class Survival:
             change = np.concatenate([change, np.zeros_like(change)])
             mu = np.concatenate([mu, mu])
         G = in_frames(grasp_map(grip.arms / grip.size), grip.frames)
-        torques = JointTorques.of(joints, grip.frames, offset, change)
-        return cls(G, offset, change, mu, torques)
+        levers = in_frames(joints.levers, grip.frames)
+        longest = np.linalg.norm(levers.reshape(-1, len(grip.arms), 3), axis=2).max(axis=1)
+        longest = np.where(longest > 0.0, longest, 1.0)  # a joint that no contact loads
+        scaled = trusted(
+            Motors, levers=levers / longest[:, None], limits=joints.limits / longest,
+            gravity=joints.gravity / longest,
+        )  # fmt: skip
+        return cls(G, offset, change, mu, scaled)
 
     @property
     def contacts(self) -> int:
         """Number of contacts."""
         return self.G.shape[1] // 3
 
+    @property
+    def groups(self) -> int:
+        """Number of groups of cases: under the loads, and at rest where they have an offset."""
+        return len(self.friction) // self.contacts
+
+    @property
+    def torque_rows(self) -> int:
+        """Number of rows (3)."""
+        return 2 * self.groups * len(self.motors.limits)
+
+    def torques(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return those of rows (3), (2, groups, joints), of values of all rows, (rows,)."""
+        return values[len(values) - self.torque_rows :].reshape(2, self.groups, -1)
+
     def reactions(self, local: Array) -> Reactions:
         """Compute the forces of all cases with a squeeze in the contacts' frames, (k, 3) [N]."""
-        cases = len(self.friction) // self.contacts
-        return Reactions(np.tile(local, (cases, 1)) + self.offset, self.change, self.friction)
+        return Reactions(np.tile(local, (self.groups, 1)) + self.offset, self.change, self.friction)
 
     def rows(self, cuts: Cuts) -> Rows:
         """Build the rows (1) at some angles, and all of (2) and (3)."""
-        i, k, count = cuts.cases, self.contacts, len(self.friction)
-        r, mu = len(i), self.friction[cuts.cases]
-        levers, taken, room = self.joints.matrix()
-        u = np.stack([np.cos(cuts.angles), np.sin(cuts.angles)], axis=1)
-        R = np.zeros((r + 2 * count, 3 * k))
-        R[np.arange(r), 3 * (i % k)] = -mu
-        R[np.arange(r), 3 * (i % k) + 1], R[np.arange(r), 3 * (i % k) + 2] = u.T
-        normal = 3 * (np.arange(count) % k)
-        R[r + np.arange(count), normal] = 1.0
-        R[r + count + np.arange(count), normal] = -1.0
-        nothing = Reactions(self.offset, self.change, self.friction)
-        lean = np.linalg.norm(nothing.leaning(i, cuts.angles), axis=1)
-        n0, t0 = self.offset[:, 0], self.offset[:, 1:]
-        left = mu * n0[i] - np.einsum("rj,rj->r", u, t0[i])
-        limits = np.zeros(len(R) + len(room))
-        limits[r : r + count] = 1.0
+        r, count, k = len(cuts.cases), len(self.friction), self.contacts
+        squeezes = np.tile(np.eye(3 * k).reshape(k, 3, 3 * k), (self.groups, 1, 1))
+        links, none = np.tile(self.motors.gravity, self.groups), np.zeros(r + 2 * count)
+        limits = np.tile(self.motors.limits, 2 * self.groups)
+        limited = np.zeros(r + 2 * count + len(limits))
+        limited[r : r + count] = 1.0
         return Rows(
-            np.vstack([R, levers]), np.concatenate([lean, nothing.swing, nothing.swing, taken]),
-            np.concatenate([left, -n0, n0, room]), limits,
+            self._sums(cuts, squeezes),
+            self._sums(cuts, self.offset[:, :, None])[:, 0] + np.concatenate([none, links, -links]),
+            self._sums(cuts, self.change), np.append(none, limits), limited,
         )  # fmt: skip
 
-    def bound(self, cuts: Cuts, multipliers: Array, balance: Array, max_push_n: float) -> float:
+    def _sums(self, cuts: Cuts, forces: Array) -> Array:
+        """Compute what rows ask of forces in all cases, (cases, 3, m), without links, (rows, m)."""
+        sides = np.cos(cuts.angles), np.sin(cuts.angles)
+        v = np.stack([-self.friction[cuts.cases], *sides], axis=1)
+        cones, pushes = np.einsum("rj,rjm->rm", v, forces[cuts.cases]), forces[:, 0]
+        stacked = forces.reshape(self.groups, -1, forces.shape[2])
+        torques = (self.motors.levers @ stacked).reshape(-1, forces.shape[2])
+        return np.concatenate([cones, pushes, -pushes, torques, -torques])
+
+    def bound(self, rows: Rows, multipliers: Array, balance: Array, max_push_n: float) -> float:
         """Bound by (4) the scale that any squeeze with this response survives; infinite if none."""
-        rows = self.rows(cuts)
         # multipliers of any length mean the same
         multipliers, balance = of_order_one(multipliers, balance)
         taken = float(rows.c @ multipliers)
@@ -290,7 +279,8 @@ class BestSqueeze(Declared):
         must be, so that contacts mostly slip where joints reach their torques.
         """
         survival = Survival.of(self.grip, self.loads, self.motors)
-        return survival.joints.shares(self.grip.local_squeeze, self.scale)
+        reached = survival.rows(self.cuts).reached(self.grip.local_squeeze, self.scale)
+        return (survival.torques(reached) / survival.motors.limits).max(axis=(0, 1))
 
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.
@@ -312,12 +302,14 @@ class BestSqueeze(Declared):
         if not (grip.stable and (motors is None or motors.are_for(len(grip.friction)))):
             return False
         survival = Survival.of(grip, self.loads, motors)
+        if not self._fits(survival):
+            return False
+        rows = survival.rows(self.cuts)
+        upper = survival.bound(rows, self.multipliers, self.balance, self.max_push_n)
         return (
-            self._fits(survival)
-            and self._survives(survival)
-            and self._ends(survival)
-            and survival.bound(self.cuts, self.multipliers, self.balance, self.max_push_n)
-            <= self.upper * (1.0 + ROUNDING) + no_scale(survival, self.max_push_n)
+            self._survives(survival, rows)
+            and self._ends(survival, rows)
+            and upper <= self.upper * (1.0 + ROUNDING) + no_scale(survival, self.max_push_n)
         )
 
     def _fits(self, survival: Survival) -> bool:
@@ -325,10 +317,10 @@ class BestSqueeze(Declared):
         return (
             r > 0
             and bool((self.cuts.cases < cases).all())
-            and len(self.multipliers) == r + 2 * cases + survival.joints.rows
+            and len(self.multipliers) == r + 2 * cases + survival.torque_rows
             and bool((self.multipliers >= 0.0).all())
             and len(self.proofs) == cases
-            and self._names_one(survival.contacts, len(survival.joints.limits))
+            and self._names_one(survival.contacts, len(survival.motors.limits))
             and len(self.direction) == self.loads.axes.shape[1]
             and abs(float(np.linalg.norm(self.direction)) - 1.0) <= ROUNDING
         )
@@ -339,20 +331,19 @@ class BestSqueeze(Declared):
             return 0 <= self.contact < contacts
         return self.contact == -1 and 0 <= self.joint < joints
 
-    def _survives(self, survival: Survival) -> bool:
-        reactions = survival.reactions(self.grip.local_squeeze)
-        pushes = reactions.start[:, 0] + self.scale * reactions.swing
-        limited = bool((pushes <= self.max_push_n * (1.0 + ROUNDING)).all())
-        strong = survival.joints.holds(self.grip.local_squeeze, self.scale)
-        return limited and strong and reactions.survives(self.scale, self.proofs)
+    def _survives(self, survival: Survival, rows: Rows) -> bool:
+        local = self.grip.local_squeeze
+        most = rows.limits(self.max_push_n) * (1.0 + ROUNDING)
+        within = (rows.reached(local, self.scale) <= most)[rows.limited]
+        # the S-lemma proves all else: cones, and pushes from below
+        return bool(within.all()) and survival.reactions(local).survives(self.scale, self.proofs)
 
-    def _ends(self, survival: Survival) -> bool:
+    def _ends(self, survival: Survival, rows: Rows) -> bool:
         further = self.scale * (1.0 + NEAR) + no_scale(survival, self.max_push_n)
         if self.joint >= 0:
-            joints = survival.joints
-            torque = joints.under(self.grip.local_squeeze)[0, self.joint]
-            torque += joints.change[0, self.joint] @ (further * self.direction)
-            return bool(abs(torque) >= joints.limits[self.joint])
+            under = rows.reached(self.grip.local_squeeze) + rows.way @ (further * self.direction)
+            beyond = survival.torques(under) >= survival.motors.limits
+            return bool(beyond[:, 0, self.joint].any())
         reactions = survival.reactions(self.grip.local_squeeze)
         start, change = reactions.start[self.contact], reactions.change[self.contact]
         normal, *across = (start + further * change @ self.direction).tolist()

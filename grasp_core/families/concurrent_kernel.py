@@ -1,167 +1,173 @@
-"""Places and bounds concurrent grasps for many attempts, with the program of `concurrent`.
+"""Constructs concurrent grasps: four lines of force that meet in one focus point.
 
-Numbers in comments are those of its derivation. Regions are cut as its `cone_footprint` does.
-Bounds are those of the program with one common radius, over (x0, y_1 .. y_4, r), for a focus before
-and behind all fingers; `discs_kernel` says why one radius is enough. `turns` (m, 2) are the
-directions of a pyramid's facets.
+Solved: for four convex faces and a force cone at each, the focus point x0 and four discs of
+the largest common radius r, one inside each face, such that x0 lies in the force cone of
+every point of every disc. When the four force cones positively span R^3 whatever direction
+each contributes (P3), any four contacts in the discs are then in equilibrium.
+
+Derivation. On face i the points are c_i + T_i y. Let g run over the inward unit normals of
+the facets of a pyramid inscribed in force cone i. A contact at y can aim at x0 iff
+g.(x0 - c_i - T_i y) >= 0 for all g. Over a disc of radius r around y_i the worst case is
+g.(x0 - c_i - T_i y_i) - r |T_i'g|, and the disc lies inside the face iff e.y_i + r <= b for
+its edges. All of it is linear in (x0, y_1..y_4, r):
+
+    maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.c_i    for all i, g      (1)
+                            e.y_i + r <= b                             for all i, edges  (2)
+
+A curved patch has its surface at c_i + T_i y + h n_i, |h| <= eps: the left side of (1) loses
+
+    eps |g.n_i|.                                                                         (3)
+
+The disc centres stay variables: eliminating them by shrinking the face over-estimates r as
+soon as an edge of the shrunk face vanishes. In the code each disc has its own radius r_i, and
+r is the smallest of them, see `discs_kernel`.
+
+The lines of force have to meet, not the forces: fingers may also push away from a focus behind
+them, as from inside a hole. For such a finger side = -1, and the cone has to hold
+
+    side (x0 - c_i - T_i y).                                                             (4)
+
+As P3 makes the weights of the force directions positive, nothing else changes. The focus before
+all fingers and behind all of them is tried first; mixed sides follow on faces that would have no
+regions. With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
+
+Before any program, discs are bounded by the distance s_i along the axis between the planes across
+it through the focus and through the disc's centre. The two points of the disc's border across the
+axis see the focus at no less than r, hence
+
+    r <= s_i tan(half_angle).                                                            (5)
+
+The region of a finger is where the inverted cone of section 3.1 meets its face: all y that (1) and
+(2) leave with x0 fixed and r = 0.
+
+Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is this project's.
 """
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.families.concurrent import RADII, SMALLEST
+from grasp_core.families.disc_bounds_kernel import reaches
 from grasp_core.families.discs_kernel import (
+    TURNS,
     Program,
-    bounded,
+    balance,
     edges_of,
-    facet_sines,
-    largest_discs,
-    optimum,
-    reaches,
-    room_for,
+    empty_rows,
+    facets,
+    largest_last,
+    room_for_program,
 )
-from grasp_core.families.placements import (
-    LEFT,
-    NONE,
-    PLACED,
-    Attempts,
-    Corners,
-    FaceTable,
-    Footprints,
-    Placed,
-)
+from grasp_core.families.placements import Attempts, Corners, FaceTable, Footprints, Placed
 from grasp_core.geometry.polygons import ON_LINE
-from grasp_core.geometry.vectors_kernel import across, balancing_weights, dotted
-from grasp_core.solvers.ties import SAME_SHARE
+from grasp_core.geometry.vectors_kernel import dotted
 from grasp_core.values import FINGERS
 
-VARIABLES, FIRST_RADIUS, LEAST = SMALLEST + 1, RADII.start, SMALLEST
+Y, RADII, VARIABLES = 3, 11, 15
+"""Indices of the first disc centre and of the first radius among (x0, y_1 .. y_4, r_1 .. r_4), and
+the number of these variables."""
 FEWEST = 3
 """Fewest corners of a polygon."""
-BOUND_VARIABLES = 12
-"""Number of variables (x0, y_1 .. y_4, r) of a bound's program."""
 
 
 @loop("numpy")
-def place(
+def reach_limit(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> float:
+    """Bound the discs by (5) if the focus is before or behind all fingers; else infinity."""
+    if abs(sides.sum()) < FINGERS:
+        return np.inf
+    corners = Corners(faces.corners, faces.edges)
+    before, behind = reaches(corners, attempts.faces[a], attempts.axes[a])
+    # the least s_i is at most the weighted mean of all s_i
+    return (before if sides[0] > 0.0 else behind) * np.tan(attempts.half_angles[a])
+
+
+@loop("numpy")
+def concurrent_program(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> Program:
+    """Build the program of one attempt for given sides (4) of its fingers."""
+    quadruple, each = attempts.faces[a], len(TURNS)
+    count = FINGERS * each + edges_of(faces, quadruple)
+    program, row = room_for_program(count, count, RADII, VARIABLES, 0.0), 0
+    A, b = program.A, program.b
+    for finger in range(FINGERS):
+        face, columns = quadruple[finger], (Y + 2 * finger, RADII + finger)
+        aim = A[row : row + each], b[row : row + each]
+        _aim_rows(faces, attempts, (a, finger), sides[finger], columns, aim)
+        row += each
+        # (2): the disc stays inside the face
+        y, r = columns
+        for e in range(faces.edges[face]):
+            A[row, y], A[row, y + 1] = faces.E[face, e, 0], faces.E[face, e, 1]
+            A[row, r], b[row] = 1.0, faces.b[face, e]
+            row += 1
+    return program
+
+
+@loop("numpy")
+def _aim_rows(
     faces: FaceTable,
     attempts: Attempts,
-    turns: Array,
-    patterns: Array,
-    least: Array,
-    placed: Placed,
+    place: tuple[int, int],
+    side: float,
+    columns: tuple[int, int],
+    rows: tuple[Array, Array],
 ) -> None:
-    """Place a focus and the largest four equal discs for each attempt."""
-    x = np.empty(VARIABLES)
-    for a in range(len(least)):
-        count = FINGERS * (len(turns) + 1) + edges_of(faces, attempts, a)
-        worth, placed.ends[a] = least[a], NONE
-        for p in range(len(patterns)):
-            program = Program(
-                np.zeros((count + 2, VARIABLES)), np.zeros(count + 2), FIRST_RADIUS, LEAST
-            )
-            row = 0
-            for finger in range(FINGERS):
-                facets, r = (turns, patterns[p, finger]), FIRST_RADIUS + finger
-                place = (a, finger, row)
-                row = _finger_rows(faces, attempts, place, facets, program.A, program.b, r)
-                # r <= r_i: the program maximises the smallest radius
-                program.A[row, LEAST], program.A[row, r] = 1.0, -1.0
-                row += 1
-            end, merit = largest_discs(program, worth, x)
-            if end == LEFT:
-                placed.ends[a] = LEFT
-                break
-            if end == PLACED:
-                placed.ends[a], placed.merits[a] = PLACED, merit
-                worth = merit + SAME_SHARE * abs(merit)
-                _take(faces, attempts, a, patterns[p], x, placed)
-
-
-@loop("numpy")
-def _finger_rows(
-    faces: FaceTable,
-    attempts: Attempts,
-    place: tuple[int, int, int],
-    facets: tuple[Array, float],
-    A: Array,
-    b: Array,
-    r: int,
-) -> int:
-    """Fill in rows (1) and (2) of one finger, its radius in column r; return the next place."""
-    (a, finger, row), (turns, side) = place, facets
-    sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
-    # (4): the sign of the facets is the side
-    sine, cosine = side * sine, side * cosine
-    face, y = attempts.faces[a, finger], 3 + 2 * finger
-    axis, T, o = attempts.axes[a, finger], faces.frames[face], faces.origins[face]
-    first, second = across(axis, T)
-    for m in range(len(turns)):
-        flat, flat_too, height, lean = 0.0, 0.0, 0.0, 0.0
+    """Fill in the rows (1) of one finger, with its disc's centre and radius in given columns."""
+    (a, finger), (y, r), (A, b) = place, columns, rows
+    face = attempts.faces[a, finger]
+    T, o, n = faces.frames[face], faces.origins[face], faces.normals[face]
+    G = facets(attempts.axes[a, finger], attempts.half_angles[a], T)
+    for m in range(len(G)):
+        # (4): the sign of the facets is the side
         for j in range(3):
-            g = sine * axis[j] - cosine * (turns[m, 0] * first[j] + turns[m, 1] * second[j])
-            A[row, j] = -g
-            flat += g * T[j, 0]
-            flat_too += g * T[j, 1]
-            height += g * o[j]
-            lean += g * faces.normals[face, j]
-        # r |T'g| of (1), for this disc
-        A[row, y], A[row, y + 1] = flat, flat_too
-        A[row, r] = np.sqrt(flat * flat + flat_too * flat_too)
+            G[m, j] *= side
+            A[m, j] = -G[m, j]
+        A[m, y], A[m, y + 1] = dotted(T[:, 0], G[m]), dotted(T[:, 1], G[m])
+        A[m, r] = np.sqrt(A[m, y] ** 2 + A[m, y + 1] ** 2)
         # (3) takes eps |g.n| from the limit
-        b[row] = -height - faces.depths[face] * abs(lean)
-        row += 1
-    # (2): the disc stays inside the face
-    for e in range(faces.edges[face]):
-        A[row, y], A[row, y + 1] = faces.E[face, e, 0], faces.E[face, e, 1]
-        A[row, r], b[row] = 1.0, faces.b[face, e]
-        row += 1
-    return row
+        b[m] = -dotted(G[m], o) - float(faces.depths[face]) * abs(dotted(G[m], n))
 
 
 @loop("numpy")
-def _take(
+def take_concurrent(
     faces: FaceTable, attempts: Attempts, a: int, sides: Array, x: Array, placed: Placed
 ) -> None:
-    ways, weights, pushes = np.empty((FINGERS, 3)), np.empty(FINGERS), 0.0
+    """Fill in contacts, forces and the focus from the program's variables."""
+    quadruple, ways = attempts.faces[a], np.empty((FINGERS, 3))
+    placed.foci[a, 0] = x[:Y]
     for finger in range(FINGERS):
-        face, y = attempts.faces[a, finger], 3 + 2 * finger
-        placed.radii[a, finger] = x[FIRST_RADIUS + finger]
+        face, y = quadruple[finger], Y + 2 * finger
         for j in range(3):
             T = faces.frames[face, j]
             placed.positions[a, finger, j] = faces.origins[face, j] + T[0] * x[y] + T[1] * x[y + 1]
             ways[finger, j] = sides[finger] * (x[j] - placed.positions[a, finger, j])
-    balancing_weights(ways, weights)
-    for finger in range(FINGERS):
-        face = attempts.faces[a, finger]
-        pushes += weights[finger] * dotted(ways[finger], faces.normals[face])
-    for finger in range(FINGERS):
-        for j in range(3):
-            placed.forces[a, finger, j] = weights[finger] * ways[finger, j] / pushes
-    for j in range(3):
-        placed.foci[a, 0, j] = x[j]
+    balance(ways, faces.normals[quadruple], placed.forces[a])
 
 
 @loop("numpy")
 def footprints(
-    faces: FaceTable, attempts: Attempts, turns: Array, placed: Placed, cut: Footprints
+    faces: FaceTable, attempts: Attempts, foci: Array, positions: Array, cut: Footprints
 ) -> None:
-    """Cut the faces of each placed attempt to where a line in the force cone meets the focus."""
+    """Cut the faces of each attempt to where a line in the force cone meets the focus.
+
+    Takes `foci` (a, 3), and `positions` (a, 4, 3), which tell the sides.
+    """
     polygons, counts, radii = cut
     most = polygons.shape[2]
-    flat, heights = np.empty((2, most, 2)), np.empty(most)
+    flat, heights, way = np.empty((2, most, 2)), np.empty(most), np.empty(3)
+    A, b = np.empty((len(TURNS), 6)), np.empty(len(TURNS))
     for a in range(len(counts)):
-        if placed.ends[a] != PLACED:
-            continue
         for finger in range(FINGERS):
-            count = _cut(faces, attempts, (a, finger), turns, placed, (flat, heights))
-            radius = _inscribed_radius(flat[0], count)
-            if radius < 0.0:
-                continue
-            counts[a, finger], radii[a, finger] = count, radius
             face = attempts.faces[a, finger]
             T, o = faces.frames[face], faces.origins[face]
+            for j in range(3):
+                way[j] = foci[a, j] - positions[a, finger, j]
+            side = 1.0 if dotted(attempts.axes[a, finger], way) > 0.0 else -1.0
+            _aim_rows(faces, attempts, (a, finger), side, (3, 5), (A, b))
+            count = _corners(faces, face, flat[0])
+            for m in range(len(A)):
+                row = A[m, 3], A[m, 4], b[m] - dotted(A[m], foci[a])
+                count = _clip(flat, heights, count, row)
+            counts[a, finger], radii[a, finger] = count, _inscribed_radius(flat[0], count)
             for k in range(count):
                 for j in range(3):
                     polygons[a, finger, k, j] = (
@@ -170,42 +176,14 @@ def footprints(
 
 
 @loop("numpy")
-def _cut(
-    faces: FaceTable,
-    attempts: Attempts,
-    place: tuple[int, int],
-    turns: Array,
-    placed: Placed,
-    room: tuple[Array, Array],
-) -> int:
-    """Fill in the footprint's corners in plane coordinates; return how many there are.
-
-    `room` holds the corners, (2, c, 2), the first of which count, and their heights over a row.
-    """
-    (a, finger), (flat, heights) = place, room
-    face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
-    T, o = faces.frames[face], faces.origins[face]
-    count, way, corner = int(faces.edges[face]), np.empty(3), np.empty(3)
-    for k in range(count):
+def _corners(faces: FaceTable, face: int, flat: Array) -> int:
+    """Fill in a face's corners in plane coordinates; return how many there are."""
+    T, o, corner = faces.frames[face], faces.origins[face], np.empty(3)
+    for k in range(faces.edges[face]):
         for j in range(3):
             corner[j] = faces.corners[face, k, j] - o[j]
-        flat[0, k, 0], flat[0, k, 1] = dotted(T[:, 0], corner), dotted(T[:, 1], corner)
-    for j in range(3):
-        way[j] = placed.foci[a, 0, j] - placed.positions[a, finger, j]
-    side = 1.0 if dotted(axis, way) > 0.0 else -1.0
-    for j in range(3):
-        way[j] = placed.foci[a, 0, j] - o[j]
-    sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
-    first, second = across(axis, T)
-    g = np.empty(3)
-    for m in range(len(turns)):
-        for j in range(3):
-            lean = turns[m, 0] * first[j] + turns[m, 1] * second[j]
-            g[j] = side * (sine * axis[j] - cosine * lean)
-        # (1) and (3) of `concurrent` with r = 0 and x0 fixed bound the point y alone
-        limit = dotted(g, way) - float(faces.depths[face]) * abs(dotted(g, faces.normals[face]))
-        count = _clip(flat, heights, count, (dotted(T[:, 0], g), dotted(T[:, 1], g), limit))
-    return count
+        flat[k, 0], flat[k, 1] = dotted(T[:, 0], corner), dotted(T[:, 1], corner)
+    return int(faces.edges[face])
 
 
 @loop("numpy")
@@ -235,42 +213,16 @@ def _clip(flat: Array, heights: Array, count: int, row: tuple[float, float, floa
 
 @loop("numpy")
 def _inscribed_radius(polygon: Array, count: int) -> float:
-    """Compute the radius of the largest disc in a convex polygon; negative where it is left."""
+    """Compute the radius of the largest disc in a convex polygon; not finite where it is left."""
     if count < FEWEST:
-        return -1.0
-    A, b, c, x = np.ones((count, 3)), np.empty(count), np.zeros(3), np.empty(3)
+        return np.inf
+    rows = empty_rows(3, count)
     for k in range(count):
         after = (k + 1) % count
         u, v = polygon[after, 0] - polygon[k, 0], polygon[after, 1] - polygon[k, 1]
         length = np.hypot(u, v)
         if not length > 0.0:
-            return -1.0
-        A[k, 0], A[k, 1] = v / length, -u / length
-        b[k] = A[k, 0] * polygon[k, 0] + A[k, 1] * polygon[k, 1]
-    c[2] = 1.0
-    end, radius = optimum(c, A, b, -np.inf, x)
-    return radius if end == PLACED else -1.0
-
-
-@loop()
-def concurrent_bounds(
-    faces: FaceTable, attempts: Attempts, turns: Array, least: float, bounds: Array
-) -> None:
-    """Bound the discs of concurrent grasps, with the focus before or behind all fingers."""
-    corners = Corners(faces.corners, faces.edges)
-    room = np.empty((BOUND_VARIABLES + 2) * FINGERS * (len(turns) + faces.E.shape[1]))
-    for a in range(len(bounds)):
-        rows = room_for(room, BOUND_VARIABLES, FINGERS * len(turns) + edges_of(faces, attempts, a))
-        before, behind = reaches(corners, attempts.faces[a], attempts.axes[a])
-        bounds[a] = -np.inf
-        for side, reach in ((1.0, before), (-1.0, behind)):
-            # (5): no program is needed where this limit is small enough
-            limit = reach * np.tan(attempts.half_angles[a])
-            if limit <= max(least, bounds[a]):
-                bounds[a] = max(bounds[a], limit)
-                continue
-            row = 0
-            for finger in range(FINGERS):
-                place, r = (a, finger, row), BOUND_VARIABLES - 1
-                row = _finger_rows(faces, attempts, place, (turns, side), rows.At.T, rows.b, r)
-            bounds[a] = max(bounds[a], bounded(rows, max(least, bounds[a])))
+            return np.inf
+        rows.At[0, k], rows.At[1, k], rows.At[2, k] = v / length, -u / length, 1.0
+        rows.b[k] = rows.At[0, k] * polygon[k, 0] + rows.At[1, k] * polygon[k, 1]
+    return largest_last(rows, -np.inf)

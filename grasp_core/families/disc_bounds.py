@@ -13,8 +13,8 @@ c_j = x - s_j a_j, then d = (a_i - a_j) / (1 - a_i.a_j) has d.a_i = 1 and d.a_j 
 
     s_i + s_j = d.(c_j - c_i),                                                                (2)
 
-which the corners of the two faces bound. See (5) of `concurrent` and `pencil_radius_bounds` for
-what reach and width mean for discs.
+which the corners of the two faces bound. See (5) of `concurrent_kernel` and
+`pencil_radius_bounds` for what reach and width mean for discs.
 
 Across. Let N be the unit vector across both axes of one pair of a pencil. It is across the line of
 the foci too, so both foci c have the same height h = N.c, and so have the disc centres q_i and q_j
@@ -37,6 +37,7 @@ maximises the smallest radius, on the convex hulls of the faces: no choice of th
 more. For reguli the bound only says whether any slopes are feasible on the hulls.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -45,31 +46,24 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
-from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
-from grasp_core.families.pencil import pencil_radius_bounds
 from grasp_core.families.placements import (
-    LEAST_RADIUS,
     PAIRINGS,
     Attempts,
     Corners,
     FaceTable,
     face_table,
 )
+from grasp_core.families.placing import KERNEL as PLACING
 from grasp_core.families.placing import Construction
 from grasp_core.families.regulus import regulus_bounds
-from grasp_core.kinds import Family
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import RESIDUAL
-from grasp_core.values import FINGERS
+from grasp_core.values import FINGERS, FaceQuadruple
 
-KERNEL = "grasp_core.families.discs_kernel"
+KERNEL = "grasp_core.families.disc_bounds_kernel"
 LEAST_SINE = 1e-6
 """Half angles between axes with a sine up to this are so small that they bound no width."""
-KERNELS: dict[Family, str] = {
-    "concurrent": "grasp_core.families.concurrent_kernel",
-    "pencil": "grasp_core.families.pencil_kernel",
-}
 
 
 def corners_of(body: Polyhedron) -> Corners:
@@ -104,8 +98,28 @@ def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
     reaches = np.full(len(half_angles), extent)
     # (5) of `concurrent`: the least s_i is at most the weighted mean of all s_i
     concurrent: Array = reaches * np.tan(half_angles)
-    pencil = pencil_radius_bounds(reaches, widths, half_angles, PAIRINGS)
+    pencil = pencil_radius_bounds(reaches, widths, half_angles)
     return np.hstack([concurrent[:, None], pencil])
+
+
+def pencil_radius_bounds(
+    reaches: Array, widths: Array, half_angles: Array, orders: Sequence[FaceQuadruple] = PAIRINGS
+) -> Array:
+    """Bound the disc radii of pencil grasps from above, for several finger orders.
+
+    With kappa >= cos(psi), (2) and (3) of `pencil_kernel` leave r <= s tan(psi / 2) for each
+    finger, and so for the mean of any fingers. Two fingers of a pair share a focus, hence the mean
+    of their s is at most half of the bound on s_i + s_j.
+
+    With positive weights of sum lam a = 0, (1) gives sum lam_ij s_ij = -sum lam_ij a_ij.q_ij - (c_2
+    - c_1).w. In cell A the last term only lowers it. In cell B it is 2 k |w|, at most half of the
+    left side, which can therefore double.
+    """
+    depths = [
+        np.minimum(2.0 * reaches, 0.5 * np.minimum(widths[..., i, j], widths[..., k, m]))
+        for i, j, k, m in orders
+    ]
+    return np.stack(depths, axis=-1) * np.tan(half_angles / 2.0)[..., None]
 
 
 def distances(corners: Corners) -> Array:
@@ -150,18 +164,14 @@ class AttemptBounds:
             np.ascontiguousarray(attempts.axes),
             np.ascontiguousarray(attempts.half_angles),
         )
-        if construction.limits is None:
-            merits, _ = regulus_bounds(self._table, attempts, -np.inf)
+        if construction.patterns is None:
+            merits, _ = regulus_bounds(self._table, attempts, any_choice=True)
             # merits are no radii: only a proof that excludes all slopes tells anything
             return np.where(merits == -np.inf, -np.inf, np.inf)
         # hulls stand for faces of several pieces: they offer no less than any piece
-        kernel = compiled(KERNELS[construction.family])
-        bounds = np.empty(len(attempts.faces))
-        if construction.family == "pencil":
-            kernel.pencil_bounds(self._table, attempts, LEAST_RADIUS, least, bounds)
-        else:
-            turns = np.array(facet_turns(PYRAMID_SIDES))
-            kernel.concurrent_bounds(self._table, attempts, turns, least, bounds)
+        bounds, pencil = np.empty(len(attempts.faces)), construction.family == "pencil"
+        kernel = compiled(PLACING)
+        kernel.bounds(pencil, self._table, attempts, construction.patterns, least, bounds)
         # a proved bound may be off by what the check of multipliers allows
         return bounds + RESIDUAL
 

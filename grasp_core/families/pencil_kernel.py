@@ -1,226 +1,192 @@
-"""Places and bounds pencil grasps for many attempts, with the program of `pencil`.
+"""Constructs pencil grasps: two pairs of lines of force, each with a focus on a common line.
 
-Numbers in comments are those of its derivation. Bounds are those of programs with one common
-radius, in both cells; `discs_kernel` says why one radius is enough. Their rows are those of the
-placements with the columns of all radii added. Their ball about each focus is no larger than
-needed, R = r + the largest depth, which leaves the variables (x0, k, r).
+Solved: for four convex faces with a force cone each, grouped into the pairs (0, 1) and
+(2, 3), two focus points c_1, c_2 and discs of the largest common radius r, one inside each
+face, such that any four contacts in the discs have equilibrium forces forming two flat
+pencils. The four cones must positively span whatever direction each contributes (P3).
+
+Derivation. Let a_ij be the axes of pair i, P_i the plane they span with unit normal N_i, and
+lam > 0 the weights with sum lam_ij a_ij = 0. Then w = lam_11 a_11 + lam_12 a_12 lies in both
+planes; u = w / |w| is the direction of the focus line c_1 c_2. From c_i the axis a_ij leads
+back to the disc centre
+
+    q_ij = c_i - s_ij a_ij,    s_ij = n_ij.(c_i - o_ij) / (n_ij.a_ij).                       (1)
+
+A ball of radius R about c_i lies in the cone of every point of the disc of radius r_ij iff
+
+    s_ij sin(psi) >= R + kappa_ij r_ij,   kappa = 1 if the axis leans by alpha >= psi from   (2)
+                                          the normal, else cos(psi - alpha).
+
+Now take any contacts x_ij in the discs and project them along N_i into the plane of the focus
+line and P_i. The direction c_i - x_ij stays in the cone when projected, and P3 keeps it off
+the line u and on the side of a_ij; the two axes are on opposite sides. So the line L_i through
+x_i1 and x_i2 passes the focus line at some e_i with an offset along N_i of at most
+
+    max_j r_ij <= R,                                                                         (3)
+
+and c_1 - e_1 and e_2 - c_2, sums of cone directions, point along +w. Join the two crossing
+points by a line L. If c_1 and c_2 lie between e_1 and e_2, the offset of L there is a convex
+combination of two offsets of at most R, so L meets both balls, in z_1 and z_2. The lines
+(x_ij, z_i) lie in the cones and form two flat pencils that share L: dependent, and by P3 in
+equilibrium. The order is safe in two cells, c_1 = x0 -+ k u, c_2 = x0 +- k u with k >= 0:
+
+    A   (c_2 - c_1).w >= 0: e_1 < c_1 <= c_2 < e_2 whatever the contacts;                    (4)
+    B   (c_2 - c_1).w <= 0 and 2 k <= s_ij a_ij.u_i - r_ij |T_ij'u|, u_1 = u, u_2 = -u: the  (5)
+        right side bounds |c_i - e_i| from below, so neither focus passes the other crossing.
+
+Each is a linear program in (x0, k, R, r_11..r_22). The paper's text leaves out the order:
+outside both cells extending L beyond e_1 and e_2 can magnify its offset without limit. The
+paper's program often ends there, and some of its regions then hold contacts out of equilibrium.
+As (3) is needed, the radii are at most depth times tan(theta / 2) when axis = normal.
+
+Where the surface of a curved patch is up to eps off its plane, contacts are that much nearer to the
+borders of their cones and farther from P_i: the right sides of (2) and of R >= r_ij in (3) grow by
+eps, and the bound of (5) loses eps |n_ij.u|. (6)
+
+Source: Sudsang & Ponce 1995, section 3.2; the order and the two cells are this project's.
 """
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.families.discs_kernel import Program, bounded, edges_of, largest_discs, room_for
-from grasp_core.families.pencil import BALL, CELL_A, CELL_B, RADII, SMALLEST, VARIABLES, K
-from grasp_core.families.placements import LEFT, NONE, PLACED, Attempts, FaceTable, Placed
-from grasp_core.geometry.vectors_kernel import (
-    angle_between,
-    balancing_weights,
-    dotted,
-    focus_direction,
-)
-from grasp_core.solvers.ties import SAME_SHARE
+from grasp_core.families.discs_kernel import Program, balance, edges_of, room_for_program
+from grasp_core.families.placements import LEAST_RADIUS, Attempts, FaceTable, Placed
+from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_direction
 from grasp_core.values import FINGERS
 
-FIRST_RADIUS = RADII.start
-SIGN_A, SIGN_B = CELL_A[0], CELL_B[0]
-"""Sign of k u in the focus of the first two fingers, for the two orders of the foci."""
-FIRST_BALL, FIRST_EDGE = 1, 1 + 3 * FINGERS
-"""Places of the first row (2), after the row of the gap, and of the first edge's row."""
-BOUND_VARIABLES = 5
-"""Number of variables (x0, k, r) of a bound's program."""
+K, BALL, RADII, VARIABLES = 3, 4, 5, 9
+"""Indices of k, R and the first radius among (x0, k, R, r_11 .. r_22), and their number."""
+ONE = 4
+"""Place of the constant in functions of (x0, k)."""
 
 
 @loop("numpy")
-def place(
-    faces: FaceTable, attempts: Attempts, least_gap: float, least: Array, placed: Placed
-) -> None:
-    """Place two foci and the largest four equal discs for each attempt."""
-    x, discs = np.empty(VARIABLES), _room_for_discs()
-    for a in range(len(least)):
-        u, edges = focus_direction(attempts.axes[a]), edges_of(faces, attempts, a)
-        worth, placed.ends[a] = least[a], NONE
-        for sign in (SIGN_A, SIGN_B):
-            count = FIRST_EDGE + edges + (FINGERS if sign == SIGN_B else 0)
-            program = Program(
-                np.zeros((count + 2, VARIABLES)), np.zeros(count + 2), FIRST_RADIUS, SMALLEST
-            )
-            _fill(faces, attempts, (a, sign, u), least_gap, discs, program.A, program.b)
-            end, merit = largest_discs(program, worth, x)
-            if end == LEFT:
-                placed.ends[a] = LEFT
-                break
-            if end == PLACED:
-                placed.ends[a], placed.merits[a] = PLACED, merit
-                worth = merit + SAME_SHARE * abs(merit)
-                _take(faces, attempts, (a, sign, u), discs, x, placed)
+def pencil_program(faces: FaceTable, attempts: Attempts, a: int, signs: Array) -> Program:
+    """Build the program of one attempt for one order of the foci, by signs of k u as in (4).
 
-
-@loop()
-def pencil_bounds(
-    faces: FaceTable, attempts: Attempts, least_gap: float, least: float, bounds: Array
-) -> None:
-    """Bound the discs of pencil grasps from above, for both orders of the foci."""
-    most, discs = FIRST_EDGE + FINGERS * (1 + faces.E.shape[1]), _room_for_discs()
-    room, A, b = np.empty((BOUND_VARIABLES + 2) * most), np.empty((most, VARIABLES)), np.empty(most)
-    for a in range(len(bounds)):
-        u, bounds[a], largest = focus_direction(attempts.axes[a]), -np.inf, 0.0
-        for finger in range(FINGERS):
-            largest = max(largest, faces.depths[attempts.faces[a, finger]])
-        for sign in (SIGN_A, SIGN_B):
-            A[:], b[:] = 0.0, 0.0
-            count, row = _fill(faces, attempts, (a, sign, u), least_gap, discs, A, b), 0
-            rows = room_for(room, BOUND_VARIABLES, count - 2 * FINGERS)
-            for k in range(count):
-                if FIRST_BALL + FINGERS <= k < FIRST_EDGE:  # rows of single radii
-                    continue
-                for j in range(K + 1):
-                    rows.At[j, row] = A[k, j]
-                # R of (3) is r and the largest depth, by (6)
-                rows.At[-1, row] = A[k, BALL]
-                for finger in range(FINGERS):
-                    rows.At[-1, row] += A[k, FIRST_RADIUS + finger]
-                rows.b[row] = b[k] - largest * A[k, BALL]
-                row += 1
-            bounds[a] = max(bounds[a], bounded(rows, max(least, bounds[a])))
-
-
-@loop("numpy")
-def _room_for_discs() -> tuple[Array, Array, Array]:
-    """Make room for C (4, 2, variables), s (4, variables + 1) and q (4, 2) of `_discs`."""
-    return (
-        np.zeros((FINGERS, 2, VARIABLES)), np.zeros((FINGERS, VARIABLES + 1)),
-        np.empty((FINGERS, 2)),
-    )  # fmt: skip
-
-
-@loop("numpy")
-def _fill(
-    faces: FaceTable,
-    attempts: Attempts,
-    place: tuple[int, float, Array],
-    least_gap: float,
-    discs: tuple[Array, Array, Array],
-    A: Array,
-    b: Array,
-) -> int:
-    """Fill in the rows for one order of the foci; return their number."""
-    (a, sign, u), (_, s, _) = place, discs
+    The common radius leaves R = r + the largest depth, by (3) and (6).
+    """
+    quadruple, near = attempts.faces[a], signs[0] > 0.0
+    common = 1 + FINGERS + edges_of(faces, quadruple) + (FINGERS if near else 0)
+    deepest = faces.depths[quadruple].max()
+    program = room_for_program(common, common + FINGERS, BALL, VARIABLES, deepest)
+    A, b = program.A, program.b
+    u = focus_direction(attempts.axes[a])
+    s, y = _centers(faces, attempts, (a, u), signs)
     # the foci are 2 k apart
-    A[0, K], b[0] = -2.0, -least_gap
-    _discs(faces, attempts, place, discs)
-    _cone_rows(faces, attempts, a, s, A, b)
-    row = _edge_rows(faces, attempts, a, discs, A, b)
-    if sign == SIGN_A:
-        return row
+    A[0, K], b[0] = -2.0, -LEAST_RADIUS
+    row = _disc_rows(faces, attempts, a, (s, y), (A, b))
+    if near:
+        row = _near_rows(faces, attempts, (a, u), s, (A, b), row)
     for finger in range(FINGERS):
-        # (5): a focus of cell B does not pass the other pair's crossing point
-        face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
-        T = faces.frames[face]
-        toward = (1.0 if finger < FINGERS // 2 else -1.0) * dotted(axis, u)
-        for j in range(K + 1):
-            A[row, j] = -toward * s[finger, j]
-        A[row, K] += 2.0
-        # r |T'u| of (5)
-        A[row, FIRST_RADIUS + finger] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
-        # (6) takes eps |n.u| from the limit
-        off = faces.depths[face] * abs(dotted(faces.normals[face], u))
-        b[row] = toward * s[finger, VARIABLES] - off
+        # (3) loses eps by (6)
+        A[row, RADII + finger], A[row, BALL] = 1.0, -1.0
+        b[row] = -faces.depths[quadruple[finger]]
         row += 1
-    return row
+    return program
 
 
 @loop("numpy")
-def _discs(
-    faces: FaceTable,
-    attempts: Attempts,
-    place: tuple[int, float, Array],
-    discs: tuple[Array, Array, Array],
-) -> None:
-    """Fill in depths s and disc centres C, q by (1), as linear functions of the variables."""
-    (a, cell, u), (C, s, q) = place, discs
+def _centers(
+    faces: FaceTable, attempts: Attempts, place: tuple[int, Array], signs: Array
+) -> tuple[Array, Array]:
+    """Write (1) as functions of (x0, k, 1): depths s (4, 5), plane points of centres (4, 2, 5)."""
+    (a, u), s, y = place, np.empty((FINGERS, 5)), np.empty((FINGERS, 2, 5))
     for finger in range(FINGERS):
         face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
         n, o, T = faces.normals[face], faces.origins[face], faces.frames[face]
-        sign, along = (cell if finger < FINGERS // 2 else -cell), dotted(n, axis)
-        for j in range(3):
-            s[finger, j] = n[j] / along
-        s[finger, K], s[finger, VARIABLES] = sign * dotted(n, u) / along, -dotted(n, o) / along
+        turned, along = signs[finger] * u, dotted(n, axis)
+        _heights(n, turned, o, s[finger])
+        for j in range(5):
+            s[finger, j] /= along
         for t in range(2):
-            back, moved, offset = dotted(T[:, t], axis), dotted(T[:, t], u), dotted(T[:, t], o)
-            for j in range(3):
-                C[finger, t, j] = T[j, t] - back * s[finger, j]
-            C[finger, t, K] = sign * moved - back * s[finger, K]
-            q[finger, t] = -(back * s[finger, VARIABLES] + offset)
+            _heights(T[:, t], turned, o, y[finger, t])
+            back = dotted(T[:, t], axis)
+            for j in range(5):
+                y[finger, t, j] -= back * s[finger, j]
+    return s, y
 
 
 @loop("numpy")
-def _cone_rows(faces: FaceTable, attempts: Attempts, a: int, s: Array, A: Array, b: Array) -> None:
-    """Fill in rows (2), (3) and r <= r_ij, four of each."""
-    psi = attempts.half_angles[a]
-    for finger in range(FINGERS):
-        face, r = attempts.faces[a, finger], FIRST_RADIUS + finger
-        lean = angle_between(faces.normals[face], attempts.axes[a, finger])
-        # (2), with eps off the limit by (6)
-        ball = FIRST_BALL + finger
-        inside, below = ball + FINGERS, ball + 2 * FINGERS
-        for j in range(K + 1):
-            A[ball, j] = -np.sin(psi) * s[finger, j]
-        A[ball, BALL], A[ball, r] = 1.0, 1.0 if lean >= psi else np.cos(psi - lean)
-        b[ball] = np.sin(psi) * s[finger, VARIABLES] - faces.depths[face]
-        # (3) loses eps in the same way
-        A[inside, r], A[inside, BALL], b[inside] = 1.0, -1.0, -faces.depths[face]
-        A[below, r], A[below, SMALLEST] = -1.0, 1.0
+def _heights(d: Array, turned: Array, o: Array, found: Array) -> None:
+    """Write the height d.(c - o) of a focus c = x0 + k (+-u) as a function of (x0, k, 1)."""
+    for j in range(3):
+        found[j] = d[j]
+    found[K], found[ONE] = dotted(d, turned), -dotted(d, o)
 
 
 @loop("numpy")
-def _edge_rows(
+def _disc_rows(
     faces: FaceTable,
     attempts: Attempts,
     a: int,
-    discs: tuple[Array, Array, Array],
-    A: Array,
-    b: Array,
+    centers: tuple[Array, Array],
+    rows: tuple[Array, Array],
 ) -> int:
-    """Fill in rows that keep the discs inside their faces; return the next place."""
-    (C, _, q), row = discs, FIRST_EDGE
+    """Fill in, from row 1 on, the rows (2) and those that keep discs in faces; return the next."""
+    (s, y), (A, b), psi, row = centers, rows, attempts.half_angles[a], 1
     for finger in range(FINGERS):
-        face = attempts.faces[a, finger]
+        face, r = attempts.faces[a, finger], RADII + finger
+        lean = angle_between(faces.normals[face], attempts.axes[a, finger])
+        # (2), with eps off the limit by (6)
+        for j in range(ONE):
+            A[row, j] = -np.sin(psi) * s[finger, j]
+        A[row, BALL], A[row, r] = 1.0, 1.0 if lean >= psi else np.cos(psi - lean)
+        b[row] = np.sin(psi) * s[finger, ONE] - faces.depths[face]
+        row += 1
         for e in range(faces.edges[face]):
             E = faces.E[face, e]
-            for j in range(K + 1):
-                A[row, j] = E[0] * C[finger, 0, j] + E[1] * C[finger, 1, j]
-            A[row, FIRST_RADIUS + finger] = 1.0
-            b[row] = faces.b[face, e] - (E[0] * q[finger, 0] + E[1] * q[finger, 1])
+            for j in range(ONE):
+                A[row, j] = E[0] * y[finger, 0, j] + E[1] * y[finger, 1, j]
+            A[row, r] = 1.0
+            b[row] = faces.b[face, e] - (E[0] * y[finger, 0, ONE] + E[1] * y[finger, 1, ONE])
             row += 1
     return row
 
 
 @loop("numpy")
-def _take(
+def _near_rows(
     faces: FaceTable,
     attempts: Attempts,
-    place: tuple[int, float, Array],
-    discs: tuple[Array, Array, Array],
-    x: Array,
-    placed: Placed,
+    place: tuple[int, Array],
+    s: Array,
+    rows: tuple[Array, Array],
+    row: int,
+) -> int:
+    """Fill in the rows (5), which keep the foci of cell B near each other; return the next row."""
+    (a, u), (A, b) = place, rows
+    for finger in range(FINGERS):
+        face, T = attempts.faces[a, finger], faces.frames[attempts.faces[a, finger]]
+        # u_1 = u and u_2 = -u
+        toward = (1.0 if finger < FINGERS // 2 else -1.0) * dotted(attempts.axes[a, finger], u)
+        for j in range(ONE):
+            A[row, j] = -toward * s[finger, j]
+        A[row, K] += 2.0
+        A[row, RADII + finger] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
+        # (6) takes eps |n.u| from the limit
+        off = faces.depths[face] * abs(dotted(faces.normals[face], u))
+        b[row] = toward * s[finger, ONE] - off
+        row += 1
+    return row
+
+
+@loop("numpy")
+def take_pencil(
+    faces: FaceTable, attempts: Attempts, a: int, signs: Array, x: Array, placed: Placed
 ) -> None:
-    (a, sign, u), (C, _, q), weights, pushes = place, discs, np.empty(FINGERS), 0.0
-    axes = attempts.axes[a]
-    balancing_weights(axes, weights)
+    """Fill in contacts, forces along the axes and foci from the program's variables."""
+    u = focus_direction(attempts.axes[a])
+    _, y = _centers(faces, attempts, (a, u), signs)
     for finger in range(FINGERS):
         face = attempts.faces[a, finger]
-        pushes += weights[finger] * dotted(axes[finger], faces.normals[face])
-        placed.radii[a, finger] = x[FIRST_RADIUS + finger]
-        first, second = q[finger, 0], q[finger, 1]
-        for j in range(K + 1):
-            first += C[finger, 0, j] * x[j]
-            second += C[finger, 1, j] * x[j]
+        first, second = y[finger, 0, ONE], y[finger, 1, ONE]
+        for j in range(ONE):
+            first += y[finger, 0, j] * x[j]
+            second += y[finger, 1, j] * x[j]
         for j in range(3):
             T = faces.frames[face, j]
             placed.positions[a, finger, j] = faces.origins[face, j] + T[0] * first + T[1] * second
-    for j in range(3):
-        for finger in range(FINGERS):
-            placed.forces[a, finger, j] = weights[finger] * axes[finger, j] / pushes
-        placed.foci[a, 0, j] = x[j] + sign * x[K] * u[j]
-        placed.foci[a, 1, j] = x[j] - sign * x[K] * u[j]
+    for pair in range(2):
+        placed.foci[a, pair] = x[:3] + signs[2 * pair] * x[K] * u
+    balance(attempts.axes[a], faces.normals[attempts.faces[a]], placed.forces[a])

@@ -1,13 +1,7 @@
-"""Holds placements, the results of constructions, and solves the program of their discs.
+"""Holds placements, the results of constructions, and the tables that compiled code works on.
 
 A placement is contacts with the forces that hold them. Lengths are in the pieces' units, where the
 object has size one.
-
-Discs. A first program maximises the smallest radius. That radius may be negative, so the program is
-always feasible and the sign of its optimum, with the multipliers that prove it, decides. The
-second keeps the smallest radius and maximises the sum of the four, so that contacts whose discs
-have room do not end up against an arbitrary edge. Among its optima the point nearest to the origin
-of the variables is taken (see `ties`).
 
 Inputs and outputs of compiled code are plain arrays; filling them does not need numba.
 """
@@ -19,19 +13,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.cones.spanning import balancing_weights
-from grasp_core.errors import SolverError
+from grasp_core.compiled import compiled
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.solvers.lp import (
-    RESIDUAL,
-    Below,
-    Infeasible,
-    LinearProgram,
-    Optimum,
-    maximize,
-    maximize_above,
-)
-from grasp_core.solvers.ties import nearest_optimum
 from grasp_core.values import FINGERS
 
 FingerOrder: TypeAlias = tuple[int, int, int, int]
@@ -61,70 +44,16 @@ class Placement:
     """Forces for which the contacts were chosen, (4, 3); None if they are those of `forces`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NoPlacement:
-    """The answer of a construction that finds no contacts on these pieces.
-
-    `bound` is the largest merit that its programs' multipliers allow; minus infinity where only
-    some slopes were tried.
-    """
-
-    bound: float
-
-
-def balanced_forces(pieces: Sequence[FacePiece], directions: Array) -> Array:
+def balanced_forces(normals: Array, ways: Array) -> Array:
     """Scale four positively spanning directions to forces whose sum is zero, (4, 3)."""
-    forces = balancing_weights(directions)[:, None] * directions
-    normals = np.array([piece.normal for piece in pieces])
-    return forces / float(np.einsum("ki,ki->", forces, normals))
-
-
-def focus_direction(axes: Array) -> Array:
-    """Compute the direction u of the line through both foci of a pencil, (..., 3).
-
-    The first focus belongs to fingers 0 and 1, the second to fingers 2 and 3. The direction lies in
-    the planes of both pairs, and the first pair pushes along it: with positive weights lam of sum
-    lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
-    """
-    first = np.einsum("...i,...ij->...j", balancing_weights(axes)[..., :2], axes[..., :2, :])
-    w = np.asarray(first, dtype=np.float64)
-    return w / np.linalg.norm(w, axis=-1, keepdims=True)
-
-
-def largest_discs(
-    A: Array, b: Array, radii: slice, smallest: int, least: float
-) -> tuple[Array, float] | NoPlacement:
-    """Find the largest four equal discs, then enlarge each, subject to rows A x <= b.
-
-    Gives the variables (n,), whose radii are reduced by the error of a program's answer, and the
-    largest value of the smallest radius; or a proved bound below `least` on it.
-    """
-    n = A.shape[1]
-    common = np.eye(n)[smallest]
-    first = maximize_above(LinearProgram(common, A, b), least)
-    if isinstance(first, Infeasible):
-        raise SolverError(
-            "the solver called a disc program infeasible, though small discs always fit"
-        )
-    if isinstance(first, Below) or first.value < least:
-        return NoPlacement(first.bound if isinstance(first, Below) else first.value)
-    kept = LinearProgram(
-        np.eye(n)[radii].sum(axis=0),
-        np.vstack([A, -common]),
-        np.append(b, -first.value * (1.0 - KEPT)),
-    )
-    try:
-        second = maximize(kept)
-    except SolverError:
-        second = first  # within rounding of infeasible where discs are tiny
-    x = np.array(nearest_optimum(kept, second) if isinstance(second, Optimum) else first.x)
-    x[radii] = np.maximum(x[radii] - RESIDUAL, 0.0)
-    return x, first.value - RESIDUAL
+    forces = np.empty((FINGERS, 3))
+    compiled("grasp_core.families.discs_kernel").balance(ways, normals, forces)
+    return forces
 
 
 LEFT, NONE, PLACED = -1, 0, 1
-"""Ends of an attempt: left to the methods that place one by one, proved to hold no discs as large
-as asked for, or placed."""
+"""Ends of an attempt: neither solved nor refuted, proved to hold nothing as good as asked for, or
+placed."""
 
 
 class FaceTable(NamedTuple):
@@ -199,8 +128,9 @@ class Footprints(NamedTuple):
     polygons: Array
     """Corners in space, (a, 4, c, 3); a region with fewer corners leaves rows unused."""
     counts: Indices
-    """Number of corners of each region, (a, 4); zero where it is left to `families.concurrent`."""
-    radii: Array  # radii of the largest discs in the regions, (a, 4)
+    """Number of corners of each region, (a, 4)."""
+    radii: Array
+    """Radii of the largest discs in the regions, (a, 4); not finite where they are left."""
 
 
 def room_for(count: int) -> Placed:

@@ -1,10 +1,8 @@
 """Places contacts for many attempts of one construction, with the regions of the fingers.
 
-Compiled code solves the programs of the concurrent and the pencil construction and checks its
-answers by their residuals; what it does not prove is left to the construction itself, one attempt
-at a time. Of several choices of cones and pieces the contacts with the largest discs count.
-
 The paper's three constructions have one interface here, `Construction`, which the planner uses.
+Compiled code solves their programs and checks its answers by their residuals; programs that it
+leaves are solved by HiGHS. Of several choices of cones and pieces the best contacts count.
 
 Contacts on curved patches move from the planes of the patches to the true surface.
 
@@ -21,43 +19,35 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple, TypeAlias
+from itertools import product
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
-from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
+from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.declared import trusted
 from grasp_core.errors import SolverError
-from grasp_core.families.concurrent import (
-    BEFORE,
-    BEHIND,
-    MIXED_SIDES,
-    cone_footprint,
-    place_concurrent,
-    place_on_mixed_sides,
-)
-from grasp_core.families.pencil import place_pencil
 from grasp_core.families.placements import (
+    KEPT,
     LEAST_RADIUS,
     LEFT,
+    NONE,
     PAIRINGS,
-    PLACED,
     Attempts,
     FaceTable,
     FingerOrder,
     Footprints,
-    NoPlacement,
     Placed,
     Placement,
     balanced_forces,
     face_table,
     room_for,
 )
-from grasp_core.families.regulus import nearly_symmetric, place_regulus
-from grasp_core.geometry.polygons import clip, edge_rows, tidy
+from grasp_core.families.regulus import nearly_symmetric, place_reguli
+from grasp_core.geometry.polygons import circle, clip, edge_rows, tidy
 from grasp_core.objects.face_pieces import (
     FacePiece,
     FaceShape,
@@ -66,7 +56,8 @@ from grasp_core.objects.face_pieces import (
     inscribed_radius,
     piece_of,
 )
-from grasp_core.solvers.ties import graded, surpassing
+from grasp_core.solvers.lp import Infeasible, LinearProgram, Optimum, maximize, maximize_above
+from grasp_core.solvers.ties import graded, nearest_optimum, surpassing
 from grasp_core.values import (
     FINGERS,
     ContactRegion,
@@ -77,90 +68,19 @@ from grasp_core.values import (
     four,
 )
 
-Region: TypeAlias = Callable[[FacePiece, ForceCone, Placement, int], ContactRegion]
-
+KERNEL = "grasp_core.families.placing_kernel"
 AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
+BEFORE, BEHIND = np.ones(FINGERS), -np.ones(FINGERS)
+MIXED_SIDES = np.array([s for s in product((1.0, -1.0), repeat=FINGERS) if abs(sum(s)) < FINGERS])
+"""Patterns of a concurrent grasp: sides on which fingers have the focus, see `concurrent_kernel`.
+"""
+CELL_A, CELL_B = np.array([-1.0, -1.0, 1.0, 1.0]), np.array([1.0, 1.0, -1.0, -1.0])
+"""Patterns of a pencil: signs of k u in the foci of the fingers, see `pencil_kernel`."""
 DISC_CORNERS = 64
 """Number of points that are listed on the border of a disc."""
-
-
-@dataclass(frozen=True, slots=True)
-class Construction:
-    """The construction of one family, with the functions that the planner needs for it."""
-
-    family: Family
-    orders: tuple[FingerOrder, ...]
-    """Orders of the fingers on the same faces that give different grasps."""
-    place: Callable[[Sequence[FacePiece], Sequence[ForceCone], float], Placement | NoPlacement]
-    """Function that places contacts, given pieces, force cones and the least merit that counts."""
-    limits: slice | None
-    """Columns of `disc_limits`, one per finger order; None where no disc is claimed."""
-    admits: Callable[[Array, Array], NDArray[np.bool_]] | None
-    """Function that returns for which quadruples a program may be feasible, (q,), from normals in
-    finger order, (q, 4, 3), and half-angles, (q,) [rad]; None for all."""
-    region: Region  # function that makes the region of one finger, in the pieces' units
-
-    @property
-    def least(self) -> float:
-        """Return the merit that a placement must exceed to count."""
-        return LEAST_RADIUS if self.limits else -math.inf
-
-
-def _cone_region(
-    piece: FacePiece, cone: ForceCone, placed: Placement, finger: int
-) -> ContactRegion:
-    polygon = cone_footprint(piece, cone, placed.foci[0], placed.positions[finger])
-    E, b = edge_rows((polygon - piece.origin) @ piece.frame)
-    return ContactRegion("cone", polygon, inscribed_radius(E, b))
-
-
-def circle() -> Array:
-    """Return points on the border of a disc of radius one, (n, 2)."""
-    turns = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
-    return np.column_stack([np.cos(turns), np.sin(turns)])
-
-
-def _disc_region(piece: FacePiece, _: ForceCone, placed: Placement, finger: int) -> ContactRegion:
-    ring = circle() @ piece.frame.T
-    radius = float(placed.radii[finger])
-    return ContactRegion("disc", placed.positions[finger] + radius * ring, radius)
-
-
-def regions_of(
-    region: Region, pieces: Sequence[FacePiece], cones: Sequence[ForceCone], placed: Placement
-) -> tuple[ContactRegion, ...]:
-    """Make the regions of all fingers, in the pieces' units."""
-    return tuple(
-        region(piece, cone, placed, finger)
-        for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True))
-    )
-
-
-def point_region(_: FacePiece, __: ForceCone, placed: Placement, finger: int) -> ContactRegion:
-    """Make a region of one point, the contact itself."""
-    return ContactRegion("point", placed.positions[finger][None], 0.0)
-
-
-CONSTRUCTIONS: dict[Family, Construction] = {
-    "concurrent": Construction(
-        "concurrent", AS_LISTED, place_concurrent, slice(0, 1), None, _cone_region
-    ),
-    "pencil": Construction("pencil", PAIRINGS, place_pencil, slice(1, 4), None, _disc_region),
-    "regulus": Construction(
-        "regulus", PAIRINGS, lambda pieces, cones, _: place_regulus(pieces, cones), None,
-        nearly_symmetric, point_region,
-    ),
-}  # fmt: skip
-MIXED = replace(CONSTRUCTIONS["concurrent"], place=place_on_mixed_sides)
-"""Construction of concurrent grasps with the focus before some fingers and behind the others."""
-
-
-Ask: TypeAlias = tuple[FaceQuadruple, Sequence[ForceCone], float]
-"""One attempt: faces in finger order, a force cone on each, and the least radius that counts."""
 MOST_CHOICES = 8
 """Most choices of pieces tried on faces that are not convex; the free method multiplies it by
 `max_face_parts`."""
-
 LEAST_FACET = 1e-5
 """Least radius of the largest disc in a part of a triangle (object size one); smaller parts are
 left out."""
@@ -170,115 +90,173 @@ meets both triangles beside the edge: a thousand rounding errors. The first of t
 enough counts."""
 
 Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
-Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...]]
-"""Convex pieces of four faces, force cones, contacts, and the regions of the fingers."""
-Planned: TypeAlias = tuple[
-    tuple[FacePiece, ...], Cones, Placement, tuple[ContactRegion, ...] | None
-]
-"""A settled placement whose regions may be None: the construction then chooses them."""
+Regions: TypeAlias = tuple[ContactRegion, ...]
+"""The regions of the fingers, in the pieces' units."""
+Planned: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
+"""Convex pieces of four faces, force cones and contacts."""
+Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, Regions]
 
 
-class Known(NamedTuple):
-    """What compiled code says about one attempt: contacts with regions, or that there are none."""
+@dataclass(frozen=True, slots=True)
+class Construction:
+    """The construction of one family, with what the planner needs for it."""
 
-    placement: Placement | None
-    regions: tuple[ContactRegion, ...] | None
-    """Regions of the fingers, in the pieces' units; None where they are left to the construction.
+    family: Family
+    region: RegionKind  # the kind of region that each finger gets
+    orders: tuple[FingerOrder, ...]
+    """Orders of the fingers on the same faces that give different grasps."""
+    patterns: Array | None = None
+    """Signs of the fingers in the programs of discs, (p, 4); None where no disc is claimed."""
+    limits: slice | None = None
+    """Columns of `disc_limits`, one per finger order; None where no disc is claimed."""
+    admits: Callable[[Array, Array], NDArray[np.bool_]] | None = None
+    """Function that returns for which quadruples a program may be feasible, (q,), from normals in
+    finger order, (q, 4, 3), and half-angles, (q,) [rad]; None for all."""
+
+    @property
+    def least(self) -> float:
+        """Return the merit that a placement must exceed to count."""
+        return LEAST_RADIUS if self.limits else -math.inf
+
+    def placed(self, table: FaceTable, attempts: Attempts, least: Array) -> Placed:
+        """Place contacts for each attempt, with merits of at least `least`, (a,)."""
+        placed = room_for(len(least))
+        if self.patterns is None:
+            place_reguli(table, attempts, placed)
+            return placed
+        pencil, kernel = self.family == "pencil", compiled(KERNEL)
+        kernel.place(pencil, table, attempts, self.patterns, least, placed)
+        for a in np.flatnonzero(placed.ends == LEFT).tolist():
+            worth, placed.ends[a] = float(least[a]), NONE
+            try:
+                for pattern in self.patterns:
+                    program = kernel.program_of(pencil, table, attempts, a, pattern)
+                    if discs := largest_discs(program, worth):
+                        kernel.take(pencil, table, attempts, a, pattern, *discs, placed)
+                        worth = surpassing(float(placed.merits[a]))
+            except SolverError:
+                placed.ends[a] = LEFT
+        return placed
+
+    def one_of(self, placed: Placed, a: int) -> Placement | None:
+        """Return what was placed for one attempt, or None if there is nothing as good as asked."""
+        if placed.ends[a] == LEFT:
+            raise SolverError("a program was neither solved nor proved infeasible")
+        if placed.ends[a] == NONE:
+            return None
+        foci = placed.foci[a, : 1 if self.family == "concurrent" else 2]
+        merit = float(placed.merits[a])
+        return Placement(placed.positions[a], placed.forces[a], foci, placed.radii[a], merit)
+
+    def place(
+        self, pieces: Sequence[FacePiece], cones: Sequence[ForceCone], least: float = -math.inf
+    ) -> Placement | None:
+        """Place contacts on four pieces; None if there are none with the least merit."""
+        attempts = attempts_of([(AS_LISTED[0], cones)])
+        return self.one_of(self.placed(face_table(pieces), attempts, np.array([least])), 0)
+
+
+CONSTRUCTIONS: dict[Family, Construction] = {
+    "concurrent": Construction(
+        "concurrent", "cone", AS_LISTED, np.array([BEFORE, BEHIND]), slice(0, 1)
+    ),
+    "pencil": Construction("pencil", "disc", PAIRINGS, np.array([CELL_A, CELL_B]), slice(1, 4)),
+    "regulus": Construction("regulus", "point", PAIRINGS, admits=nearly_symmetric),
+}
+MIXED = replace(CONSTRUCTIONS["concurrent"], patterns=MIXED_SIDES)
+"""Construction of concurrent grasps with the focus before some fingers and behind the others. This
+is for faces on which nothing else was found; on convex objects it hardly ever finds anything."""
+
+
+def attempts_of(asked: Sequence[tuple[FaceQuadruple, Sequence[ForceCone]]]) -> Attempts:
+    """List attempts, at least one; of cones with different half-angles the least one holds."""
+    return Attempts(
+        np.array([faces for faces, _ in asked], dtype=np.int64),
+        np.array([[cone.axis for cone in cones] for _, cones in asked]),
+        np.array([min(cone.half_angle for cone in cones) for _, cones in asked]),
+    )
+
+
+def largest_discs(program: Any, least: float) -> tuple[Array, float] | None:
+    """Find the largest four equal discs, then enlarge each, like `discs_kernel` but by HiGHS too.
+
+    Gives the variables (n,) and the largest smallest radius; None if it is proved to be less.
     """
-
-
-@dataclass(frozen=True, eq=False)
-class ManyPlacements:
-    """Places contacts on convex pieces, one for each face of an object."""
-
-    pieces: Sequence[FacePiece | None]  # the piece of each face; None for faces without room
-
-    def of(self, construction: Construction, asked: Sequence[Ask]) -> list[Known | None]:
-        """Place contacts for each attempt; None where that is left to the construction itself."""
-        if construction.limits is None or not asked:
-            return [None] * len(asked)
-        attempts = Attempts(
-            np.array([faces for faces, _, _ in asked], dtype=np.int64),
-            np.array([[cone.axis for cone in cones] for _, cones, _ in asked]),
-            np.array([cones[0].half_angle for _, cones, _ in asked]),
+    rows = compiled("grasp_core.families.discs_kernel").of_equal_radii(program)
+    objective = np.eye(len(rows.At))[-1]
+    first = maximize_above(LinearProgram(objective, np.array(rows.At.T), rows.b), least)
+    if isinstance(first, Infeasible):
+        raise SolverError(
+            "the solver called a disc program infeasible, though small discs always fit"
         )
-        least = np.array([each for _, _, each in asked])
-        placed = room_for(len(asked))
-        if construction.family == "pencil":
-            kernel = compiled("grasp_core.families.pencil_kernel")
-            kernel.place(self._table, attempts, LEAST_RADIUS, least, placed)
-            regions = self._discs(attempts, placed)
-        else:
-            turns = np.array(facet_turns(PYRAMID_SIDES))
-            sides = MIXED_SIDES if construction is MIXED else (BEFORE, BEHIND)
-            kernel = compiled("grasp_core.families.concurrent_kernel")
-            kernel.place(self._table, attempts, turns, np.array(sides), least, placed)
-            regions = self._footprints(attempts, turns, placed)
-        alike = [len({cone.half_angle for cone in cones}) == 1 for _, cones, _ in asked]
-        return [
-            None if end == LEFT or not same else Known(_placement(placed, place, construction), on)
-            for place, (end, same, on) in enumerate(
-                zip(placed.ends.tolist(), alike, regions, strict=True)
-            )
-        ]
-
-    def _discs(self, attempts: Attempts, placed: Placed) -> list[tuple[ContactRegion, ...] | None]:
-        rings = placed.positions[:, :, None] + (
-            placed.radii[:, :, None, None] * self._rings[attempts.faces]
-        )
-        counts = np.full(placed.radii.shape, DISC_CORNERS)
-        return _regions("disc", Footprints(rings, counts, placed.radii), placed.ends)
-
-    def _footprints(
-        self, attempts: Attempts, turns: Array, placed: Placed
-    ) -> list[tuple[ContactRegion, ...] | None]:
-        most = self._table.E.shape[1] + len(turns) + 1
-        shape = placed.radii.shape
-        cut = Footprints(
-            np.zeros((*shape, most, 3)), np.zeros(shape, dtype=np.int64), np.zeros(shape)
-        )
-        kernel = compiled("grasp_core.families.concurrent_kernel")
-        kernel.footprints(self._table, attempts, turns, placed, cut)
-        return _regions("cone", cut, placed.ends)
-
-    @cached_property
-    def _table(self) -> FaceTable:
-        return face_table(self.pieces)
-
-    @cached_property
-    def _rings(self) -> Array:
-        """Border points of a disc of radius one on each face, about its centre, (f, n, 3)."""
-        return np.array([circle() @ frame.T for frame in self._table.frames])
-
-
-def _placement(placed: Placed, place: int, construction: Construction) -> Placement | None:
-    if placed.ends[place] != PLACED:
+    if not isinstance(first, Optimum) or first.value < least:
         return None
-    foci = 2 if construction.family == "pencil" else 1
-    return Placement(
-        placed.positions[place], placed.forces[place], placed.foci[place, :foci],
-        placed.radii[place], float(placed.merits[place]),
-    )  # fmt: skip
+    n, count = program.A.shape[1], len(program.b) - FINGERS - 1
+    radii = np.eye(n)[-FINGERS:]
+    kept = LinearProgram(
+        radii.sum(axis=0),
+        np.vstack([program.A[:count], -radii]),
+        np.append(program.b[:count], np.full(FINGERS, -first.value * (1.0 - KEPT))),
+    )
+    try:
+        second = maximize(kept)
+    except SolverError:
+        second = first  # within rounding of infeasible where discs are tiny
+    if isinstance(second, Optimum) and second is not first:
+        return nearest_optimum(kept, second), first.value
+    x = np.append(first.x[:-1], np.full(n - program.radii, first.value))
+    x[program.radii] += program.excess
+    return x, first.value
 
 
-def _regions(
-    kind: RegionKind, cut: Footprints, ends: Indices
-) -> list[tuple[ContactRegion, ...] | None]:
-    """Make the regions of each attempt; None where a polygon has no corners."""
+def point_regions(placement: Placement) -> Regions:
+    """Make regions of one point each, the contacts themselves."""
+    return tuple(ContactRegion("point", at[None], 0.0) for at in placement.positions)
+
+
+def regions_of(kind: RegionKind, planned: Sequence[Planned]) -> list[Regions]:
+    """Make the regions of the fingers for many placements."""
+    if kind == "point" or not planned:
+        return [point_regions(placement) for _, _, placement in planned]
+    pieces = list({id(piece): piece for chosen, _, _ in planned for piece in chosen}.values())
+    places = {id(piece): place for place, piece in enumerate(pieces)}
+    attempts = attempts_of(
+        [(four(places[id(piece)] for piece in chosen), cones) for chosen, cones, _ in planned]
+    )
+    positions = np.array([placement.positions for _, _, placement in planned])
+    if kind == "disc":
+        frames = np.array([piece.frame for piece in pieces])[attempts.faces]
+        radii = np.array([placement.radii for _, _, placement in planned])
+        rings = radii[..., None, None] * np.einsum("nt,afjt->afnj", circle(DISC_CORNERS), frames)
+        cut = Footprints(positions[:, :, None] + rings, np.full(radii.shape, DISC_CORNERS), radii)
+    else:
+        foci = np.array([placement.foci[0] for _, _, placement in planned])
+        cut = _footprints(pieces, attempts, foci, positions)
     cut.polygons.setflags(write=False)
-    found: list[tuple[ContactRegion, ...] | None] = [None] * len(ends)
-    counts, radii = cut.counts.tolist(), cut.radii.tolist()
-    for place in np.flatnonzero((ends == PLACED) & (cut.counts.min(axis=1) > 0)).tolist():
-        found[place] = four(
+    return [
+        four(
             trusted(
-                ContactRegion,
-                kind=kind,
-                polygon=cut.polygons[place, finger, : counts[place][finger]],
-                inscribed_radius=radii[place][finger],
+                ContactRegion, kind=kind, polygon=polygon[:count], inscribed_radius=float(radius)
             )
-            for finger in range(FINGERS)
+            for polygon, count, radius in zip(*each, strict=True)
         )
-    return found
+        for each in zip(*cut, strict=True)
+    ]
+
+
+def _footprints(
+    pieces: Sequence[FacePiece], attempts: Attempts, foci: Array, positions: Array
+) -> Footprints:
+    table, shape = face_table(pieces), attempts.faces.shape
+    most = table.E.shape[1] + PYRAMID_SIDES + 1
+    cut = Footprints(np.zeros((*shape, most, 3)), np.zeros(shape, np.int64), np.zeros(shape))
+    kernel = compiled("grasp_core.families.concurrent_kernel")
+    kernel.footprints(table, attempts, foci, positions, cut)
+    for a, finger in np.argwhere(~np.isfinite(cut.radii)).tolist():
+        piece, count = pieces[int(attempts.faces[a, finger])], cut.counts[a, finger]
+        flat = (cut.polygons[a, finger, :count] - piece.origin) @ piece.frame
+        cut.radii[a, finger] = inscribed_radius(*edge_rows(flat))
+    return cut
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,72 +302,76 @@ class Settling:
                 for attempt, end in going
                 if choice < len(attempt.cones) and attempt.bounds[choice] > end.least
             ]
-            asked: list[Ask] = [
-                (attempt.faces, attempt.cones[choice], end.least) for attempt, end in going
-            ]
-            known = self._many.of(self.construction, asked)
-            for ask, (_, end), each in zip(asked, going, known, strict=True):
-                self._place(ask, each, end)
+            self._place([(attempt.faces, attempt.cones[choice], end) for attempt, end in going])
             going = [(attempt, end) for attempt, end in going if not end.failed]
-        for attempt, end in zip(attempts, ends, strict=True):
-            self._settle(attempt, end)
+        self._settle(
+            [
+                (chosen_shapes(self.shapes, attempt.faces), end, end.planned)
+                for attempt, end in zip(attempts, ends, strict=True)
+                if end.planned is not None and not end.failed
+            ]
+        )
         return ends
 
-    def _place(self, ask: Ask, known: Known | None, end: End) -> None:
-        """Enter the contacts of one choice of cones if they are better than those before."""
-        try:
-            found = self._best_placement(ask, known, end)
-        except SolverError:
-            end.failed = True
+    def _place(self, asked: Sequence[tuple[FaceQuadruple, Cones, End]]) -> None:
+        """Enter the contacts of one choice of cones where they are better than those before."""
+        if not asked:
             return
-        if found:
-            end.planned, end.least = found, surpassing(found[2].merit)
+        attempts = attempts_of([(faces, cones) for faces, cones, _ in asked])
+        least = np.array([end.least for _, _, end in asked])
+        placed = self.construction.placed(self._table, attempts, least)
+        for a, (faces, cones, end) in enumerate(asked):
+            try:
+                end.solved += 1
+                found = self._best(faces, cones, self.construction.one_of(placed, a), end)
+            except SolverError:
+                end.failed = True
+                continue
+            if found:
+                end.planned, end.least = found, surpassing(found[2].merit)
 
-    def _settle(self, attempt: Attempt, end: End) -> None:
-        if end.planned is None or end.failed:
-            return
-        chosen, cones, placement, known = end.planned
-        regions = known or regions_of(self.construction.region, chosen, cones, placement)
-        shapes = chosen_shapes(self.shapes, attempt.faces)
-        if all(shape.facets is None for shape in shapes):
-            end.settled = chosen, cones, placement, regions
-            return
-        place = partial(_placed_on, self.construction, cones)
-        try:
-            found = on_true_surface(shapes, chosen, cones, placement, regions, place)
-        except SolverError:
-            end.failed = True
-            return
-        end.settled = None if found is None else (found[0], cones, found[1], regions)
-
-    def _best_placement(self, ask: Ask, known: Known | None, end: End) -> Planned | None:
+    def _best(
+        self, faces: FaceQuadruple, cones: Cones, whole: Placement | None, end: End
+    ) -> Planned | None:
         """Place contacts on the best choice of one convex piece per face; None unless above least.
 
         Where faces have several pieces, their hulls are tried first: a grasp that the hulls do not
         hold no piece holds, and the contacts on the hulls show which pieces are likely to be best.
         """
-        construction, (faces, given, least) = self.construction, ask
-        cones, shapes = four(given), chosen_shapes(self.shapes, faces)
-        hulls = tuple(shape.hull for shape in shapes)
-        end.solved += 1
-        whole = construction.place(hulls, cones, least) if known is None else known.placement
-        if not (isinstance(whole, Placement) and whole.merit > least):
+        construction, shapes, least = (
+            self.construction,
+            chosen_shapes(self.shapes, faces),
+            end.least,
+        )
+        if whole is None or not whole.merit > least:
             return None
         if all(len(shape.pieces) == 1 for shape in shapes):
-            return hulls, cones, whole, None if known is None else known.regions
+            return tuple(shape.hull for shape in shapes), cones, whole
         best = None
         for chosen in choices_near(shapes, whole.positions, MOST_CHOICES):
             end.solved += 1
             if construction.limits is not None and min(piece.inradius for piece in chosen) < least:
                 continue
             placed = construction.place(chosen, cones, least)
-            if isinstance(placed, Placement) and placed.merit > least:
-                best, least = (chosen, cones, placed, None), surpassing(placed.merit)
+            if placed is not None and placed.merit > least:
+                best, least = (chosen, cones, placed), surpassing(placed.merit)
         return best
 
+    def _settle(self, done: Sequence[tuple[tuple[FaceShape, ...], End, Planned]]) -> None:
+        """Enter the contacts on the true surface, with their regions."""
+        every = regions_of(self.construction.region, [planned for _, _, planned in done])
+        for (shapes, end, (chosen, cones, placement)), regions in zip(done, every, strict=True):
+            place = partial(_placed_on, self.construction, cones)
+            try:
+                found = on_true_surface(shapes, chosen, cones, placement, regions, place)
+            except SolverError:
+                end.failed = True
+                continue
+            end.settled = None if found is None else (found[0], cones, found[1], regions)
+
     @cached_property
-    def _many(self) -> ManyPlacements:
-        return ManyPlacements([shape.hull if shape else None for shape in self.shapes])
+    def _table(self) -> FaceTable:
+        return face_table([shape.hull if shape else None for shape in self.shapes])
 
 
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
@@ -401,8 +383,7 @@ def _placed_on(
     construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
 ) -> Placement | None:
     """Place contacts on convex pieces, with discs however small; None if it is impossible."""
-    placed = construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
-    return placed if isinstance(placed, Placement) else None
+    return construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
 
 
 def on_true_surface(
@@ -447,7 +428,8 @@ def _aimed(
         facet.inset(at) >= -ON_EDGE for facet, at in zip(facets, positions, strict=True)
     ):
         return None
-    forces = balanced_forces(facets, np.sign(inward)[:, None] * ways)
+    normals = np.array([facet.normal for facet in facets])
+    forces = balanced_forces(normals, np.sign(inward)[:, None] * ways)
     return replace(planned, positions=positions, forces=forces)
 
 

@@ -1,10 +1,48 @@
-"""Searches in compiled code for the best slopes of a regulus, by the programs of `regulus`.
+"""Constructs regulus grasps: two pairs of lines of force that pass at equal pitch.
 
-A program, over (x0, k, p, x_1, x_2, z_1, z_2, t), is first solved without its gap: if p stays
-beyond the gap anyway, that side was the better one. As the cones span (P3), x_i is on the side of
-its pair's resultant; there the rows that keep the forces of a pair in their pyramids are bounds on
-z_i / x_i, of which the tightest imply the others. `regulus` builds the best program whole and
-solves it again. Numbers in comments are those of `regulus`.
+Solved: for four convex faces with a force cone each, grouped into the pairs (0, 1) and
+(2, 3), four contacts near the middle of their faces and forces in the cones whose lines lie
+on one regulus. The cones must positively span whatever direction each contributes (P3).
+
+Derivation. With axes a_ij, planes P_i, and u along both planes as for pencils, let N_i be the
+unit normal of P_i and v_i = N_i x u. The two lines of pair i pass the focus line on either side
+of c_i = x0 +- k u, at d_i1 = c_i + l_i N_i and d_i2 = c_i - l_i N_i, along
+
+    f_i1 = x_i u + y_i v_i + z_i N_i,      f_i2 = x_i u - y_i v_i - z_i N_i,             (1)
+
+and the contacts are x_ij = d_ij - f_ij. With equal weights the two forces of a pair amount to
+the force 2 x_i u with the moment 2 x_i (x0 x u) - 2 l_i y_i u, so pairs 1 and 2 cancel iff
+
+    l_1 y_1 / x_1 = l_2 y_2 / x_2                                      (equal pitch).    (2)
+
+The paper calls the lines "clearly linearly dependent", but without this equation they are
+independent in general, and of the grasps its program returns on random polyhedra two in five
+are not in equilibrium.
+The equation is bilinear. Fixing both slopes tau_i = y_i / x_i makes it linear: l_1 = p tau_2 and
+l_2 = p tau_1 with one free p. The projection of f_ij into P_i stays within psi of a_ij, so if
+phi_ij is the angle of a_ij from the resultant of its pair, +u or -u, then
+
+    max_j phi_ij - psi <= atan|tau_i| <= min(min_j phi_ij + psi, pi / 2),                (3)
+
+an interval of which a few values are tried; tau_i has the sign of x_i. It is empty unless the
+pair is nearly symmetric about u, |phi_i1 - phi_i2| <= 2 psi. In (x0, k, p, x_i, z_i, t) the
+program is linear:
+
+    minimise t  subject to  x_ij inside its face,                                        (4)
+                            |x_ij - centre| <= t along both axes of the face,            (5)
+                            f_ij in an inscribed pyramid,                                (6)
+                            n_ij.f_ij >= a least depth,                                  (7)
+                            p beyond a least gap, on either side.                        (8)
+
+The last two keep out the zero force, and lines that meet: those are pencils. The program is solved
+for some slopes of both pairs, on either side of the focus line: compiled code chooses the ones
+whose contacts are nearest to the faces' middles, and `regulus` solves its program again.
+
+A program is first solved without its gap: if p stays beyond the gap anyway, that side was the
+better one. As the cones span (P3), x_i is on the side of its pair's resultant; there the rows (6)
+are bounds on z_i / x_i, of which the tightest imply the others.
+
+Source: Sudsang & Ponce 1995, section 3.3; the pitch equation and its use are this project's.
 """
 
 from typing import NamedTuple
@@ -14,20 +52,17 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.families.discs_kernel import edges_of, facet_sines, measure, room_for, vertex_of
-from grasp_core.families.placements import Attempts, FaceTable
-from grasp_core.families.regulus import (
-    LEAST_DEPTH,
-    LEAST_GAP,
-    LEAST_INSET,
-    SAME_OFFSET,
-    SLOPES,
-    VARIABLES,
-    K,
-    P,
-    T,
+from grasp_core.families.discs_kernel import (
+    TURNS,
+    balance,
+    edges_of,
+    empty_rows,
+    facets,
+    measure,
+    vertex_of,
 )
-from grasp_core.geometry.vectors_kernel import across, angle_between, cross, dotted, focus_direction
+from grasp_core.families.placements import PLACED, Attempts, FaceTable, Placed
+from grasp_core.geometry.vectors_kernel import angle_between, cross, dotted, focus_direction
 from grasp_core.solvers.lp_kernel import (
     INFEASIBLE,
     LOST,
@@ -39,11 +74,21 @@ from grasp_core.solvers.lp_kernel import (
 )
 from grasp_core.values import FINGERS
 
+LEAST_DEPTH = 0.02
+"""Least height of the passing points over their faces, in object radii."""
+LEAST_INSET = 1e-3
+"""Least distance of a contact from the edges of its face, in object radii."""
+LEAST_GAP = 0.01
+"""Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
+K, P, X, Z, T, VARIABLES = 3, 4, 5, 7, 9, 10
+"""Indices of k, p, x_1, z_1 and t among the variables, and their number."""
+SLOPES = (0.5, 0.2, 0.8)
+"""Shares of the interval (3) at which each slope's angle is tried."""
+SAME_OFFSET = 1e-9
+"""Difference between offsets that counts as none; of equal slopes, those tried first win."""
 FLAT = 1e-12
 """Size of a facet's component along N below which the facet does not bound z / x: it allows every
 value or none."""
-X, Z = 5, 7
-"""Indices of the first x_i and z_i among the variables."""
 ACCURACY, FARTHEST = 1e-11, 1e4
 """Error up to which multipliers give the objective, and the size |x|_1 of the variables up to which
 a proof of infeasibility must hold."""
@@ -70,58 +115,70 @@ class PairFrames(NamedTuple):
 
 
 @loop()
-def pair_frames(faces: FaceTable, attempts: Attempts, a: int, turns: Array) -> PairFrames:
+def nearly_symmetric(axes: Array, half_angles: Array, found: NDArray[np.bool_]) -> None:
+    """Tell whether both pairs of each quadruple leave their slopes an interval (3), (q,)."""
+    for q in range(len(found)):
+        u = focus_direction(axes[q])
+        least, largest = _interval(axes[q], half_angles[q], u, 0)
+        lowest, highest = _interval(axes[q], half_angles[q], u, 1)
+        found[q] = least < largest and lowest < highest
+
+
+@loop()
+def _interval(axes: Array, half_angle: float, u: Array, pair: int) -> tuple[float, float]:
+    """Return the least and largest angle (3) of a pair's slope."""
+    least, largest = -np.pi, np.pi / 2.0
+    for finger in (2 * pair, 2 * pair + 1):
+        phi = angle_between(axes[finger], u if pair == 0 else -u)
+        least, largest = max(least, phi - half_angle), min(largest, phi + half_angle)
+    return least, largest
+
+
+@loop()
+def pair_frames(faces: FaceTable, attempts: Attempts, a: int) -> PairFrames:
     """Compute the frames of one attempt; slopes of too asymmetric pairs are not usable."""
-    axes, slopes = attempts.axes[a], len(SLOPES)
+    axes, half_angle, slopes = attempts.axes[a], attempts.half_angles[a], len(SLOPES)
     u, normal = focus_direction(axes), np.empty(3)
     frames = PairFrames(
-        u, np.empty((2, 3)), np.empty((2, 3)), np.empty((2, slopes)),
-        np.empty((2, slopes, 2, 2)), np.zeros((2, slopes), dtype=np.bool_),
+        u, np.empty((2, 3)), np.empty((2, 3)), np.zeros((2, slopes)),
+        np.zeros((2, slopes, 2, 2)), np.zeros((2, slopes), dtype=np.bool_),
     )  # fmt: skip
     for pair in range(2):
-        resultant = 1.0 if pair == 0 else -1.0
-        first, second = axes[2 * pair], axes[2 * pair + 1]
-        cross(first, second, normal)
+        resultant, first = (1.0 if pair == 0 else -1.0), axes[2 * pair]
+        cross(first, axes[2 * pair + 1], normal)
         cross(normal, u, frames.v[pair])
+        # turned so that v has the first axis on its side
         scale = np.sign(dotted(frames.v[pair], first)) / np.sqrt(dotted(normal, normal))
         for j in range(3):
             frames.N[pair, j] = scale * normal[j]
             frames.v[pair, j] *= scale
-        # the interval (3) of `regulus`
-        least, largest = -np.pi, np.pi / 2.0
-        for axis in (first, second):
-            phi = angle_between(axis, resultant * u)
-            least = max(least, phi - attempts.half_angles[a])
-            largest = min(largest, phi + attempts.half_angles[a])
+        least, largest = _interval(axes, half_angle, u, pair)
         if largest <= least:
             continue
-        facets = _facets(faces, attempts, (a, pair), frames, turns)
+        along = _facets_along(faces, attempts, (a, pair), frames)
         for s in range(slopes):
-            angle = least + SLOPES[s] * (largest - least)
-            frames.tau[pair, s] = resultant * np.tan(angle)
-            frames.usable[pair, s] = _tightest(
-                facets, resultant, frames.tau[pair, s], frames.tight[pair, s]
-            )
+            # the sign of the slope is that of x
+            tau = resultant * np.tan(least + SLOPES[s] * (largest - least))
+            frames.tau[pair, s] = tau
+            frames.usable[pair, s] = _tightest(along, resultant, tau, frames.tight[pair, s])
     return frames
 
 
 @loop()
-def _facets(
-    faces: FaceTable, attempts: Attempts, place: tuple[int, int], frames: PairFrames, turns: Array
+def _facets_along(
+    faces: FaceTable, attempts: Attempts, place: tuple[int, int], frames: PairFrames
 ) -> Array:
     """Compute normals of the facets of a pair's pyramids along u, v, N, (2, facets, 3)."""
     a, pair = place
-    found = np.empty((2, len(turns), 3))
-    sine, cosine = facet_sines(attempts.half_angles[a], len(turns))
+    found = np.empty((2, len(TURNS), 3))
     for each in range(2):
-        axis = attempts.axes[a, 2 * pair + each]
-        first, second = across(axis, faces.frames[attempts.faces[a, 2 * pair + each]])
-        for along, direction in enumerate((frames.u, frames.v[pair], frames.N[pair])):
-            middle = dotted(axis, direction)
-            lean, lean_too = dotted(first, direction), dotted(second, direction)
-            for m in range(len(turns)):
-                lies = turns[m, 0] * lean + turns[m, 1] * lean_too
-                found[each, m, along] = sine * middle - cosine * lies
+        finger = 2 * pair + each
+        frame = faces.frames[attempts.faces[a, finger]]
+        G = facets(attempts.axes[a, finger], attempts.half_angles[a], frame)
+        for m in range(len(G)):
+            found[each, m, 0] = dotted(G[m], frames.u)
+            found[each, m, 1] = dotted(G[m], frames.v[pair])
+            found[each, m, 2] = dotted(G[m], frames.N[pair])
     return found
 
 
@@ -163,34 +220,64 @@ class _Line(NamedTuple):
 
 @loop()
 def regulus_bounds(
-    faces: FaceTable,
-    attempts: Attempts,
-    turns: Array,
-    enough: float,
-    bounds: Array,
-    chosen: Indices,
+    faces: FaceTable, attempts: Attempts, any_choice: bool, bounds: Array, chosen: Indices
 ) -> None:
-    """Bound the merit, minus the largest offset t, over slopes until one is above `enough`."""
-    others = 1 + FINGERS * (4 + 1 + 1) + 4  # gap; offsets, depth, equality; bounds on z / x
-    room = np.empty((VARIABLES + 2) * (others + FINGERS * faces.E.shape[1]))
+    """Bound the merit, minus the largest offset t, over slopes; stop when none can be better.
+
+    If any choice will do, stop at the first.
+    """
     slopes, vertex = len(SLOPES), vertex_of(VARIABLES)
+    enough = -np.inf if any_choice else -SAME_OFFSET
     for a in range(len(bounds)):
-        frames = pair_frames(faces, attempts, a, turns)
-        count = others + edges_of(faces, attempts, a)
+        frames = pair_frames(faces, attempts, a)
         bounds[a], chosen[a] = -np.inf, NONE
         for i in range(slopes):
             for j in range(slopes):
                 if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] > enough:
                     continue
-                rows = room_for(room, VARIABLES, count)
-                rows = Rows(rows.At, rows.b, rows.norms, FINGERS)
-                _fill(faces, attempts.faces[a], frames, (i, j), rows)
-                gap = LEAST_GAP / min(abs(frames.tau[0, i]), abs(frames.tau[1, j]))
+                rows, gap = _rows(faces, attempts.faces[a], frames, (i, j))
                 worth = bounds[a] + SAME_OFFSET
                 best, side = _best_side(rows, gap, worth, vertex)
                 if best > worth:
                     bounds[a] = best
                     chosen[a, 0], chosen[a, 1], chosen[a, 2] = i, j, side
+
+
+@loop()
+def regulus_program(
+    faces: FaceTable, attempts: Attempts, a: int, choice: tuple[int, int, int]
+) -> tuple[bool, Rows]:
+    """Build the program for given slopes and side; return also whether the slopes are usable."""
+    frames, (i, j, side) = pair_frames(faces, attempts, a), choice
+    rows, gap = _rows(faces, attempts.faces[a], frames, (i, j))
+    rows.At[P, 0], rows.b[0] = (-1.0 if side == PLUS else 1.0), -gap
+    return frames.usable[0, i] and frames.usable[1, j], rows
+
+
+@loop()
+def take(
+    faces: FaceTable,
+    attempts: Attempts,
+    a: int,
+    choice: tuple[int, int, int],
+    x: Array,
+    merit: float,
+    placed: Placed,
+) -> None:
+    """Fill in contacts, forces and foci from the variables of a program."""
+    frames, quadruple, ways = pair_frames(faces, attempts, a), attempts.faces[a], np.empty((4, 3))
+    placed.foci[a] = 0.0
+    for finger in range(FINGERS):
+        line, n = _line(frames, choice[:2], finger), faces.normals[quadruple[finger]]
+        passing = x[:3] + x[K] * line.k + x[P] * line.p
+        ways[finger] = x[X + line.pair] * line.x + x[Z + line.pair] * line.z
+        contact = passing - ways[finger]
+        # takes away what the program's answer may be off the plane
+        off = dotted(n, contact - faces.origins[quadruple[finger]])
+        placed.positions[a, finger] = contact - off * n
+        placed.foci[a, line.pair] += 0.5 * passing
+    balance(ways, faces.normals[quadruple], placed.forces[a])
+    placed.ends[a], placed.merits[a] = PLACED, merit
 
 
 @loop()
@@ -224,16 +311,15 @@ def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
     return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
 
 
-@loop()
-def _fill(
-    faces: FaceTable,
-    quadruple: Indices,
-    frames: PairFrames,
-    slopes: tuple[int, int],
-    rows: Rows,
-) -> None:
-    """Fill in all rows but the first, which is left for the gap (8); equalities come last."""
-    row, equality = 1, len(rows.b) - FINGERS
+@loop("numpy")
+def _rows(
+    faces: FaceTable, quadruple: Indices, frames: PairFrames, slopes: tuple[int, int]
+) -> tuple[Rows, float]:
+    """Build the rows, the first left for the gap (8) and equalities last; return also the gap."""
+    count = 1 + FINGERS * (4 + 1 + 1) + 4 + edges_of(faces, quadruple)
+    rows = empty_rows(VARIABLES, count)
+    rows = Rows(rows.At, rows.b, rows.norms, FINGERS)
+    row, equality = 1, count - FINGERS
     rows.b[0] = 0.0
     for finger in range(FINGERS):
         face, line = quadruple[finger], _line(frames, slopes, finger)
@@ -254,6 +340,9 @@ def _fill(
             rows.At[X + pair, row], rows.At[Z + pair, row] = -tight[0], -tight[1]
             rows.b[row] = 0.0
             row += 1
+    # (8) for both pairs: l_i is p times the slope of the other
+    steepest = min(abs(frames.tau[0, slopes[0]]), abs(frames.tau[1, slopes[1]]))
+    return rows, LEAST_GAP / steepest
 
 
 @loop()

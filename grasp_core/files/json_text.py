@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, cast
 
+from grasp_core import kinds
 from grasp_core.errors import InputError
 
 DEEPEST = 64
@@ -19,7 +20,7 @@ LARGEST_WHOLE = 2**64 - 1
 """Largest whole number: larger ones are no seeds, counts or indices, and arrays cannot hold them.
 """
 LONGEST_ECHO = 40
-"""Largest number of characters of a wrong value, or of a key, that a message repeats."""
+"""Largest number of characters of a key that a message repeats."""
 KINDS: Mapping[str, Collection[str]] = {
     "baseline": {"grasps_file"},
     "verdicts.json": {"verdicts"},
@@ -42,7 +43,7 @@ def object_of(
     text: str, wanted: str, *, schema: int | None = None, nulls: bool = True
 ) -> dict[str, Any]:
     """Return the object that a JSON text holds."""
-    found = value_of(text, nulls=nulls)
+    found = json_of(text, nulls=nulls)
     if not isinstance(found, dict):
         raise InputError(f"{_with_article(wanted)} must hold one JSON object, got {shown(found)}")
     record = cast("dict[str, Any]", found)
@@ -52,7 +53,7 @@ def object_of(
     return record
 
 
-def value_of(text: str, *, nulls: bool = True) -> Any:
+def json_of(text: str, *, nulls: bool = True) -> Any:
     """Return the value that a JSON text holds."""
     try:
         found = json.loads(text, object_pairs_hook=_without_twins)
@@ -132,26 +133,17 @@ def place(parts: Sequence[object]) -> str:
 
 
 def shown(value: object) -> str:
-    """Write a wrong value for a message: short, and in characters that can be printed."""
-    if isinstance(value, dict):
-        return "an object"
-    if isinstance(value, list | tuple):
-        return "a list"
-    if isinstance(value, str):
-        return json.dumps(value) if len(value) <= LONGEST_ECHO else f"text of {len(value)} letters"
+    """Write a wrong value for a message, in the words of JSON."""
+    if isinstance(value, dict | list | tuple):
+        return "an object" if isinstance(value, dict) else "a list"
     if value is None or isinstance(value, bool):
         return json.dumps(value)
-    if isinstance(value, int) and abs(value) > LARGEST_WHOLE:
-        return f"a whole number of {value.bit_length()} bits"
-    return _cut(ascii(value))
+    return kinds.shown(value)
 
 
 def _key(key: str) -> str:
-    return _cut(key if key.isidentifier() else ascii(key))
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST_ECHO else f"{text[:LONGEST_ECHO]}..."
+    said = key if key.isidentifier() else ascii(key)
+    return said if len(said) <= LONGEST_ECHO else f"{said[:LONGEST_ECHO]}..."
 
 
 def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -30,11 +30,11 @@ from typing import (
     get_type_hints,
 )
 
-from grasp_core.declared import Declared, FieldError, check, default_of, rules, types
+from grasp_core.declared import Declared, check, default_of, rules, types
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of, shown, text_of
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import Many, Null, inside
+from grasp_core.kinds import FieldError, Many, Null, inside
 from grasp_core.settings import at, named, placed
 
 UNRECORDED = "unrecorded"

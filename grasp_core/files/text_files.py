@@ -7,8 +7,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Generator, Iterable
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 from grasp_core.errors import InputError, about
@@ -21,30 +20,23 @@ SHOWN = 40
 
 def write_parts(path: Path, parts: Iterable[bytes]) -> Path:
     """Write a file from parts of bytes; missing folders are made."""
-    with replacing(path) as temporary, temporary.open("wb") as stream:
-        stream.writelines(parts)
-        stream.flush()
-        os.fsync(stream.fileno())
-    return path
-
-
-@contextmanager
-def replacing(path: Path) -> Generator[Path]:
-    """Yield another path with the same suffix to write to; afterwards that file replaces `path`."""
     path.parent.mkdir(parents=True, exist_ok=True)
     prefix = f".{path.name[:SHOWN]}{UNFINISHED}"
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=prefix, suffix=path.suffix)
         temporary = Path(name)
         try:
-            os.close(handle)
-            yield temporary
+            with os.fdopen(handle, "wb") as stream:
+                stream.writelines(parts)
+                stream.flush()
+                os.fsync(handle)
             temporary.chmod(0o644)
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+    return path
 
 
 def remove_unfinished(folder: Path) -> None:

@@ -34,20 +34,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import SMALLEST_SIZE, Array, frozen
-from grasp_core.checked import LARGEST, SMALLEST, number, one_of, several, shown
 from grasp_core.closure.contacts import (
-    WRENCH,
     contact_arrays,
     contact_frames,
     contact_frictions,
+    contact_torsions,
     grasp_map,
     in_frames,
     unit_size,
 )
-from grasp_core.closure.soft_contacts import LOCAL, contact_torsions
-from grasp_core.closure.wrench_sets import with_torques
+from grasp_core.closure.proofs import ContactCones
+from grasp_core.closure.wrench_sets import contact_program
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 from grasp_core.errors import InputError, NoForcesError, SolverError
+from grasp_core.kinds import LARGEST, SMALLEST, number, one_of, several, shown
 from grasp_core.solvers import conic, qp
 from grasp_core.solvers.conic import ConicProgram
 from grasp_core.solvers.qp import PROXQP, QuadraticProgram, check_solver, least_distance
@@ -165,11 +165,16 @@ def balances(
     return found
 
 
-def needed_friction(f: Array, weights: Array) -> float:
-    """Return the largest ratio of tangential to weighted normal force of forces (3k,)."""
+def needed_friction(f: Array, weights: Array, slack: float = RESIDUAL) -> float:
+    """Return the largest ratio of tangential to weighted normal force of forces (3k,).
+
+    Tangential forces up to the slack count as none, and with a slack of zero those of contacts
+    without weight.
+    """
     along, across = f[0::3], np.hypot(f[1::3], f[2::3])
     ratios = across / np.maximum(weights * along, NO_FORCE)
-    return float(np.where(across <= RESIDUAL, 0.0, ratios).max())
+    counted = across > slack if slack > 0.0 else weights > 0.0
+    return float(ratios[counted].max(initial=0.0))
 
 
 def in_cones(f: Array | None, friction: Array) -> bool:
@@ -253,7 +258,7 @@ def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> 
 
 def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
     """Find forces (3k,) in cones that need the least friction; the given ones if none need less."""
-    best, friction = forces, _largest_ratio(forces, weights)
+    best, friction = forces, needed_friction(forces, weights, 0.0)
     for _ in range(CONE_ROUNDS):
         if friction <= FRICTIONLESS:
             break
@@ -262,7 +267,7 @@ def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
             better = balance.checked(conic.minimize(program).x[:-1], FINE_RESIDUAL)
         except SolverError:
             break
-        needed = math.inf if better is None else _largest_ratio(better, weights)
+        needed = math.inf if better is None else needed_friction(better, weights, 0.0)
         if better is None or not needed < friction:
             break
         # an improvement is kept, but a small one ends the search
@@ -299,13 +304,6 @@ def least_imbalance(balance: Balance, friction: Array) -> Array:
     return np.stack([along, shrink * f[1::3], shrink * f[2::3]], axis=1).ravel()
 
 
-def _largest_ratio(f: Array, weights: Array) -> float:
-    """Return the largest ratio of tangential to weighted normal force, however small both are."""
-    along, across = f[0::3], np.hypot(f[1::3], f[2::3])
-    ratios = across / np.maximum(weights * along, NO_FORCE)
-    return float(ratios[weights > 0.0].max())
-
-
 def _cone_program(
     balance: Balance, friction: Array, *, excess: Array | None = None, unit: float = 1.0
 ) -> ConicProgram:
@@ -313,30 +311,16 @@ def _cone_program(
 
     Its last variable is a bound on the norm, or the excess. Forces are in units of `unit`.
     """
-    n, count = balance.G.shape[1], len(friction)
+    n = balance.G.shape[1]
     forces, last = np.eye(n, n + 1), np.eye(n + 1)[n]
-    normal, cones, flat = forces[0::3], -forces, np.zeros(count, dtype=bool)
-    cones[0::3] *= friction[:, None]
-    equations = np.hstack([balance.G, np.zeros((WRENCH, 1))])
-    if excess is None:
-        # a cone of friction zero is a ray: its tangential parts are equations instead
-        flat = friction == 0.0
-        slides = np.delete(forces[np.repeat(flat, 3)], np.s_[::3], axis=0)
-        equations, cones = np.vstack([equations, slides]), cones[np.repeat(~flat, 3)]
-        tail, lengths = -np.vstack([last, forces]), (n + 1,)
-    else:
-        cones[0::3] -= excess[:, None] * last
-        tail, lengths = np.empty((0, n + 1)), ()
-    bounded = [(-normal, -balance.least)]
+    pushes = forces[0::3]
+    limits = [(-pushes, -balance.least / unit)]
     if math.isfinite(balance.largest):
-        bounded.append((normal, balance.largest))
-    A = np.vstack([equations, *(side for side, _ in bounded), cones, tail])
-    b = np.zeros(len(A))
-    b[:WRENCH] = -balance.w / unit
-    for side, (_, limit) in enumerate(bounded):
-        b[len(equations) + side * count :][:count] = limit / unit
-    each = (3,) * int((~flat).sum())
-    return ConicProgram(last, A, b, len(equations), count * len(bounded), (*each, *lengths))
+        limits.append((pushes, balance.largest / unit))
+    norm = [] if excess is not None else [(-np.vstack([last, forces]), 0.0)]
+    room = None if excess is None else -excess
+    equal = [(balance.G @ forces, -balance.w / unit)]
+    return contact_program(last, friction, 3, equal, limits, norm, room)
 
 
 def contact_forces(
@@ -464,36 +448,30 @@ def even_forces(
     points, units = contact_arrays(positions, normals)
     mu = contact_frictions(friction, len(points))
     arms, _, size = unit_size(points)
-    k, torsions = len(points), contact_torsions(torsion_m, mu)
+    torsions = contact_torsions(torsion_m, mu)
+    cones = ContactCones.at(arms, units, mu, None if torsions is None else torsions / size)
     # tangential unknowns over mu, so that small coefficients are solved as well as large ones
-    frames = contact_frames(units) * np.column_stack([np.ones(k), mu, mu])[:, None]
-    matrix, width = in_frames(grasp_map(arms), frames), 3
-    if torsions is not None:
-        matrix, width = with_torques(matrix, units, torsions / size), LOCAL
+    frames, (k, width) = cones.frames, cones.normals.shape
+    frames[:, :, 1:] *= mu[:, None, None]
     n = width * k
-    pushes, least = np.eye(n, n + 1)[0::width], np.eye(n + 1)[-1]
-    balance = np.hstack([matrix, np.zeros((WRENCH, 1))])
-    # rows: (1), the upper and the lower bounds of (2), the cones (3)
-    A = np.vstack([balance, pushes, least - pushes, -np.eye(n, n + 1)])
-    b = np.concatenate([np.zeros(WRENCH), np.ones(k), np.zeros(k + n)])
-    x = conic.minimize(ConicProgram(-least, A, b, WRENCH, 2 * k, (width,) * k)).x[:-1]
-    along = x[0::width]
-    if not along.min() > NO_PUSH:
+    unknowns, least = np.eye(n, n + 1), np.eye(n + 1)[n]
+    pushes, balance = unknowns[::width], in_frames(cones.maps, frames) @ unknowns
+    program = contact_program(
+        -least, np.sign(mu), width, [(balance, 0.0)], [(pushes, 1.0), (least - pushes, 0.0)]
+    )
+    local = conic.minimize(program).x[:-1].reshape(k, width)
+    if not local[:, 0].min() > NO_PUSH:
         raise NoForcesError(
             f"no balanced forces in which every finger pushes were found at friction {mu}; "
             "more friction may allow them"
         )
-    local = x.reshape(k, width)
-    forces = np.einsum("kij,kj->ki", frames, local[:, :3]) / along.max()
-    wrench = grasp_map(arms) @ forces.ravel()
-    if torsions is not None:
-        wrench[3:] += (local[:, 3] * torsions / (size * along.max())) @ units
-    imbalance = float(np.abs(wrench).max())
+    forces = np.einsum("kij,kj->ki", frames, local) / local[:, 0].max()
+    imbalance = float(np.abs(cones.wrench(forces)).max())
     if not imbalance <= IMBALANCE:
         raise SolverError(
             f"the solver's forces miss balance by {imbalance:.3g} of the largest push"
         )
-    return forces
+    return np.array(forces[:, :3])
 
 
 def _check_limits(normal_force: tuple[float, float]) -> None:

@@ -78,6 +78,18 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
     return polygon
 
 
+def circle(count: int) -> Array:
+    """Return points at equal distances on the circle of radius one, counter-clockwise, (n, 2)."""
+    turns = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([np.cos(turns), np.sin(turns)])
+
+
+def clip_to_disc(polygon: Array, center: Array, radius: float, sides: int) -> Array:
+    """Cut a convex polygon to a regular one around a disc."""
+    rows = circle(sides)
+    return clip(polygon, rows, rows @ center + radius)
+
+
 def tidy(polygon: Array) -> Array:
     """Remove corners from a polygon (k, 2) at unit size that coincide with the corner before."""
     return polygon[np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1) > SAME_CORNER]
@@ -103,10 +115,17 @@ def nearest_point(polygon: Array, point: Array) -> Array:
     E, b = edge_rows(polygon)
     if (E @ point <= b).all():
         return point
-    along = np.roll(polygon, -1, axis=0) - polygon
-    shares = ((point - polygon) * along).sum(axis=1) / (along**2).sum(axis=1)
-    feet = polygon + np.clip(shares, 0.0, 1.0)[:, None] * along
+    feet = nearest_on_segments(polygon, np.roll(polygon, -1, axis=0), point)
     return feet[first_best(-np.linalg.norm(feet - point, axis=1))]
+
+
+def nearest_on_segments(starts: Array, ends: Array, points: Array) -> Array:
+    """Return the points of segments nearest to given points, (..., d); segments may be points."""
+    along = ends - starts
+    squares = np.einsum("...i,...i->...", along, along)
+    shares = np.einsum("...i,...i->...", points - starts, along)
+    shares = np.clip(shares / np.where(squares > 0.0, squares, 1.0), 0.0, 1.0)
+    return starts + shares[..., None] * along
 
 
 def convex_hull(points: Array) -> Array:
@@ -221,16 +240,6 @@ class FlatPolygon:
         return bool((points @ self.E.T <= self.b + slack).all())
 
 
-def flat_polygon(arms: Array, normal: Array, slack: float) -> FlatPolygon | None:
-    """Make a convex polygon from points (k, 3) in the plane through zero, counter-clockwise.
-
-    Gives None if the points are off the plane, or not corners of a convex polygon in order.
-    """
-    if float(np.abs(arms @ normal).max()) > slack:
-        return None
-    return convex_polygon(arms @ plane_frame(normal), slack)
-
-
 def convex_polygon(corners: Array, slack: float) -> FlatPolygon | None:
     """Make a polygon of corners (k, 2), repeats left out; None if not convex and in order."""
     corners = tidy(corners)
@@ -261,9 +270,7 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
     """Return whether a polygon covers a disc in a border, but for `LEFT_OUT` of its own area."""
-    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    rows = np.column_stack([np.cos(turns), np.sin(turns)])
-    disc = clip(border.corners, rows, rows @ center + radius)
+    disc = clip_to_disc(border.corners, center, radius, SIDES)
     if len(disc) == 0:
         return radius == 0.0
     held = clip(disc, polygon.E, polygon.b)

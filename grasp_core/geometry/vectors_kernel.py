@@ -29,24 +29,45 @@ def angle_between(u: Array, v: Array) -> float:
 
 
 @loop()
-def balancing_weights(axes: Array, weights: Array) -> None:
-    """Fill in weights with sum w_i a_i = 0, (4,), like those of `grasp_core.cones.spanning`."""
-    front, back, total = np.empty(3), np.empty(3), 0.0
-    cross(axes[2], axes[3], back)
-    cross(axes[0], axes[1], front)
-    weights[0], weights[1] = dotted(back, axes[1]), -dotted(back, axes[0])
-    weights[2], weights[3] = dotted(front, axes[3]), -dotted(front, axes[2])
-    for i in range(4):
-        total += weights[i]
-    size = abs(weights[0]) + abs(weights[1]) + abs(weights[2]) + abs(weights[3])
-    scale = np.sign(total) / max(size, np.finfo(np.float64).tiny)
-    for i in range(4):
-        weights[i] *= scale
+def crossed(u: Array, v: Array) -> tuple[float, float, float]:
+    """Return the cross product of two vectors."""
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@loop()
+def vanishing_weights(vectors: Array) -> tuple[float, float, float, float]:
+    """Return weights of sum w_i v_i = 0 for four vectors, by Cramer's rule.
+
+    They are determinants of the other three vectors, all of one sign where the four positively
+    span.
+    """
+    one, two, three, four = vectors[0], vectors[1], vectors[2], vectors[3]
+    (x, y, z), (u, v, w) = crossed(one, two), crossed(three, four)
+    return (
+        u * two[0] + v * two[1] + w * two[2],
+        -(u * one[0] + v * one[1] + w * one[2]),
+        x * four[0] + y * four[1] + z * four[2],
+        -(x * three[0] + y * three[1] + z * three[2]),
+    )
+
+
+@loop()
+def balancing_weights(vectors: Array, weights: Array) -> None:
+    """Fill in weights of sum w_i v_i = 0, sum |w_i| = 1; positive if vectors span, (4,)."""
+    a, b, c, d = vanishing_weights(vectors)
+    size = abs(a) + abs(b) + abs(c) + abs(d)
+    scale = np.sign(a + b + c + d) / max(size, np.finfo(np.float64).tiny)
+    weights[0], weights[1], weights[2], weights[3] = scale * a, scale * b, scale * c, scale * d
 
 
 @loop()
 def focus_direction(axes: Array) -> Array:
-    """Compute what `focus_direction` of `grasp_core.families.placements` computes."""
+    """Compute the direction u of the line through both foci of a pencil, (3,).
+
+    The first focus belongs to fingers 0 and 1, the second to fingers 2 and 3. The direction lies in
+    the planes of both pairs, and the first pair pushes along it: with positive weights lam of sum
+    lam a = 0, u points along w = lam_0 a_0 + lam_1 a_1 = -lam_2 a_2 - lam_3 a_3.
+    """
     weights, u = np.empty(4), np.empty(3)
     balancing_weights(axes, weights)
     for j in range(3):

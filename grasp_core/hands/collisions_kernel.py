@@ -8,7 +8,6 @@ from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import dotted
 from grasp_core.hands.distances_kernel import (
     box_box,
-    box_surface,
     corners_of,
     hull_hull,
     hull_surface,
@@ -22,7 +21,8 @@ from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree
 INSIDE = 0.5
 """Windings of a surface around a point from which the point counts as inside."""
 ROUNDING = 1e-9
-"""Distance beyond a limit from which a quick bound on a distance decides [m]."""
+"""Distance beyond a limit from which a quick bound on a distance decides, and up to which hulls
+overlap [m]."""
 
 
 @loop()
@@ -262,23 +262,21 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
 def of_object(
     hand: HandArrays, turned: Array, middles: Array, tree: SurfaceTree, needs: Array
 ) -> float:  # fmt: skip
-    """Return the least distance of shapes from a surface, beyond what each of them needs."""
+    """Return the least distance of shapes from a surface beyond what each needs, if negative.
+
+    A shape whose hull overlaps the surface, or is inside it, is as deep as the surface is large.
+    """
     best, near, other = np.inf, np.empty(3), np.empty(3)
     low, high = tree.middles[0] - tree.radii[0], tree.middles[0] + tree.radii[0]
     for s in range(len(hand.shape_links)):
-        radius, middle = hand.shape_radii[s], middles[s]
-        if is_block(hand, s):
-            corners, radius = core_in(hand, turned[s], middles[s], s)
-            middle = corners[0]
-            apart = hull_surface(corners, needs[s] + radius, tree, near, other)
-        else:
-            size = hand.shape_sizes[s]
-            apart = box_surface(size, turned[s], middles[s], needs[s] + radius, tree)
-        apart = apart - radius - needs[s]
-        inner = (low < middle).all() and (middle < high).all()
-        if apart >= 0.0 and inner and windings(middle, tree.corners) > INSIDE:
-            apart = -tree.radii[0]
-        best = min(best, apart)
+        reach = tree.radii[0] + hand.shape_reaches[s] + needs[s]
+        if reach < 0.0 or squared(middles[s], tree.middles[0]) > reach * reach:
+            continue
+        corners, rounding = core_in(hand, turned[s], middles[s], s)
+        apart = hull_surface(corners, needs[s] + rounding, tree, near, other)
+        if (low < corners[0]).all() and (corners[0] < high).all() and apart > ROUNDING:
+            apart = 0.0 if windings(corners[0], tree.corners) > INSIDE else apart
+        best = min(best, apart - rounding - needs[s] if apart > ROUNDING else -tree.radii[0])
     return best
 
 
@@ -287,17 +285,9 @@ def of_table(hand: HandArrays, turned: Array, middles: Array, up: Array, height:
     """Return the least height of a hand's shapes over a plane."""
     best = np.inf
     for s in range(len(hand.shape_links)):
-        if is_block(hand, s):
-            corners, rounding = core_in(hand, turned[s], middles[s], s)
-            for c in range(len(corners)):
-                best = min(best, dotted(up, corners[c]) - height - rounding)
-            continue
-        lowest = dotted(up, middles[s]) - height - hand.shape_radii[s]
-        for k in range(3):
-            lowest -= hand.shape_sizes[s, k] * abs(
-                up[0] * turned[s, 0, k] + up[1] * turned[s, 1, k] + up[2] * turned[s, 2, k]
-            )
-        best = min(best, lowest)
+        corners, rounding = core_in(hand, turned[s], middles[s], s)
+        for c in range(len(corners)):
+            best = min(best, dotted(up, corners[c]) - height - rounding)
     return best
 
 

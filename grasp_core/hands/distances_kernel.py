@@ -1,9 +1,9 @@
 """Measures exact distances between boxes, triangles, points, hulls and surfaces, compiled.
 
-Two convex bodies that do not overlap are nearest at a corner of one and a point of the other, or at
-an edge of each. If they overlap, an axis among the normals and the cross products of edges shows
-how far one must move to be free of the other (separating axes of convex bodies). Distances are
-signed: a negative one is the least such way.
+Two boxes that do not overlap are nearest at a corner of one and a point of the other, or at an edge
+of each. If they overlap, an axis among the normals and the cross products of edges shows how far
+one must move to be free of the other (separating axes of convex bodies). The distance of two boxes
+is signed: a negative one is the least such way. Hulls that overlap have the distance zero.
 
 Two hulls are nearest where the hull of the differences of their corners is nearest to the origin.
 That point is approached as Gilbert, Johnson and Keerthi do: by the corner that reaches farthest
@@ -24,7 +24,6 @@ from grasp_core.hands.hand_arrays import SurfaceTree
 
 PARALLEL = 1e-10
 """Sine of the angle between edges below which their cross product is no axis."""
-CORNERS = 3
 BOX_CORNERS, BOX_EDGES = 8, 12
 MOST_STEPS = 100
 """Largest number of corners that are tried: the bound of the loop, which ends after ten or so."""
@@ -174,39 +173,6 @@ def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) 
             best[j] = sign * axis[j] / length
         return gap
     return widest
-
-
-@loop()
-def box_triangle(h: Array, T: Array, limit: float) -> float:
-    """Return the signed distance of the box |x_i| <= h_i from a triangle, (3, 3) in its frame."""
-    axis, units, sides, way = np.empty(3), np.eye(3), np.empty((CORNERS, 3)), np.empty(3)
-    for k in range(CORNERS):
-        for j in range(3):
-            sides[k, j] = T[(k + 1) % CORNERS, j] - T[k, j]
-    cross(sides[0], sides[1], axis)
-    widest = _try_axis(axis / max(np.sqrt(dotted(axis, axis)), 1e-300), h, T, -np.inf, way)
-    for j in range(3):
-        widest = _try_axis(units[j], h, T, widest, way)
-        if widest > limit:
-            return widest
-        for k in range(CORNERS):
-            length = np.sqrt(dotted(sides[k], sides[k]))
-            if length > 0.0:
-                cross(units[j], sides[k] / length, axis)
-                widest = _try_axis(axis, h, T, widest, way)
-    if widest <= 0.0 or widest > limit:
-        return widest
-    corners = corners_of(h, units, np.zeros(3))
-    starts, along = edges_of(corners)
-    best, near, between, weights = np.inf, np.empty(3), np.empty(3), np.empty(2)
-    for k in range(CORNERS):
-        best = min(best, point_box(T[k], h))
-    for k in range(BOX_CORNERS):
-        best = min(best, point_triangle(corners[k], T, near, weights))
-    for e in range(BOX_EDGES):
-        for k in range(CORNERS):
-            best = min(best, segment_segment(starts[e], along[e], T[k], sides[k], between, near))
-    return np.sqrt(best)
 
 
 @loop()
@@ -422,29 +388,6 @@ def nearest(p: Array, within: float, tree: SurfaceTree, near: Array) -> int:
                 stack[depth], gaps[depth] = tree.links[node, side], gap2[side]
                 depth += 1
     return found
-
-
-@loop()
-def box_surface(h: Array, R: Array, middle: Array, limit: float, tree: SurfaceTree) -> float:
-    """Return the signed distance of a box from a surface, or some number above the limit."""
-    stack, depth, local, T = np.empty(DEEPEST, np.int64), 1, np.empty(3), np.empty((3, 3))
-    best = np.nextafter(limit, np.inf)
-    stack[0] = 0
-    while depth > 0:
-        depth -= 1
-        node = stack[depth]
-        into_frame(R, middle, tree.middles[node], local)
-        if np.sqrt(point_box(local, h)) - tree.radii[node] > max(best, 0.0):
-            continue
-        if tree.links[node, 0] >= 0:
-            stack[depth], stack[depth + 1] = tree.links[node, 0], tree.links[node, 1]
-            depth += 2
-            continue
-        for t in range(tree.links[node, 1], tree.links[node, 1] - tree.links[node, 0]):
-            for k in range(3):
-                into_frame(R, middle, tree.corners[t, k], T[k])
-            best = min(best, box_triangle(h, T, best))
-    return best
 
 
 @loop()

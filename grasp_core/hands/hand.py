@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Shape, UnitVector, frozen_each
-from grasp_core.checked import text
 from grasp_core.declared import Declared, counted, summary
 from grasp_core.errors import InputError
 from grasp_core.files.records import Key
 from grasp_core.hands.couplings import Coupling, Drives, drives
-from grasp_core.kinds import Many, Range, TorqueLimit
+from grasp_core.kinds import Many, Range, TorqueLimit, value_of
 
 LARGEST_SIZE = 2.0
 """Largest length of a hand [m]: a larger one is in other units."""
@@ -273,7 +272,7 @@ class Hand(Declared):
             ))
             for finger in self.fingers
         )  # fmt: skip
-        return replace(self, fingers=fingers, torque_source=text(source, "source"))
+        return replace(self, fingers=fingers, torque_source=value_of(str, source, "source"))
 
     def __repr__(self) -> str:
         parts = counted(len(self.fingers), "finger"), counted(len(self.joints), "joint")

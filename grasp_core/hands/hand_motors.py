@@ -46,7 +46,6 @@ shift of the points that touch, as in (4) of `grips`, less what the fingertips t
 A finger needs joints that let its fingertip move in all directions, or L' S L has no inverse.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -56,16 +55,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import UNIT_SLACK, Array, Shape, cross
-from grasp_core.checked import LARGEST, switch
 from grasp_core.closure.contacts import WRENCH, contact_frictions, cross_matrix
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.kinematics import HandPlaces, places
+from grasp_core.hands.kinematics import HandPlaces, jacobian, places
 from grasp_core.hands.reach import HandReach, Stance, direction, stance_of
-from grasp_core.kinds import Quantity
+from grasp_core.kinds import LARGEST, Quantity, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
@@ -95,7 +93,7 @@ def hand_motors(
             has no mass that gravity needs, or a motor cannot carry the links.
     """
     stance = stance_of(hand, reach)
-    switch(any_orientation, "any_orientation")
+    value_of(bool, any_orientation, "any_orientation")
     way = None if down is None else direction(down, "down")
     found, levers, limits = _joints(hand, stance)
     if any_orientation:
@@ -106,10 +104,11 @@ def hand_motors(
 
 
 def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
-    found = places(hand, stance.joints, stance.palm_pose)
-    levers = np.zeros((len(hand.joints), len(stance.contacts), 3))
-    for contact, (joints, axes, arms) in enumerate(_fingers(hand, stance, found)):
-        levers[joints, contact] = cross(axes, arms)  # the first factors of (1)
+    found, own = places(hand, stance.joints, stance.palm_pose), chains(hand)
+    levers = np.array([
+        jacobian(hand, found, own[finger][-1], contact.position[None])[0].T
+        for contact, finger in zip(stance.contacts, stance.fingers, strict=True)
+    ])  # fmt: skip
     missing = [joint.name for joint in hand.free_joints if joint.torque_limit_n_m is None]
     if missing:
         raise InputError(
@@ -117,7 +116,8 @@ def _joints(hand: Hand, stance: Stance) -> tuple[HandPlaces, Array, Array]:
             f"{hand.torque_source}; give your own with hand.with_torque_limits(limits, source)"
         )
     limits = np.array([joint.torque_limit_n_m for joint in hand.free_joints])
-    return found, hand.drives.carried(levers.reshape(len(levers), -1)), limits
+    stacked = levers.transpose(1, 0, 2).reshape(len(hand.joints), -1)
+    return found, hand.drives.carried(stacked), limits
 
 
 def chains(hand: Hand) -> list[range]:
@@ -126,36 +126,18 @@ def chains(hand: Hand) -> list[range]:
     return [range(first, end) for first, end in pairwise(ends)]
 
 
-def _fingers(
-    hand: Hand, stance: Stance, found: HandPlaces
-) -> Iterator[tuple[list[int], Array, Array]]:
-    """Yield for each contact its finger's joints, their axes and the arms from them to it."""
-    for contact, finger in zip(stance.contacts, stance.fingers, strict=True):
-        joints = list(chains(hand)[finger])
-        yield (
-            joints,
-            found.joint_axes[0, joints],
-            contact.position - found.link_positions[0, joints],
-        )
-
-
 def _weights(hand: Hand, found: HandPlaces) -> Array:
     """Return what (1) multiplies with the acceleration, for each motor, (joints, 3) [kg m]."""
     weights = np.zeros((len(hand.joints), 3))
-    links = hand.links
-    for chain in chains(hand):
-        for number in chain:
-            link = links[number]
-            if link.mass_kg is None or link.center_of_mass is None:
-                raise InputError(
-                    f"hand must have the mass and centre of mass of each link for gravity, got "
-                    f"none for {link.name}; leave gravity out, or give them"
-                )
-            center = found.link_positions[0, number]
-            center = center + found.link_rotations[0, number] @ link.center_of_mass
-            before = list(range(chain.start, number + 1))
-            arms = center - found.link_positions[0, before]
-            weights[before] -= link.mass_kg * cross(found.joint_axes[0, before], arms)
+    for number, link in enumerate(hand.links):
+        if link.mass_kg is None or link.center_of_mass is None:
+            raise InputError(
+                f"hand must have the mass and centre of mass of each link for gravity, got "
+                f"none for {link.name}; leave gravity out, or give them"
+            )
+        turned = found.link_rotations[:, number] @ link.center_of_mass
+        center = found.link_positions[:, number] + turned
+        weights -= link.mass_kg * jacobian(hand, found, number, center)[0].T
     return hand.drives.carried(weights)
 
 
@@ -272,11 +254,11 @@ class HandGrip(Grip):
 def hand_grip(hand: Hand, stance: Stance, loose: Grip, servo_n_m_per_rad: float) -> HandGrip:
     """Hold contacts with the servos of a hand, without a squeeze."""
     found = places(hand, stance.joints, stance.palm_pose)
-    own = list(_fingers(hand, stance, found))
-    most = max(len(joints) for joints, _, _ in own)
-    axes, arms = np.zeros((2, len(own), most, 3))
-    for k, (joints, of_joints, to_contact) in enumerate(own):
-        axes[k, : len(joints)], arms[k, : len(joints)] = of_joints, to_contact
+    own = [chains(hand)[finger] for finger in stance.fingers]
+    axes, arms = np.zeros((2, len(own), max(map(len, own)), 3))
+    for k, (joints, contact) in enumerate(zip(own, stance.contacts, strict=True)):
+        axes[k, : len(joints)] = found.joint_axes[0, joints]
+        arms[k, : len(joints)] = contact.position - found.link_positions[0, joints]
     return HandGrip(
         loose.arms, loose.normals, loose.friction, loose.squeeze, loose.stiffness,
         loose.tip_radius_m, axes, arms, servo_n_m_per_rad,

@@ -9,7 +9,6 @@ where k is one of the finger's joints, and by nothing else.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,17 +54,20 @@ def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) ->
     return HandPlaces(*(frozen_copy(each) for each in (R, p, W, tips)))
 
 
+def jacobian(hand: Hand, found: HandPlaces, link: int, points: Array) -> Array:
+    """Compute the derivatives (1) of points (n, 3) that a link carries, (n, 3, joints) [m/rad]."""
+    own = slice(hand_arrays(hand).link_firsts[link], link + 1)
+    arms = points[:, None] - found.link_positions[:, own]
+    J = np.zeros((len(points), 3, len(hand.joints)))
+    J[:, :, own] = np.swapaxes(cross(found.joint_axes[:, own], arms), -1, -2)
+    return J
+
+
 def tip_jacobians(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) -> Array:
     """Compute the derivatives (1) of fingertips' middles, (n, fingers, 3, joints) [m/rad]."""
-    found = places(hand, joints, palm_pose)
-    starts = hand_arrays(hand).starts
-    J = np.zeros((*found.tips.shape, len(hand.joints)))
-    for finger, (first, end) in enumerate(pairwise(starts)):
-        arms = found.tips[:, finger, None] - found.link_positions[:, first:end]
-        J[:, finger, :, first:end] = np.swapaxes(
-            cross(found.joint_axes[:, first:end], arms), -1, -2
-        )
-    return J
+    found, ends = places(hand, joints, palm_pose), hand_arrays(hand).starts[1:] - 1
+    each = [jacobian(hand, found, end, found.tips[:, f]) for f, end in enumerate(ends.tolist())]
+    return np.stack(each, axis=1)
 
 
 def rotation_about(axis: Array, angle: float) -> Array:

@@ -19,13 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen
-from grasp_core.checked import (
-    coefficient,
-    instance,
-    seed_of,
-    shown,
-    switch,
-)
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
@@ -36,10 +29,18 @@ from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.opening import opened
 from grasp_core.hands.pose_search import Asked, contact_choices, find_pose
-from grasp_core.kinds import HandClearance, Number, Starts
+from grasp_core.kinds import (
+    Friction,
+    HandClearance,
+    Number,
+    Seed,
+    Starts,
+    instance,
+    shown,
+    value_of,
+)
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.settings import value_of
 from grasp_core.values import FINGERS, Contact, Grasp
 
 ReachReason: TypeAlias = Literal["", "limit", "collision", "not found", "no closure"]
@@ -185,11 +186,11 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
     check_body(body)
     instance(grasp, Grasp, "grasp", "plan finds some")
     up, height = _table(body, table_down)
-    switch(regions, "regions")
+    value_of(bool, regions, "regions")
     asked = Asked(
-        hand, body, grasp, coefficient(friction), up, height,
+        hand, body, grasp, value_of(Friction, friction, "friction"), up, height,
         value_of(HandClearance, clearance_m, "clearance_m"), regions,
-        seed_of(seed), value_of(Starts, starts, "starts"),
+        value_of(Seed, seed, "seed"), value_of(Starts, starts, "starts"),
     )  # fmt: skip
     closed, refuted, undecided = contact_choices(grasp, asked.friction, len(hand.fingers))
     if not closed:

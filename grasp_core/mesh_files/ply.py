@@ -10,11 +10,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
-from grasp_core.mesh_files.polygons import Polygons
-from grasp_core.mesh_files.rounding import TextPoints
+from grasp_core.mesh_files.polygons import Polygons, TextPoints
 from grasp_core.mesh_files.texts import plain_text, whole, worded_lines
 
 TYPES = {
@@ -65,7 +63,7 @@ def read_ply(data: bytes, most: int) -> tuple[Array, int, Polygons]:
         elif table.name == "vertex":
             points = body.points(table)
         else:
-            body.skip(table)
+            deque(_rows(table, body), maxlen=0)
     body.begin_row()
     if body.goes_on():
         raise ValueError("the file goes on after the tables that its header announces")
@@ -162,10 +160,6 @@ class _Text:
             values[:] = kept
         return points
 
-    def skip(self, table: Table) -> None:
-        """Pass over a table that says nothing of the surface."""
-        deque(_rows(table, self), maxlen=0)
-
     def goes_on(self) -> bool:
         """Return whether anything follows in the row."""
         return self.place < len(self.words)
@@ -194,20 +188,10 @@ class _Binary:
         if any(column.counted for column in table.columns):
             listed = [[cells[axis][0] for axis in POINT] for cells in _rows(table, self)]
             return np.array(listed, dtype=np.float64).reshape(-1, 3)
-        rows = self._plain_rows(table)
-        return np.stack([rows[axis].astype(np.float64) for axis in POINT], axis=1)
-
-    def _plain_rows(self, table: Table) -> "NDArray[Any]":
         fields = [(column.name, self.order + column.kind) for column in table.columns]
         rows = np.frombuffer(self.data, np.dtype(fields), table.rows, self.place)
         self.place += rows.nbytes
-        return rows
-
-    def skip(self, table: Table) -> None:
-        if any(column.counted for column in table.columns):
-            deque(_rows(table, self), maxlen=0)
-        elif table.rows:
-            self._plain_rows(table)
+        return np.stack([rows[axis].astype(np.float64) for axis in POINT], axis=1)
 
     def goes_on(self) -> bool:
         return self.place < len(self.data)

@@ -16,8 +16,7 @@ from grasp_core.files.text_files import bounded_bytes
 from grasp_core.mesh_files.glb import read_glb
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.ply import read_ply
-from grasp_core.mesh_files.polygons import too_many
-from grasp_core.mesh_files.rounding import single_rounding, text_rounding
+from grasp_core.mesh_files.polygons import single_rounding, text_rounding, too_many
 from grasp_core.mesh_files.texts import read_obj, read_off, read_stl_text
 
 FORMATS = ("obj", "stl", "ply", "off", "glb")

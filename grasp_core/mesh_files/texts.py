@@ -9,8 +9,7 @@ import re
 from collections.abc import Iterator
 
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.polygons import Polygons, too_many
-from grasp_core.mesh_files.rounding import TextPoints
+from grasp_core.mesh_files.polygons import Polygons, TextPoints, too_many
 
 LONGEST_LINE = 2**20
 PADDING = b"\0\x1a"

@@ -92,10 +92,10 @@ def intersection_volume(one: Solid, two: Solid) -> float:
     return float((_manifold(one) ^ _manifold(two)).volume())
 
 
-def union(solids: Sequence[tuple[Solid, Indices]]) -> tuple[Solid, Indices]:
+def union(solids: Sequence[Solid], numbers: Sequence[Indices]) -> tuple[Solid, Indices]:
     """Unite solids whose triangles are numbered; parts of triangles keep their numbers, (t,)."""
     kernel = _kernel()
-    parts = [_manifold(solid, numbers) for solid, numbers in solids]
+    parts = list(map(_manifold, solids, numbers))
     body = kernel.Manifold.batch_boolean(parts, kernel.OpType.Add)
     return _solid(body), np.asarray(body.to_mesh64().face_id, dtype=np.int64)
 

@@ -23,21 +23,21 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices, frozen, real_array
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mesh_files.limits import MeshChoices, MeshLimits, PatchLimits
-from grasp_core.mesh_files.polygons import check_corners, too_many
-from grasp_core.mesh_files.rounding import single_rounding
+from grasp_core.mesh_files.polygons import check_corners, single_rounding, too_many
 from grasp_core.objects.booleans import Solid, hull
 from grasp_core.objects.curved_patches import flat_patches
 from grasp_core.objects.planar_faces import (
     MAX_FACES,
     PLANAR,
-    Flatness,
     coplanar_groups,
     planar_face,
+    planar_slack,
 )
-from grasp_core.objects.sheets import check_bounds
-from grasp_core.objects.solid_checks import check_volume
-from grasp_core.objects.sound_surface import SoundSurface, sound_surface
-from grasp_core.objects.surface import Face, Surface
+from grasp_core.objects.sheets import check_bounds, outward_sheets
+from grasp_core.objects.shells import check_volume
+from grasp_core.objects.sound_surface import sound_surface
+from grasp_core.objects.surface import Face, SoundSurface, Surface
+from grasp_core.objects.triangles import Edges
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
@@ -74,20 +74,21 @@ def build(
     blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
     most, largest = choices.max_parts, choices.largest_part
     found = sound_surface(points, corners, blur, most_parts=most, largest_part=largest, known=known)
-    flatness = Flatness.of(extent, blur)
-    groups = _planar_groups(found, flatness, choices)
-    if groups is None:
-        found = found.outward(largest_part=largest)
-        patches = choices.patches
-        faces, said = _patched(found, patches)
-    elif found.fault:
-        raise found.fault
-    else:
+    slack = planar_slack(extent, blur)
+    groups = _planar_groups(found, slack, blur, choices)
+    fault = Edges.of(found.corners).fault()
+    if groups is not None and fault:
+        raise fault
+    if found.surface.closed:
         check_bounds(found.points, found.corners)
-        patches = None
-        faces = tuple(
-            planar_face(found.points, found.corners[group], flatness.distance) for group in groups
-        )
+    else:
+        found = outward_sheets(found, largest_part=largest)
+    patches = None
+    if groups is None:
+        patches = choices.patches
+        faces, said = _patched(found, fault, patches)
+    else:
+        faces = tuple(planar_face(found.points, found.corners[group], slack) for group in groups)
         said = _uneven(found, groups, faces, PLANAR * extent)
     center = _given_center(found.points, center_of_mass)
     surface = found.surface
@@ -146,23 +147,29 @@ def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | No
 
 
 def _planar_groups(
-    found: SoundSurface, flatness: Flatness, choices: MeshChoices
+    found: SoundSurface, slack: float, blur: float, choices: MeshChoices
 ) -> list[Indices] | None:
     if choices.faces == "patches":
         return None
-    groups = coplanar_groups(found.points, found.corners, flatness, found.surface.caps)
-    if choices.faces == "auto" and len(groups) > MAX_FACES:
+    automatic = choices.faces == "auto"
+    most = MAX_FACES if automatic else choices.max_faces
+    groups = coplanar_groups(
+        found.points, found.corners, slack, blur=0.5 * blur, caps=found.surface.caps, most=most
+    )
+    if automatic and len(groups) > most:
         return None
     if len(groups) > choices.max_faces:
         message = (
-            f"{len(groups)} planar faces exceed the limit of {choices.max_faces}; simplify "
-            "the mesh, or plan on nearly flat patches (--faces patches)"
+            f"the mesh has more planar faces than the limit of {choices.max_faces}; simplify the "
+            "mesh, or plan on nearly flat patches (--faces patches)"
         )
         raise MeshError(MeshRefusal.TOO_MANY, message)
     return groups
 
 
-def _patched(found: SoundSurface, limits: PatchLimits) -> tuple[tuple[Face, ...], list[str]]:
+def _patched(
+    found: SoundSurface, fault: MeshError | None, limits: PatchLimits
+) -> tuple[tuple[Face, ...], list[str]]:
     patches = flat_patches(found.points, found.corners, limits, found.surface.caps)
     if len(patches) < FINGERS:
         raise MeshError(
@@ -177,8 +184,8 @@ def _patched(found: SoundSurface, limits: PatchLimits) -> tuple[tuple[Face, ...]
         f"the surface is curved; its {len(patches)} patches stand for faces, and lean from their "
         f"planes by up to {math.degrees(lean):.3g} deg and are up to {1e3 * off:.3g} mm off them"
     ]
-    if found.fault and found.surface.closed:
-        notes.append(f"the surface is faulty ({found.fault}); only its patches are used")
+    if fault and found.surface.closed:
+        notes.append(f"the surface is faulty ({fault}); only its patches are used")
     return patches, notes
 
 

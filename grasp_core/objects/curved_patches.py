@@ -10,9 +10,8 @@ projection then has no folds and no ends: the number of triangles over a point i
 everywhere. It is one at the point that the polygon grew from, so it is one everywhere. Spread and
 depth are measured on all triangles that may reach over the polygon.
 
-Groups grow across shared edges from the flattest triangles on, measured against a plane of
-their own, never from neighbour to neighbour; the plane is fitted again to what has grown. Edges of
-holes in the surface, or of more than two triangles, are borders.
+Groups grow (see `triangles`) from the flattest triangles on. Edges of holes in the surface, or of
+more than two triangles, are borders.
 
 Polygons grow between segments that must stay outside. A segment is kept out by the half-plane
 through the segment's point nearest to the middle of the polygon, perpendicular to the line that
@@ -25,7 +24,6 @@ through semidefinite programming", 2015), with the ellipse of the polygon's seco
 
 import math
 from bisect import insort
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -37,12 +35,13 @@ from grasp_core.geometry.polygons import (
     area_and_centroid,
     clip,
     edge_rows,
+    nearest_on_segments,
     plane_frame,
     signed_area,
 )
 from grasp_core.mesh_files.limits import PatchLimits
-from grasp_core.objects.planar_faces import NO_CAPS, triangle_neighbours
 from grasp_core.objects.surface import Face
+from grasp_core.objects.triangles import NO_CAPS, Plane, Triangles
 from grasp_core.solvers.ties import first_best, graded, largest_first, ranks, surpassing
 
 SMOOTHING = 10
@@ -62,8 +61,9 @@ def flat_patches(
     vertices: Array, triangles: Indices, limits: PatchLimits, caps: Indices = NO_CAPS
 ) -> tuple[Face, ...]:
     """Find the largest nearly flat patches of a surface, those with the largest discs first."""
-    surface = _Surface.of(vertices, triangles)
-    depth = limits.depth * surface.extent
+    surface = Triangles.of(vertices, triangles)
+    extent = float(np.ptp(vertices, axis=0).max())
+    depth = limits.depth * extent
     found: list[tuple[float, Face]] = []
     radii: list[float] = []
     for group in _groups(surface, math.radians(limits.spread_deg), depth, caps):
@@ -71,10 +71,10 @@ def flat_patches(
         enough = len(radii) >= limits.most
         if enough and math.pi * radii[-limits.most] ** 2 >= group.area:
             break
-        if patch := _patch(surface, group.triangles, -group.outward):
+        if patch := _patch(surface, group.triangles, -group.outward, BORDER_GAP * extent):
             found.append(patch)
             insort(radii, patch[0])
-    return _largest_apart(found, limits.most, surface.extent)
+    return _largest_apart(found, limits.most, extent)
 
 
 def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) -> tuple[Face, ...]:
@@ -95,26 +95,6 @@ def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) ->
     return tuple(found[place][1] for place in kept)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Surface:
-    """A triangle mesh with the areas, normals and neighbours by which groups of triangles grow."""
-
-    corners: Array  # corners of the triangles, (t, 3, 3) [m]
-    normals: Array  # outward unit normals, zero for triangles without area, (t, 3)
-    areas: Array  # (t,) [m^2]
-    across: Indices  # the triangle across each edge (k, k+1), (t, 3); -1 where the edge is a border
-    extent: float  # largest extent of the object [m]
-
-    @classmethod
-    def of(cls, vertices: Array, triangles: Indices) -> "_Surface":
-        corners = vertices[triangles]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        lengths = np.linalg.norm(cross, axis=1)
-        normals = cross / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-        extent = float(np.ptp(vertices, axis=0).max())
-        return cls(corners, normals, 0.5 * lengths, triangle_neighbours(triangles), extent)
-
-
 class _Group(NamedTuple):
     """Connected triangles, with the outward normal of their plane and their area [m^2]."""
 
@@ -123,58 +103,32 @@ class _Group(NamedTuple):
     area: float
 
 
-def _groups(surface: _Surface, spread: float, depth: float, caps: Indices) -> list[_Group]:
-    smooth = _smoothed(surface)
-    flatness: Array = np.einsum("ti,ti->t", smooth, surface.normals)
+def _groups(surface: Triangles, spread: float, depth: float, caps: Indices) -> list[_Group]:
+    smooth, normals = _smoothed(surface), surface.normals
+    flatness: Array = np.einsum("ti,ti->t", smooth, normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
-    free = np.ones(len(surface.areas), dtype=np.bool_)
-    free[caps] = False
-    groups: list[_Group] = []
-    for seed in flat_first:
-        if not free[seed]:
-            continue
+
+    def fit(some: Indices, plane: Plane) -> NDArray[np.bool_]:
+        normal, origin = plane
+        upright = normals[some] @ normal >= math.cos(spread)
+        heights = np.abs((surface.corners[some] - origin) @ normal).max(axis=1)
+        return upright & (heights <= depth)
+
+    def first_plane(seed: int) -> Plane:
         # on flat ground the average is the better normal, beside an edge the triangle's own
-        level = float(smooth[seed] @ surface.normals[seed]) >= math.cos(0.5 * spread)
-        plane = (smooth if level else surface.normals)[seed], surface.corners[seed].mean(axis=0)
-        group = _Group(np.array([seed]), plane[0], 0.0)
-        for _ in range(FITS):
-            members = _grown(surface, int(seed), plane, spread, depth, free)
-            if not len(members):
-                break
-            weights = surface.areas[members]
-            group = _Group(members, plane[0], float(weights.sum()))
-            mean = weights @ surface.normals[members]
-            middle = weights @ surface.corners[members].mean(axis=1) / weights.sum()
-            plane = mean / np.linalg.norm(mean), middle
-        free[group.triangles] = False
-        groups.append(group)
+        middle = surface.corners[seed].mean(axis=0)
+        level = float(smooth[seed] @ normals[seed]) >= math.cos(0.5 * spread)
+        near = bool(fit(np.array([seed]), (smooth[seed], middle))[0])  # a large triangle may not be
+        return (smooth if level and near else normals)[seed], middle
+
+    groups = [
+        _Group(members, normal, float(surface.areas[members].sum()))
+        for members, (normal, _) in surface.groups(flat_first, first_plane, fit, FITS, caps)
+    ]
     return [groups[place] for place in largest_first([group.area for group in groups])]
 
 
-def _grown(
-    surface: _Surface,
-    seed: int,
-    plane: tuple[Array, Array],
-    spread: float,
-    depth: float,
-    free: NDArray[np.bool_],
-) -> Indices:
-    normal, origin = plane
-    seen = ~free
-    seen[seed] = True
-    front, members = np.array([seed]), list[Indices]()
-    while len(front):
-        upright = surface.normals[front] @ normal >= math.cos(spread)
-        heights = np.abs((surface.corners[front] - origin) @ normal).max(axis=1)
-        front = front[upright & (heights <= depth)]
-        members.append(front)
-        after = np.unique(surface.across[front])
-        front = after[(after >= 0) & ~seen[after]]
-        seen[front] = True
-    return np.concatenate(members)
-
-
-def _smoothed(surface: _Surface) -> Array:
+def _smoothed(surface: Triangles) -> Array:
     """Average normals over neighbouring triangles, weighted by area, (t, 3)."""
     weighted = surface.normals * surface.areas[:, None]
     inner = surface.across >= 0
@@ -186,7 +140,9 @@ def _smoothed(surface: _Surface) -> Array:
     return weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-300)
 
 
-def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Face] | None:
+def _patch(
+    surface: Triangles, group: Indices, normal: Array, gap: float
+) -> tuple[float, Face] | None:
     """Fit a convex polygon that a group covers once; also return its largest disc's radius [m]."""
     frame = plane_frame(normal)
     origin = surface.corners[group].mean(axis=(0, 1))
@@ -201,7 +157,7 @@ def _patch(surface: _Surface, group: Indices, normal: Array) -> tuple[float, Fac
     # the derivation needs one triangle over the point from which the polygon grows
     if room <= 0.0 or over.sum() != 1:
         return None
-    polygon = clearing(start, border, BORDER_GAP * surface.extent)
+    polygon = clearing(start, border, gap)
     if polygon is None:
         return None
     E, b = edge_rows(polygon)
@@ -294,10 +250,7 @@ def _cut(box: Array, middle: Array, segments: Array, stretch: Array, gap: float)
 
 def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
     """Return the points of segments nearest to a point, (m, 2), and their distances, (m,)."""
-    tails, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    squared = np.einsum("mi,mi->m", along, along)
-    share = np.einsum("mi,mi->m", point - tails, along) / np.where(squared > 0.0, squared, 1.0)
-    points = tails + np.clip(share, 0.0, 1.0)[:, None] * along
+    points = nearest_on_segments(segments[:, 0], segments[:, 1], point)
     return points, np.linalg.norm(points - point, axis=1)
 
 

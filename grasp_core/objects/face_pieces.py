@@ -5,7 +5,7 @@ All linear programs work on these pieces, so their tolerances mean the same for 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, product
 from typing import Annotated, TypeAlias
 
 import numpy as np
@@ -20,7 +20,6 @@ from grasp_core.geometry.polygons import (
     convex_polygon,
     edge_rows,
     has_inscribed_radius,
-    plane_frame,
 )
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
@@ -157,27 +156,25 @@ def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
 
 def unit_pieces(body: Polyhedron) -> tuple[FacePiece, ...]:
     """List convex pieces with room for a contact, about the centre of mass, over the radius."""
-    pieces = [
-        replace(
-            piece_of(index, face.normal, (polygon - body.center_of_mass) / body.radius),
-            spread=face.spread,
-            depth=face.depth / body.radius,
-        )
-        for index, face in enumerate(body.faces)
-        for polygon in face.pieces
-    ]
-    return tuple(piece for piece in pieces if piece.inradius > THINNEST)
+    return tuple(chain.from_iterable(pieces_by_face(body)))
 
 
 def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
-    """List the convex pieces of each face with room for a contact, in the order of the faces."""
-    by_face: list[list[FacePiece]] = [[] for _ in body.faces]
-    for piece in unit_pieces(body):
-        by_face[piece.face].append(piece)
-    return tuple(tuple(pieces) for pieces in by_face)
+    """List the pieces of `unit_pieces` for each face."""
+    found: list[tuple[FacePiece, ...]] = []
+    for index, face in enumerate(body.faces):
+        polygons = ((polygon - body.center_of_mass) / body.radius for polygon in face.pieces)
+        pieces = (
+            piece_of(index, face.normal, polygon, face.spread, face.depth / body.radius)
+            for polygon in polygons
+        )
+        found.append(tuple(piece for piece in pieces if piece.inradius > THINNEST))
+    return tuple(found)
 
 
-def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
+def piece_of(
+    face: int, normal: Array, polygon: Array, spread: float = 0.0, depth: float = 0.0
+) -> FacePiece:
     """Make the `FacePiece` of a convex polygon (k, 3)."""
     edge = polygon[1] - polygon[0]
     along = np.asarray(edge / np.linalg.norm(edge), dtype=np.float64)
@@ -186,20 +183,8 @@ def piece_of(face: int, normal: Array, polygon: Array) -> FacePiece:
     corners = (polygon - origin) @ frame
     E, b = edge_rows(corners)
     return FacePiece(
-        face=face,
-        normal=normal,
-        origin=origin,
-        frame=frame,
-        corners=corners,
-        E=E,
-        b=b,
-        inradius=inscribed_radius(E, b),
+        face, normal, origin, frame, corners, E, b, inscribed_radius(E, b), spread, depth
     )
-
-
-def inscribed_disc_radius_of(polygon: Array, normal: Array) -> float:
-    """Compute the radius of the largest disc in a convex polygon (k, 3), wound about the normal."""
-    return inscribed_radius(*edge_rows((polygon - polygon[0]) @ plane_frame(normal)))
 
 
 def inscribed_radius(E: Array, b: Array) -> float:

@@ -18,15 +18,16 @@ instead.
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
-from grasp_core.checked import instance
 from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import nearest_on_segments
+from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
+from grasp_core.objects.triangles import areas_and_normals
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 
@@ -46,7 +47,7 @@ def check_planar(body: Polyhedron, asking: str) -> None:
     if body.patches is not None:
         raise InputError(
             f"{asking}: expected an object with planar faces, got {body.name} with curved ones; "
-            "take a mesh with fewer, planar faces"
+            "read it with faces='planar', or take a mesh with fewer, planar faces"
         )
 
 
@@ -97,8 +98,7 @@ def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
         off = abs(float(face.normal @ (contact.position - face.centroid)))
         return off <= slack and float(np.abs(contact.normal - face.normal).max()) <= ON_FACE
     corners = body.vertices[body.triangles[face.facets][:, ::-1]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    _, normals = areas_and_normals(corners)
     heights = np.abs(np.einsum("fi,fi->f", normals, contact.position - corners[:, 0]))
     turned = np.abs(normals - contact.normal).max(axis=1)
     return any(
@@ -124,22 +124,13 @@ def nearest_on_surface(vertices: Array, triangles: Indices, points: Array) -> Ar
 
 def nearest_on_triangles(corners: Array, points: Array) -> Array:
     """Find the point of each triangle (t, 3, 3) nearest to points (..., 3), (..., t, 3) [m]."""
-    points = points[..., None, :]
-    candidates = np.stack([*_on_edges(corners, points), _foot(corners, points)])
-    nearest = np.linalg.norm(candidates - points, axis=-1).argmin(axis=0)
-    found: Array = np.take_along_axis(candidates, nearest[None, ..., None], axis=0)[0]
-    return found
-
-
-def _on_edges(corners: Array, points: Array) -> list[Array]:
-    """Return the point of each edge nearest to points (..., 1, 3), three times (..., t, 3)."""
-    found: list[Array] = []
-    for start, end in ((0, 1), (1, 2), (2, 0)):
-        tails = corners[:, start]
-        along = corners[:, end] - tails
-        shares = np.clip(_divided(_dots(points - tails, along), _dots(along, along)), 0.0, 1.0)
-        found.append(tails + shares[..., None] * along)
-    return found
+    points = points[..., None, None, :]
+    on_edges = nearest_on_segments(corners, np.roll(corners, -1, axis=1), points)
+    feet = _foot(corners, points[..., 0, :])[..., None, :]
+    candidates = np.concatenate([on_edges, feet], axis=-2)
+    nearest = np.linalg.norm(candidates - points, axis=-1).argmin(axis=-1)
+    found: Array = np.take_along_axis(candidates, nearest[..., None, None], axis=-2)
+    return found[..., 0, :]
 
 
 def _foot(corners: Array, points: Array) -> Array:
@@ -147,38 +138,26 @@ def _foot(corners: Array, points: Array) -> Array:
     tails = corners[:, 0]
     one, other, away = corners[:, 1] - tails, corners[:, 2] - tails, points - tails
     normals = cross(one, other)
-    squares = _dots(normals, normals)
-    v = _divided(_dots(normals, cross(away, other)), squares)
-    w = _divided(_dots(normals, cross(one, away)), squares)
+    squares = np.einsum("ti,ti->t", normals, normals)
+    scaled = normals / np.where(squares > 0.0, squares, 1.0)[:, None]
+    v = np.einsum("ti,...ti->...t", scaled, cross(away, other))
+    w = np.einsum("ti,...ti->...t", scaled, cross(one, away))
     inside = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
     v, w = np.where(inside, v, 0.0), np.where(inside, w, 0.0)
     return tails + v[..., None] * one + w[..., None] * other
 
 
-def _dots(a: Array, b: Array) -> Array:
-    return np.einsum("...i,...i->...", a, b)
-
-
-def _divided(a: Array, b: Array) -> Array:
-    """Divide arrays, with zero where the divisor is zero: there corners are the candidates."""
-    return np.divide(a, b, out=np.zeros_like(a), where=np.broadcast_to(b > 0.0, a.shape))
-
-
 LEAN = math.cos(3e-3)
 """Cosine of the largest angle at which a normal and a triangle's normal agree: planar faces are
-flat to within `Flatness`, and files keep six digits."""
+flat to within `planar_faces.ANGLE`, and files keep six digits."""
 
 
 class Surface:
     """The surface of a closed triangle mesh whose triangles face outwards."""
 
     def __init__(self, vertices: Array, triangles: Indices) -> None:
-        self._corners: Any = vertices[triangles]
-        outward = np.cross(
-            self._corners[:, 1] - self._corners[:, 0], self._corners[:, 2] - self._corners[:, 0]
-        )
-        lengths = np.linalg.norm(outward, axis=1, keepdims=True)
-        self._inward = -outward / np.where(lengths > 0.0, lengths, 1.0)
+        self._corners = vertices[triangles]
+        self._inward = -areas_and_normals(self._corners)[1]
 
     def holds(self, point: Array, normal: Array | None, slack: float) -> bool:
         """Return whether a point is within `slack` of a triangle with such a normal, if given."""

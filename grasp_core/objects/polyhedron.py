@@ -16,18 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
-from grasp_core.checked import (
-    LARGEST,
-    instance,
-    one_of,
-    path_of,
-    positive,
-    shown,
-    text,
-)
 from grasp_core.declared import Declared, InNotebooks, counted, summary
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import Range
+from grasp_core.kinds import LARGEST, Quantity, Range, instance, one_of, path_of, shown, value_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
@@ -132,7 +123,7 @@ class Polyhedron(Declared, InNotebooks):
         Raises:
             InputError: The density is out of range, or the volume is not known.
         """
-        density = positive(density_kg_m3, "density_kg_m3")
+        density = value_of(Quantity, density_kg_m3, "density_kg_m3")
         if not self.surface.closed:
             raise InputError(
                 f"{self.name}: a density gives no mass, because the surface is open and its volume "
@@ -200,7 +191,7 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         MeshChoices, instance(limits, MeshLimits, "limits"), faces=faces,
         patches=patches or PatchLimits(), flatness_m=flatness_m, largest_part=largest_part,
     )  # fmt: skip
-    size = UNITS_M[unit] * positive(scale, "scale")
+    size = UNITS_M[unit] * value_of(Quantity, scale, "scale")
     path = path_of(path, "path")
     mesh = read_triangles(path, limits)
     with about(path):
@@ -228,7 +219,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
     kind: type[AnyPolyhedron] = Polyhedron,
 ) -> AnyPolyhedron:
     """Check a triangle mesh and build the polyhedron of its faces."""
-    text(name, "name")
+    value_of(str, name, "name")
     made = build(
         vertices, triangles, choices, rounding=rounding, center_of_mass=center_of_mass, known=known
     )

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.objects.planar_faces import SIDES, triangle_neighbours
-from grasp_core.objects.shells import SMALL, Shells, left_out
-from grasp_core.objects.solid_checks import components, triangle_areas
+from grasp_core.objects.shells import SMALL, left_out
+from grasp_core.objects.surface import SoundSurface
+from grasp_core.objects.triangles import NO_CAPS, Edges, components, numbered, triangle_areas
 
 CERTAIN = 0.4
 """Least mean winding number on an open surface that is taken for outward: half a ball has 0.3."""
@@ -43,13 +43,13 @@ def check_bounds(points: Array, corners: Indices) -> None:
         raise _crossing(off)
 
 
-def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Shells:
+def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
     """Orient the parts of an open surface outwards."""
     # parts connect across edges of two triangles
-    across = triangle_neighbours(corners)
-    here = np.repeat(np.arange(len(corners)), SIDES + 1)
-    links = np.column_stack([here, across.ravel()])[across.ravel() >= 0]
-    _, label = np.unique(components(len(corners), links), return_inverse=True)
+    points, corners = found.points, found.corners
+    across = Edges.of(corners).neighbours()
+    here, side = np.nonzero(across >= 0)
+    label = numbered(len(corners), np.column_stack([here, across[here, side]]))
     areas, said = triangle_areas(points, corners), list[str]()
     whole, count = float(areas.sum()), int(label.max()) + 1
     if largest_part:
@@ -81,8 +81,7 @@ def outward_sheets(points: Array, corners: Indices, *, largest_part: bool) -> Sh
     if (apart := count - int(sound.sum())) > 0:
         said.append(left_out(apart, dropped))
     used, local = np.unique(corners, return_inverse=True)
-    none = np.empty(0, dtype=np.int64)
-    return Shells(points[used], local.reshape(-1, 3), none, max(dropped, 0.0), tuple(said))
+    return found.mended(points[used], local.reshape(-1, 3), NO_CAPS, max(dropped, 0.0), said)
 
 
 def _winding_of_parts(points: Array, corners: Indices, areas: Array, label: Indices) -> Array:
@@ -130,13 +129,17 @@ def winding_on(corners: Array, places: Indices) -> Array:
     axes = np.ascontiguousarray(corners.transpose(2, 1, 0))
     for start in range(0, len(places), step):
         asked = places[start : start + step]
-        angles = _solid_angles(axes, corners[asked].mean(axis=1))
+        angles = solid_angles(axes, corners[asked].mean(axis=1))
         angles[np.arange(len(asked)), asked] = 0.0
         found[start : start + step] = angles.sum(axis=1) / (4.0 * math.pi)
     return found
 
 
-def _solid_angles(axes: Array, points: Array) -> Array:
+def solid_angles(axes: Array, points: Array) -> Array:
+    """Return solid angles of triangles seen from points, signed (Van Oosterom & Strackee 1983).
+
+    Triangles are given by coordinates, corners and number, (3, 3, t); found are (points, t).
+    """
     x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
     lengths = np.sqrt(x * x + y * y + z * z)
     (ax, bx, cx), (ay, by, cy), (az, bz, cz), (a, b, c) = (
@@ -158,11 +161,8 @@ def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.boo
     In each part that connects across edges of two triangles, the larger area keeps its winding.
     Gives the triangles, and which of them were turned.
     """
-    across = triangle_neighbours(corners)
-    # across these edges the neighbour runs along the edge in the same direction, (t, 3)
-    heads, others = np.roll(corners, -1, axis=1), corners[across]
-    same = (others == corners[..., None]) & (np.roll(others, -1, axis=2) == heads[..., None])
-    against = same.any(axis=2) & (across >= 0)
+    edges = Edges.of(corners)
+    across, against = edges.neighbours(), edges.against[edges.place].reshape(-1, 3)
     # each triangle counts twice, as it is and turned; those that are wound alike are linked
     inner, count = across >= 0, len(corners)
     here, there, flip = np.nonzero(inner)[0], across[inner], count * against[inner]

@@ -8,21 +8,15 @@ apart from each other. Parts that would be refused are left out if all of them t
 no area, or if the user asks for the largest part alone.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.objects.booleans import Solid, intersection_volume, union
-from grasp_core.objects.planar_faces import edges_of
-from grasp_core.objects.solid_checks import (
-    THINNEST,
-    check_volume,
-    components,
-    thin_share,
-    triangle_areas,
-)
+from grasp_core.objects.surface import SoundSurface
+from grasp_core.objects.triangles import Edges, crosses_of, triangle_areas
 
 OVERLAP = 1e-6
 """Volume shared by two parts, relative to the whole, above which they overlap; parts that only
@@ -32,74 +26,77 @@ SMALL = 0.01
 CLEAN = 1e-4
 """Largest share of the surface of a union that may be beside slits as thin as rounding; edges of
 sound unions show some 1e-6."""
+THINNEST = 1e-9
+"""Least volume of a solid, relative to the cube of the extent."""
+THIN = 4e-6
+"""Width of a slit, relative to the extent, which rounding in single precision may leave."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shells:
-    """The surface of one solid, made of the shells of a mesh."""
+class _Body(Solid):
+    """A body with its cavities."""
 
-    points: Array  # vertices, (n, 3) [m]
-    corners: Indices  # vertex indices, (t, 3)
-    caps: Indices  # indices of the triangles that are or come from caps, (c,)
-    dropped: float  # area of the parts that were left out, as a share of the whole
-    said: tuple[str, ...]  # what was changed, in words
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Body:
-    """A body with its cavities; `marks` are the triangles' numbers in the mesh."""
-
-    solid: Solid
-    marks: Indices
+    marks: Indices  # numbers of the triangles in the mesh, (t,)
 
     @property
     def area(self) -> float:
-        return float(triangle_areas(self.solid.vertices, self.solid.triangles).sum())
+        return float(triangle_areas(self.vertices, self.triangles).sum())
 
     def joined(self, other: "_Body") -> "_Body":
-        solid, added = self.solid, other.solid
         return _Body(
-            Solid(
-                np.concatenate([solid.vertices, added.vertices]),
-                np.concatenate([solid.triangles, added.triangles + len(solid.vertices)]),
-            ),
+            np.concatenate([self.vertices, other.vertices]),
+            np.concatenate([self.triangles, other.triangles + len(self.vertices)]),
             np.concatenate([self.marks, other.marks]),
         )
 
     def turned(self) -> "_Body":
-        return _Body(Solid(self.solid.vertices, self.solid.triangles[:, ::-1]), self.marks)
+        return _Body(self.vertices, self.triangles[:, ::-1], self.marks)
+
+    def shells(self) -> "list[_Body]":
+        """Split the body into parts that share no edge."""
+        label, parts = Edges.of(self.triangles).parts(), list[_Body]()
+        for part in range(int(label.max()) + 1):
+            mine = label == part
+            used, local = np.unique(self.triangles[mine], return_inverse=True)
+            parts.append(_Body(self.vertices[used], local.reshape(-1, 3), self.marks[mine]))
+        return parts
 
 
-def one_solid(
-    points: Array, corners: Indices, caps: Indices, *, most: int, largest_part: bool
-) -> Shells:
-    """Orient the shells of a mesh outwards, and make one solid of them."""
-    whole = Solid(points, corners)
+def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSurface:
+    """Orient the shells of a closed surface outwards, and make one solid of them."""
+    corners, said = found.corners, list[str]()
+    whole = Solid(found.points, corners)
     check_volume(whole)
-    said = list[str]()
     if whole.volume < 0.0:
         corners = corners[:, ::-1]
         said.append("the mesh was inside out; its triangles were turned")
-    label = _labels(corners)
-    if label.max() >= most:
+    if (count := int(Edges.of(corners).parts().max()) + 1) > most:
         raise MeshError(
             MeshRefusal.SEPARATE,
-            f"the mesh has {label.max() + 1} parts, more than the limit of {most}; give one solid",
+            f"the mesh has {count} parts, more than the limit of {most}; give one solid",
         )
-    bodies = _split(_Body(Solid(points, corners), np.arange(len(corners))), label)
-    as_it_is = Shells(points, corners, caps, 0.0, tuple(said))
-    if len(bodies) == 1:
+    as_it_is = found.mended(found.points, corners, found.surface.caps, 0.0, said)
+    shells = _Body(found.points, corners, np.arange(len(corners))).shells()
+    if len(shells) == 1:
         return as_it_is
     try:
-        found = _of_many(bodies, caps, abs(whole.volume), largest_part=largest_part)
+        kept, dropped, changed = _of_many(shells, abs(whole.volume), largest_part=largest_part)
     except InputError as error:
         if isinstance(error, MeshError):
             raise
         raise MeshError(MeshRefusal.NON_MANIFOLD, f"parts cannot be compared: {error}") from error
-    return replace(found, said=(*said, *found.said)) if found.said else as_it_is
+    if not changed:
+        return as_it_is
+    used, local = np.unique(kept.triangles, return_inverse=True)
+    is_cap = np.flatnonzero(np.isin(kept.marks, found.surface.caps))
+    points, corners = kept.vertices[used], local.reshape(-1, 3)
+    return found.mended(points, corners, is_cap, dropped, [*said, *changed])
 
 
-def _of_many(shells: list[_Body], caps: Indices, volume: float, *, largest_part: bool) -> Shells:
+def _of_many(
+    shells: list[_Body], volume: float, *, largest_part: bool
+) -> tuple[_Body, float, list[str]]:
+    """Return the one body to use, the share of the area left out, and what else was changed."""
     said = list[str]()
     area = sum(shell.area for shell in shells)
     slack = OVERLAP * volume
@@ -120,10 +117,7 @@ def _of_many(shells: list[_Body], caps: Indices, volume: float, *, largest_part:
         raise why
     if apart or bad:
         said.append(left_out(len(apart) + len(bad), dropped))
-    used = np.unique(kept.solid.triangles)
-    local = np.searchsorted(used, kept.solid.triangles)
-    is_cap = np.flatnonzero(np.isin(kept.marks, caps))
-    return Shells(kept.solid.vertices[used], local, is_cap, dropped, tuple(said))
+    return kept, dropped, said
 
 
 def left_out(count: int, share: float) -> str:
@@ -135,9 +129,9 @@ def _sorted_out(
     shells: list[_Body], slack: float, said: list[str]
 ) -> tuple[list[_Body], list[_Body], MeshError | None]:
     """Give each cavity to its body; return bodies, parts that cannot be used, and the reason."""
-    thinnest = [THINNEST * float(np.ptp(s.solid.vertices, axis=0).max()) ** 3 for s in shells]
-    flat = [s for s, least in zip(shells, thinnest, strict=True) if abs(s.solid.volume) <= least]
-    bodies = [s for s in shells if s not in flat and s.solid.volume > 0.0]
+    thinnest = [THINNEST * float(np.ptp(s.vertices, axis=0).max()) ** 3 for s in shells]
+    flat = [s for s, least in zip(shells, thinnest, strict=True) if abs(s.volume) <= least]
+    bodies = [s for s in shells if s not in flat and s.volume > 0.0]
     bad: list[_Body] = flat
     why: MeshError | None = None
     if flat:
@@ -147,13 +141,13 @@ def _sorted_out(
             "solids",
         )
     for shell in shells:
-        if shell.solid.volume > 0.0 or shell in flat:
+        if shell.volume > 0.0 or shell in flat:
             continue
         hollow = shell.turned()
-        shared = [intersection_volume(body.solid, hollow.solid) for body in bodies]
-        around = [k for k, part in enumerate(shared) if part >= hollow.solid.volume - slack]
+        shared = [intersection_volume(body, hollow) for body in bodies]
+        around = [k for k, part in enumerate(shared) if part >= hollow.volume - slack]
         if around:
-            host = min(around, key=lambda k: bodies[k].solid.volume)
+            host = min(around, key=lambda k: bodies[k].volume)
             bodies[host] = bodies[host].joined(shell)
         elif sum(shared) <= slack:
             bodies.append(hollow)
@@ -179,13 +173,13 @@ def _sorted_out(
 
 def _is_inside_another(place: int, bodies: list[_Body], slack: float) -> bool:
     """Tell whether a larger body, or an equal one before it, holds a body in its material."""
-    inner = bodies[place].solid
+    inner = bodies[place]
     low, high = inner.vertices.min(axis=0), inner.vertices.max(axis=0)
     return any(
-        (other.solid.volume, place) > (inner.volume, k)
-        and bool((other.solid.vertices.min(axis=0) <= high).all())
-        and bool((low <= other.solid.vertices.max(axis=0)).all())
-        and intersection_volume(other.solid, inner) >= inner.volume - slack
+        (other.volume, place) > (inner.volume, k)
+        and bool((other.vertices.min(axis=0) <= high).all())
+        and bool((low <= other.vertices.max(axis=0)).all())
+        and intersection_volume(other, inner) >= inner.volume - slack
         for k, other in enumerate(bodies)
     )
 
@@ -194,11 +188,11 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
     """Unite bodies that overlap or touch; those that do not are returned as they are."""
     if len(bodies) == 1:
         return bodies
-    solid, marks = union([(body.solid, body.marks) for body in bodies])
-    found = _with_cavities(_split(_Body(solid, marks), _labels(solid.triangles)), slack)
+    solid, marks = union(bodies, [body.marks for body in bodies])
+    found = _with_cavities(_Body(solid.vertices, solid.triangles, marks).shells(), slack)
     if len(found) == len(bodies):
         return bodies
-    if max(thin_share(body.solid) for body in found) > CLEAN:
+    if max(map(thin_share, found)) > CLEAN:
         raise MeshError(
             MeshRefusal.OVERLAP,
             "parts touch, but rounding leaves thin slits between them; let them overlap, or unite "
@@ -209,33 +203,36 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
 
 
 def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
-    bodies = [shell for shell in shells if shell.solid.volume > 0.0]
+    bodies = [shell for shell in shells if shell.volume > 0.0]
     for shell in shells:
-        if shell.solid.volume <= 0.0:
+        if shell.volume <= 0.0:
             hollow = shell.turned()
-            shared = [intersection_volume(body.solid, hollow.solid) for body in bodies]
+            shared = [intersection_volume(body, hollow) for body in bodies]
             host = int(np.argmax(shared))
             if shared[host] > slack:
                 bodies[host] = bodies[host].joined(shell)
     return bodies
 
 
-def _split(body: _Body, label: Indices) -> list[_Body]:
-    parts = list[_Body]()
-    for part in range(int(label.max()) + 1):
-        mine = label == part
-        used, local = np.unique(body.solid.triangles[mine], return_inverse=True)
-        parts.append(
-            _Body(Solid(body.solid.vertices[used], local.reshape(-1, 3)), body.marks[mine])
-        )
-    return parts
+def check_volume(solid: Solid) -> None:
+    """Refuse a solid that encloses almost no volume."""
+    extent = float(np.ptp(solid.vertices, axis=0).max())
+    if abs(solid.volume) < THINNEST * extent**3:
+        message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"
+        raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
 
-def _labels(corners: Indices) -> Indices:
-    """Number the part that each triangle belongs to; parts share no edge, (t,)."""
-    place, _ = edges_of(corners)
-    here, first = np.repeat(np.arange(len(corners)), 3), np.empty(len(place), dtype=np.int64)
-    first[place[::-1]] = here[::-1]
-    links = np.column_stack([here, first[place]])
-    _, label = np.unique(components(len(corners), links), return_inverse=True)
-    return label
+def thin_share(solid: Solid) -> float:
+    """Return the share of the surface that is beside slits or walls thinner than `THIN`.
+
+    Solved: a solid that is moved by a step along an axis leaves a volume of the step times the area
+    that it shows along the axis, each wall counted, less what slits and walls thinner than the step
+    hide. The largest share of the three axes is returned.
+    """
+    step = THIN * float(np.ptp(solid.vertices, axis=0).max())
+    corners = solid.vertices[solid.triangles]
+    seen = 0.25 * np.abs(crosses_of(corners)).sum(axis=0)
+    left = [
+        solid.volume - intersection_volume(solid, solid.moved(step * axis)) for axis in np.eye(3)
+    ]
+    return float(np.abs(seen - np.array(left) / step).max() / seen.max())

@@ -6,10 +6,14 @@ used for its patches, once `sheets` has found which side is inside.
 
 The volume that a hole may hide is bounded by that of half a ball: a cap of area A across a hole of
 width d is off by at most A d / 3 if the true surface stays within the half-ball over the hole.
+
+Close vertices are linked and connected parts found with numpy, since importing scipy's graphs takes
+longer than planning a small object does. Its search tree is used only where points are dense.
 """
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+import importlib
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,42 +21,19 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import Solid, triangulate
-from grasp_core.objects.planar_faces import cut_at_repeats, edges_of
-from grasp_core.objects.sheets import check_bounds, outward_sheets, wound_alike
-from grasp_core.objects.shells import Shells, one_solid
-from grasp_core.objects.solid_checks import (
-    balanced,
-    components,
-    surface_fault,
-    triangle_areas,
-    welded,
-)
-from grasp_core.objects.surface import Surface
+from grasp_core.objects.sheets import wound_alike
+from grasp_core.objects.shells import one_solid
+from grasp_core.objects.surface import SoundSurface, Surface
+from grasp_core.objects.triangles import Edges, components, triangle_areas
 
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""
 FLAT = 1e-9
 """Area of a loop in the plane that fits it, relative to its width squared, below which it is a
 crack between triangles that meet."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SoundSurface:
-    """Welded and consistently wound triangles, with what is known of them."""
-
-    points: Array  # vertices, (n, 3) [m]
-    corners: Indices  # vertex indices, (t, 3)
-    surface: Surface
-    fault: MeshError | None
-    """Why the triangles do not bound a solid with planar faces; None if they do."""
-
-    def outward(self, *, largest_part: bool) -> "SoundSurface":
-        """Return this surface with an open one oriented outwards; a closed one is so already."""
-        if self.surface.closed:
-            check_bounds(self.points, self.corners)
-            return self
-        found = outward_sheets(self.points, self.corners, largest_part=largest_part)
-        return _with_shells(self, found)
+WELD = 1e-8
+"""Distance below which vertices are joined, relative to the extent: single precision in a file
+keeps 6e-8, and vertices that were equal before are equal to the last bit."""
 
 
 def sound_surface(
@@ -68,7 +49,7 @@ def sound_surface(
     if known is None:
         points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
         surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
-        if surface_fault(corners):
+        if Edges.of(corners).fault():
             corners, surface = _capped(points, corners, surface)
     else:  # vertices that were kept apart may be equal, where a united solid touches itself
         points, corners, _ = welded(vertices, triangles, reach=-1.0)
@@ -77,12 +58,10 @@ def sound_surface(
             raise InputError(
                 f"caps must be numbers of triangles below {len(corners)}, got {known.caps.max()}"
             )
-    surface = replace(surface, closed=balanced(corners))
-    found = SoundSurface(points, corners, surface, surface_fault(corners))
-    if not surface.closed:
-        return found
-    whole = one_solid(points, corners, surface.caps, most=most_parts, largest_part=largest_part)
-    return _with_shells(found, whole)
+    # a volume is enclosed where edges are run along as often in both directions
+    closed = not Edges.of(corners).balance.any()
+    found = SoundSurface(points, corners, replace(surface, closed=closed))
+    return one_solid(found, most=most_parts, largest_part=largest_part) if closed else found
 
 
 def _joined(
@@ -91,7 +70,7 @@ def _joined(
     """Weld close vertices, and wind triangles like their neighbours; also say what was changed."""
     points, corners, dropped = welded(vertices, triangles)
     said = [f"dropped {dropped} triangles without area"] if dropped else []
-    fault = surface_fault(corners)
+    fault = Edges.of(corners).fault()
     if fault and fault.reason is MeshRefusal.WINDING:
         wound = wound_alike(corners, triangle_areas(points, corners))
         if wound is None:
@@ -102,14 +81,14 @@ def _joined(
             )
         corners, turned = wound
         said.append(f"triangles wound against their neighbours were turned, {turned.sum()} in all")
-        fault = surface_fault(corners)
+        fault = Edges.of(corners).fault()
     if fault and fault.reason is MeshRefusal.NON_MANIFOLD:
         apart = _welded_apart(vertices, triangles, most_parts)
         if apart is not None:
             points, corners = apart
     elif fault and flatness_m:
         closer, joined, _ = welded(points, corners, 0.5 * flatness_m)
-        if surface_fault(joined) is None:
+        if Edges.of(joined).fault() is None:
             points, corners = closer, joined
             said.append("vertices that rounding had moved apart were joined")
     return points, corners, said
@@ -128,23 +107,12 @@ def _welded_apart(vertices: Array, triangles: Indices, most: int) -> tuple[Array
     points, corners, count = list[Array](), list[Indices](), 0
     for part in range(int(label.max()) + 1):
         mine, local, _ = welded(vertices, triangles[label == part])
-        if surface_fault(local) is not None:
+        if Edges.of(local).fault() is not None:
             return None
         points.append(mine)
         corners.append(local + count)
         count += len(mine)
     return np.concatenate(points), np.concatenate(corners)
-
-
-def _with_shells(found: SoundSurface, made: Shells) -> SoundSurface:
-    surface = replace(
-        found.surface,
-        caps=made.caps,
-        dropped=max(found.surface.dropped, made.dropped),
-        repairs=(*found.surface.repairs, *made.said),
-    )
-    fault = surface_fault(made.corners) if found.surface.closed else found.fault
-    return SoundSurface(made.points, made.corners, surface, fault)
 
 
 def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices, Surface]:
@@ -184,7 +152,7 @@ class Caps(NamedTuple):
 
 def caps_of(points: Array, corners: Indices) -> Caps | None:
     """Close the holes of a surface; None if it has none, or its open edges do not form loops."""
-    loops = _loops(corners)
+    loops = Edges.of(corners).open_loops()
     if not loops:
         return None
     triangles = [_cap(points, loop) for loop in loops]
@@ -192,31 +160,6 @@ def caps_of(points: Array, corners: Indices) -> Caps | None:
     areas = np.array([triangle_areas(points, each).sum() for each in triangles])
     hole_of = np.repeat(np.arange(len(loops)), [len(each) for each in triangles])
     return Caps(np.concatenate(triangles), widths, hole_of, float(areas @ widths) / 3.0)
-
-
-def _loops(corners: Indices) -> list[list[int]] | None:
-    """Walk along the open edges against their triangles, so that caps are wound like these.
-
-    None if an edge that belongs to three or more triangles has more of them on one side. Otherwise
-    as many open edges end in each vertex as begin there, so that every walk returns.
-    """
-    tails, heads = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    place, forward = edges_of(corners)
-    uses = np.bincount(place)
-    balance = np.bincount(place, weights=np.where(forward, 1.0, -1.0))
-    if ((uses > 1) & (balance != 0)).any():
-        return None
-    leaving: dict[int, list[int]] = {}
-    for edge in np.flatnonzero(uses[place] == 1).tolist():
-        leaving.setdefault(int(heads[edge]), []).append(int(tails[edge]))
-    loops = list[list[int]]()
-    for start in list(leaving):
-        while leaving[start]:
-            walk = [start]
-            while (vertex := leaving[walk[-1]].pop()) != start:  # each step uses up an edge
-                walk.append(vertex)
-            loops += cut_at_repeats(walk)
-    return loops
 
 
 def _cap(points: Array, loop: list[int]) -> Indices:
@@ -249,3 +192,70 @@ def _width(places: Array) -> float:
     if len(places) > 500:  # noqa: PLR2004 - the diagonal of the box is at most 1.8 times as long
         return float(np.linalg.norm(np.ptp(places, axis=0)))
     return float(np.linalg.norm(places[:, None] - places[None], axis=2).max())
+
+
+def welded(
+    points: Array, corners: Indices, reach: float | None = None
+) -> tuple[Array, Indices, int]:
+    """Join close vertices, drop unused ones and collapsed triangles; also count the latter."""
+    used, corners = np.unique(corners, return_inverse=True)
+    points, corners = points[used], corners.reshape(-1, 3)
+    if reach is None:
+        reach = WELD * float(np.ptp(points, axis=0).max())
+    try:
+        links = close_pairs(points, reach) if reach >= 0.0 else np.empty((0, 2), dtype=np.int64)
+    except InputError as error:
+        raise MeshError(MeshRefusal.LIMIT, str(error)) from error
+    label = components(len(points), links)
+    _, first, order = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    points, corners = points[np.sort(first)], rank[order][corners]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    if not whole.any():
+        raise MeshError(MeshRefusal.ZERO_VOLUME, "no triangle has an area; export a solid")
+    return points, corners[whole], int((~whole).sum())
+
+
+GENERAL = np.array([0.41421, 0.56714, 0.69315])
+"""Direction of the line on which points are projected, perpendicular to no face that parts usually
+have. It is shorter than one, so that projections are closer together than points."""
+CROWDED = 64
+"""Largest number of neighbours on the line that are compared with a point one by one."""
+MOST_LINKS = 100
+"""Largest number of links per point."""
+
+
+def close_pairs(points: Array, reach: float) -> Indices:
+    """List links between points within a distance of each other, as pairs of indices, (k, 2).
+
+    Close points have close projections on a line, so only neighbours there are compared. Equal
+    points are linked in a row, and only one of them is compared with other points.
+    """
+    shadows = ((points - points[0]) * GENERAL).sum(axis=1)
+    order = np.argsort(shadows, kind="stable")
+    equal = (points[order[1:]] == points[order[:-1]]).all(axis=1)
+    links = [np.column_stack([order[:-1], order[1:]])[equal]]
+    order = order[np.append(True, ~equal)]
+    for step in range(1, len(order)):
+        near = shadows[order[step:]] - shadows[order[:-step]] <= reach
+        if not near.any():
+            break
+        if step > CROWDED:
+            links.append(order[_pairs_of_tree(points[order], reach)])
+            break
+        pairs = np.column_stack([order[:-step][near], order[step:][near]])
+        apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+        links.append(pairs[apart <= reach])
+    return np.concatenate(links)
+
+
+def _pairs_of_tree(points: Array, reach: float) -> Indices:
+    spatial: Any = importlib.import_module("scipy.spatial")
+    tree = spatial.KDTree(points)
+    pairs = (int(tree.count_neighbors(tree, reach)) - len(points)) // 2
+    if pairs > MOST_LINKS * len(points):
+        raise InputError(
+            f"{pairs} pairs of points are within {reach:.3g} of each other, more than {MOST_LINKS} "
+            "per point; merge points that coincide first"
+        )
+    return np.asarray(tree.query_pairs(reach, output_type="ndarray"), dtype=np.int64)

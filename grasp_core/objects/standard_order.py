@@ -34,7 +34,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.geometry.polygons import clip, convex_hull, merge_into_convex_pieces, plane_frame
 from grasp_core.objects.booleans import inset_figure, triangulate
 from grasp_core.objects.face_pieces import Shapes, face_shapes
-from grasp_core.objects.planar_faces import Flatness, convex_pieces
+from grasp_core.objects.planar_faces import convex_pieces, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import graded
@@ -90,7 +90,7 @@ def standard(body: Polyhedron) -> Standard:
     _, image, frame = first
     order: list[int] = np.lexsort(_cells(image, frame).T[::-1]).tolist()
     extent = float(np.ptp(body.vertices, axis=0).max())
-    slack = Flatness.of(extent, body.surface.flatness_m).distance
+    slack = planar_slack(extent, body.surface.flatness_m)
     faces = tuple(_relisted(image.faces[face], image, frame, slack) for face in order)
     owners, body_in_order = tuple(range(len(faces))), replace(image, faces=faces)
     return Standard(body_in_order, tuple(order), mirrored=image is not body, owners=owners)
@@ -119,23 +119,38 @@ def mirror_image(body: Polyhedron) -> Polyhedron:
     )
 
 
+def flag_traits(body: Polyhedron) -> tuple[Array, list[Array]]:
+    """Describe flags by numbers that no rotation or reflection changes, at object radius one.
+
+    Gives each face's area, its plane's height over the centre of mass and the distance of its
+    centre from there, (f, 3); and for each face the distances of its corners from its centre and
+    from the centre of mass, (k, 2).
+    """
+    centers = np.array([face.centroid for face in body.faces]).reshape(-1, 3)
+    away = (centers - body.center_of_mass) / body.radius
+    areas = np.array([face.area for face in body.faces]) / body.radius**2
+    heights = np.einsum("fi,fi->f", body.normals, away)
+    faces = np.column_stack([areas, heights, np.linalg.norm(away, axis=1)])
+    corners = [
+        np.linalg.norm(face.polygon[:, None] - [face.centroid, body.center_of_mass], axis=2)
+        for face in body.faces
+    ]
+    return faces, [lengths / body.radius for lengths in corners]
+
+
 def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
     """Yield the flags (face, corner) that may define the standard order, in the file's order."""
-    kinds: list[Cells] = []
-    for face in body.faces:
-        away = (face.centroid - body.center_of_mass) / body.radius
-        lengths = float(face.normal @ away), float(np.linalg.norm(away))
-        kinds.append(_graded((face.area / body.radius**2, *lengths)))
-    rarest = _rarest([kind for kind in kinds if kind])
+    faces, corners = flag_traits(body)
+    kinds = _graded(faces)
+    rarest = _rarest(kinds)
     flags = [
-        (place, corner)
-        for place, kind in enumerate(kinds)
-        if kind and kind == rarest
-        for corner in range(len(body.faces[place].polygon))
+        (face, corner, cells)
+        for face in (place for place, kind in enumerate(kinds) if kind == rarest)
+        for corner, cells in enumerate(_graded(corners[face]))
+        if corners[face][corner, 0] > SHORTEST
     ]
-    corners = [_kind_of_corner(body, *flag) for flag in flags]
-    rarest = _rarest([kind for kind in corners if kind])
-    return (flag for flag, kind in zip(flags, corners, strict=True) if kind and kind == rarest)
+    rarest = _rarest([cells for *_, cells in flags])
+    return ((face, corner) for face, corner, cells in flags if cells == rarest)
 
 
 def _rarest(kinds: Sequence[Cells]) -> Cells:
@@ -143,16 +158,8 @@ def _rarest(kinds: Sequence[Cells]) -> Cells:
     return min(((count, kind) for kind, count in Counter(kinds).items()), default=(0, ()))[1]
 
 
-def _kind_of_corner(body: Polyhedron, face: int, corner: int) -> Cells:
-    """Describe a corner by its distances from both centres; empty if it gives no direction."""
-    at = body.faces[face].polygon[corner]
-    middles = body.faces[face].centroid, body.center_of_mass
-    lengths = [float(np.linalg.norm(at - middle)) / body.radius for middle in middles]
-    return _graded(lengths) if lengths[0] > SHORTEST else ()
-
-
-def _graded(numbers: Sequence[float]) -> Cells:
-    return tuple(graded(np.array(numbers), CELL_DIGITS).tolist())
+def _graded(rows: Array) -> list[Cells]:
+    return list(map(tuple, graded(rows, CELL_DIGITS).tolist()))
 
 
 def flag_frame(body: Polyhedron, face: int, corner: int) -> Array:
@@ -167,8 +174,7 @@ def flag_frame(body: Polyhedron, face: int, corner: int) -> Array:
 
 def _looks(body: Polyhedron, frame: Array) -> tuple[Cells, ...]:
     """Sort the rows of `_cells` for all faces in a frame in lexicographic order."""
-    cells = _cells(body, frame)
-    return tuple(map(tuple, cells[np.lexsort(cells.T[::-1])].tolist()))
+    return tuple(sorted(map(tuple, _cells(body, frame).tolist())))
 
 
 def _cells(body: Polyhedron, frame: Array) -> Array:

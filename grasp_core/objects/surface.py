@@ -4,16 +4,15 @@ Whatever depends on how far a mesh can be trusted asks here. An orientation that
 no field, because such meshes are refused.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
 import numpy as np
 
-from grasp_core.arrays import Indices, Point, Polygon, Shape, UnitVector
-from grasp_core.checked import LARGEST
+from grasp_core.arrays import Array, Indices, Point, Polygon, Shape, UnitVector
 from grasp_core.declared import Declared, counted, summary
-from grasp_core.kinds import NotNegative, Number, Range
+from grasp_core.kinds import LARGEST, NotNegative, Number, Range
 from grasp_core.values import RIGHT_ANGLE
 
 Places = Annotated[Indices, Shape(None, whole=True)]
@@ -97,3 +96,24 @@ class Surface(Declared):
         if not self.closed:
             what = "its volume is" if self.center_given else "its volume and centre of mass are"
             yield f"the surface is open, so {what} of the convex hull, and a density gives no mass"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SoundSurface:
+    """Welded and consistently wound triangles, with what is known of them."""
+
+    points: Array  # vertices, (n, 3) [m]
+    corners: Indices  # vertex indices, (t, 3)
+    surface: Surface
+
+    def mended(
+        self, points: Array, corners: Indices, caps: Indices, dropped: float, said: Sequence[str]
+    ) -> "SoundSurface":
+        """Return the surface with other triangles, made by dropping a share and by what is said."""
+        known = replace(
+            self.surface,
+            caps=caps,
+            dropped=max(self.surface.dropped, dropped),
+            repairs=(*self.surface.repairs, *said),
+        )
+        return SoundSurface(points, corners, known)

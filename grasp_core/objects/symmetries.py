@@ -16,7 +16,7 @@ foci of one to those of the other, whatever the order of their fingers.
 import importlib
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -25,7 +25,7 @@ import numpy as np
 from grasp_core.arrays import Array, Shape
 from grasp_core.declared import Declared
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import SHORTEST, flag_frame
+from grasp_core.objects.standard_order import SHORTEST, flag_frame, flag_traits
 from grasp_core.values import FINGERS, Grasp
 
 SAME_BODY = 1e-4
@@ -176,32 +176,21 @@ def _near(points: Array) -> Array:
 
 def _flags(body: Polyhedron) -> list[Array]:
     """Return the frames of flags that may be images of the first one, which comes first."""
-    # numbers that no symmetry changes, at object radius one
-    sizes = [math.sqrt(face.area) / body.radius for face in body.faces]
-    aways = [(face.centroid - body.center_of_mass) / body.radius for face in body.faces]
-    heights = [float(face.normal @ away) for face, away in zip(body.faces, aways, strict=True)]
-    kinds = np.column_stack([sizes, heights, [float(np.linalg.norm(away)) for away in aways]])
+    kinds, corners = flag_traits(body)
+    kinds[:, 0] = np.sqrt(kinds[:, 0])  # areas as lengths
     alike = np.abs(kinds[:, None] - kinds[None]).max(axis=2) <= SAME_BODY
-    chosen = min(range(len(kinds)), key=lambda face: int(alike[face].sum()))
-    corners = [
+    chosen = int(alike.sum(axis=1).argmin())
+    flags = [
         (face, corner, lengths)
         for face in (chosen, *(face for face in np.flatnonzero(alike[chosen]) if face != chosen))
-        for corner, lengths in _corners(body, int(face))
+        for corner, lengths in enumerate(corners[face])
+        if lengths[0] > SHORTEST
     ]
     return [
         flag_frame(body, int(face), corner)
-        for face, corner, lengths in corners
-        if math.dist(lengths, corners[0][2]) <= 2.0 * SAME_BODY
+        for face, corner, lengths in flags
+        if math.dist(lengths, flags[0][2]) <= 2.0 * SAME_BODY
     ]
-
-
-def _corners(body: Polyhedron, face: int) -> Iterator[tuple[int, tuple[float, float]]]:
-    """Yield a face's corners that give a direction, with their distances from both centres."""
-    centroid = body.faces[face].centroid
-    for corner, at in enumerate(body.faces[face].polygon):
-        inner = float(np.linalg.norm(at - centroid)) / body.radius
-        if inner > SHORTEST:
-            yield corner, (inner, float(np.linalg.norm(at - body.center_of_mass)) / body.radius)
 
 
 def _is_matched(images: Array, rows: Array) -> bool:

@@ -5,7 +5,7 @@ contact's position, so that no contact on a polygon answers a twist with more th
 support at its corners; the largest of all polygons, over the twist's demand, is what no four
 contacts exceed.
 
-*Levels.* Good contacts are found (`incumbents`), and then one threshold after another is refuted,
+*Levels.* Good contacts are found (`ascent`), and then one threshold after another is refuted,
 each by a tree of cuts (`search`). Each threshold is nearer to the best known quality q: the gap is
 halved from level to level, to q / (1 - gap) at last. Contacts that are found on the way and reach a
 threshold become the best known, and the level is tried again. A level costs more than all before
@@ -26,35 +26,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Amount, Array
-from grasp_core.checked import coefficient, function, number, seed_of, whole
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.compiled import compiled
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Gap, TimeLimit
+from grasp_core.geometry.polygons import convex_polygon
+from grasp_core.kinds import Count, Friction, Gap, Seed, TimeLimit, function, number, value_of
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.optimizing.ascent import begin, climbed, piece_at
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
-from grasp_core.optimizing.grounds import (
-    SEARCH_DIGITS,
-    TWISTS,
-    exact_maps,
-    first_nodes,
-    grounds_of,
-)
-from grasp_core.optimizing.incumbents import begin, climbed, piece_at
-from grasp_core.optimizing.search import (
-    EXACT_GAP,
-    Searching,
-    Steps,
-    Stop,
-)
-from grasp_core.optimizing.support_cuts import SEARCHED_BELOW, CutTree, Slack
+from grasp_core.optimizing.grounds import UNIT, exact_maps, grounds_of
+from grasp_core.optimizing.search import EXACT_GAP, Searching, Stop
+from grasp_core.optimizing.support_cuts import CutTree
 from grasp_core.planning.certify import named
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import Measure, MeasureName, ResistedLoads, measured_set
-from grasp_core.settings import value_of
-from grasp_core.solvers.ties import few_digits, first_best, on_grid, surpassing
+from grasp_core.solvers.ties import few_digits, surpassing
 from grasp_core.values import FINGERS, Grasp, four
 
 PLACED = 1e-7
@@ -85,16 +72,13 @@ def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
 
 def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
     grounds = proof.grounds
-    for piece, polygon in enumerate(grounds.polygons()):
-        away = point - grounds.origins[piece]
-        at = grounds.frames[piece].T @ away
-        edges = np.roll(polygon, -1, axis=0) - polygon
-        beside = edges[:, 0] * (at - polygon)[:, 1] - edges[:, 1] * (at - polygon)[:, 0]
-        if (
-            abs(float(away @ grounds.normals[piece])) <= PLACED
-            and np.abs(normal - grounds.normals[piece]).max() <= PLACED
-            and float(beside.min()) >= -PLACED
-        ):
+    away = point - grounds.origins
+    off = np.abs(np.einsum("pi,pi->p", away, grounds.normals))
+    aside = np.abs(normal - grounds.normals).max(axis=1)
+    for piece in np.flatnonzero((off <= PLACED) & (aside <= PLACED)):
+        polygon = convex_polygon(grounds.polygons()[piece], UNIT)
+        at = grounds.frames[piece].T @ away[piece]
+        if polygon is not None and polygon.holds(at[None], PLACED):
             return True
     return False
 
@@ -184,13 +168,6 @@ def measured(
     return measured_set(wrenches, measure, gap)
 
 
-COUNT = 384
-"""Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
-support of all polygons is smaller."""
-FIRST_STEPS = 60
-"""Steps of these descents: they settle within it."""
-ROUNDED_UP = 1e-6
-"""Share by which a threshold is rounded up at least, and less than three times as much."""
 WIDEST = 0.4
 """Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
 AIMED = 0.999
@@ -204,83 +181,21 @@ MOST_JOBS = 256
 """Most threads: no machine that is known has more use for them."""
 
 
-def lowered_twists(searching: Searching, rng: np.random.Generator) -> Array:
-    """Return unit twists, (n, 6), that polygons resist little, and let the search know them."""
-    grounds, loads = searching.grounds, searching.measure.loads
-    points = [grounds.places(p, at) for p, at in enumerate(grounds.polygons())]
-    on = np.repeat(np.arange(len(points)), [len(each) for each in points])
-    corners, pieces = on_grid(np.vstack(points), SEARCH_DIGITS), searching.pieces
-    found = rng.normal(size=(COUNT, 6))
-    # a task's loads themselves, the other way, ask for most
-    found = np.vstack([-loads, found])
-    found = on_grid(found / np.linalg.norm(found, axis=1, keepdims=True))
-    low = len(loads) + COUNT // 4
-    lowered = found[:low].copy()
-    for y in lowered:
-        compiled(TWISTS).descend(
-            pieces, searching.demand, corners, on, len(on), y, FIRST_STEPS, 0.0
-        )
-    found = np.vstack([lowered, found[low:]])
-    searching.learn(found)
-    return np.array(searching.pool.twists[: len(found)])
-
-
-def refuted_by_one(
-    searching: Searching, cases: int, slack: Slack, twists: Array
-) -> tuple[Steps, float]:
-    """Return the tree that asks a single twist, and the least threshold that it refutes."""
-    kernel, pieces, at = compiled(TWISTS), searching.pieces, np.empty(6)
-    reached = np.full(len(twists), -math.inf)
-    polygons = [on_grid(polygon, SEARCH_DIGITS) for polygon in searching.grounds.polygons()]
-    for k, y in enumerate(twists):
-        for p, polygon in enumerate(polygons):
-            kernel.slopes(pieces, p, y, at)
-            highest = max(kernel.support(at, a, b, searching.friction) for a, b in polygon)
-            reached[k] = max(reached[k], highest)
-    demands = searching.measure.demands(twists)
-    if searching.measure.is_usual:
-        thresholds = reached + slack.raised
-    else:
-        with np.errstate(divide="ignore"):  # a twist without demand refutes nothing
-            resisted = (np.maximum(reached, 0.0) + slack.lowered) / demands
-        thresholds = np.where(demands > 0.0, resisted, np.inf)
-    best = first_best(-thresholds)
-    threshold = float(thresholds[best])
-    if threshold > 0.0:
-        threshold = few_digits((1.0 + 2.0 * ROUNDED_UP) * threshold, ROUNDED_UP)
-    steps = Steps(
-        np.zeros(cases, np.int64), np.zeros(cases, np.int64), twists[best : best + 1],
-        np.empty((0, 3)),
-    )  # fmt: skip
-    return steps, threshold
-
-
 class Levels:
-    """The levels of a search, with the best contacts and the best bound so far."""
+    """The levels of a search, with the best contacts so far."""
 
     def __init__(
         self, body: Polyhedron, friction: float, measure: Measure, clearance: float, seed: int,
         jobs: int, stop: Stop, progress: Callable[[GapAt], None] | None,
     ) -> None:  # fmt: skip
-        self.body, self.friction, self.clearance, self.progress = (
-            body, friction, clearance, progress,
-        )  # fmt: skip
+        self.body, self.clearance, self.progress = body, clearance, progress
         self.started = time.perf_counter()
         self.rng = np.random.default_rng([seed])
-        self.grounds = grounds_of(body, clearance)
-        self.measure = measure
-        self.maps = exact_maps(body, self.grounds, measure)
-        self.nodes = first_nodes(self.grounds, self.maps)
-        self.proved = Slack.of(friction, len(self.maps), measure)
-        # searches leave more than proofs, for a replay with other roundings
-        self.searched = Slack.of(friction, len(self.maps), measure, SEARCHED_BELOW)
-        lowered = self.searched.lowered
-        self.searching = Searching(self.grounds, friction, jobs, stop, measure, lowered)
+        grounds = grounds_of(body, clearance)
+        maps = exact_maps(body, grounds, measure)
+        self.searching = Searching(grounds, friction, jobs, stop, measure, maps)
         self.history: list[GapAt] = []
-        twists = lowered_twists(self.searching, self.rng)
-        cases = len(self.nodes[0])
-        self.steps, self.threshold = refuted_by_one(self.searching, cases, self.searched, twists)
-        found = begin(self.searching, twists, self.rng)
+        found = begin(self.searching, self.searching.begin(self.rng), self.rng)
         if found is None:
             raise InputError(
                 f"best_grasp: expected contacts in force closure at friction {friction:g}, found "
@@ -288,11 +203,6 @@ class Levels:
             )
         self.best = found
         self._tell()
-
-    @property
-    def bound(self) -> float:
-        """Return what no contacts exceed, by the last threshold that was refuted."""
-        return self.threshold + self.proved.raised
 
     def closed_to(self, gap: float) -> Ended:
         """Refute threshold after threshold, until the gap is reached or the search is stopped."""
@@ -302,7 +212,7 @@ class Levels:
             for k in range(steps, -1, -1):
                 share = 1.0 - AIMED * gap * 2.0**k
                 # each turn lowers the bound to `wanted`, or raises the quality, or is the last
-                while self.best.quality.lower < share * (1.0 - SAME) * self.bound:
+                while self.best.quality.lower < share * (1.0 - SAME) * self.searching.bound:
                     wanted = few_digits(self.best.quality.lower / share, grain)
                     if not self._refuted(wanted, grain):
                         return "time" if self.searching.stop() else "undivided"
@@ -312,44 +222,38 @@ class Levels:
 
     def _refuted(self, bound: float, grain: float) -> bool:
         """Lower the bound, or find contacts better by a grain; return whether either came about."""
-        threshold = bound - self.searched.raised
         known = self.best.quality.lower
-        surpassed = (1.0 + grain) * known
-        steps, better = self.searching.refute(self.nodes, threshold, surpassed)
-        if steps is not None:
-            self.steps = steps
-            self.threshold = bound - self.proved.raised
+        refuted, better = self.searching.refute(bound, (1.0 + grain) * known)
         for found in better:
             if found.quality.lower > surpassing(self.best.quality.lower):
                 self.best = found
         if better:
             self.best = climbed(self.searching, self.best.pieces, self.best.at)
         self._tell()
-        return steps is not None or self.best.quality.lower > known
+        return refuted or self.best.quality.lower > known
 
     def _tell(self) -> None:
-        seconds = time.perf_counter() - self.started
-        now = GapAt(seconds, self.best.quality.lower, self.bound, self.searching.nodes)
+        searching, seconds = self.searching, time.perf_counter() - self.started
+        now = GapAt(seconds, self.best.quality.lower, searching.bound, searching.nodes)
         self.history.append(now)
         if self.progress is not None:
             self.progress(now)
 
     def result(self, ended: Ended) -> BestGrasp:
         """Return the best contacts as a grasp, with the proof."""
-        proof = CutTree(
-            self.grounds, self.friction, self.maps, self.threshold, *self.steps, self.measure
-        )
-        pieces = tuple(piece_at(self.grounds, p) for p in self.best.pieces)
-        points = np.array([piece.point(y) for piece, y in zip(pieces, self.best.at, strict=True)])
+        searching = self.searching
+        pieces = tuple(piece_at(searching.grounds, p) for p in self.best.pieces)
+        points = searching.grounds.places(np.array(self.best.pieces), self.best.at)
         faces = four(piece.face for piece in pieces)
         name = named("b", faces)
-        grasp = certified(self.body, name, pieces, points, self.friction, self.rng)
+        grasp = certified(self.body, name, pieces, points, searching.friction, self.rng)
         if grasp is None:
             raise InputError(
                 f"best_grasp: expected that the best contacts found, on faces {list(faces)}, can "
                 "be certified, and they cannot; try another seed"
             )
-        quality = measured(self.body, grasp, self.friction, self.measure)
+        quality = measured(self.body, grasp, searching.friction, searching.measure)
+        proof = searching.proof()
         return BestGrasp(grasp, quality, self.clearance, proof, ended, tuple(self.history))
 
 
@@ -398,10 +302,10 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         SolverError: A program's answer failed its check.
     """
     check_planar(body, "best_grasp")
-    friction, seed = coefficient(friction), seed_of(seed)
+    friction, seed = value_of(Friction, friction, "friction"), value_of(Seed, seed, "seed")
     value_of(Gap, gap, "gap")
     loads = Measure.of(measure, wrenches, body.radius)
-    jobs = min(whole(jobs, "jobs", least=1), MOST_JOBS)
+    jobs = min(value_of(Count, jobs, "jobs"), MOST_JOBS)
     if progress is not None:
         function(progress, "progress")
     if time_limit_s is not None:

@@ -20,17 +20,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import SMALLEST, coefficient, number, seed_of
 from grasp_core.declared import ByValue
 from grasp_core.errors import InputError
 from grasp_core.families.free import closed_at, of_general_type
-from grasp_core.families.placing import point_region, regions_of
+from grasp_core.families.placing import point_regions
 from grasp_core.geometry.polygons import SAME_CORNER
+from grasp_core.kinds import SMALLEST, Friction, Seed, number, value_of
 from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
-from grasp_core.planning.certify import Candidate, certify_each, to_grasps
+from grasp_core.planning.as_given import to_grasp
+from grasp_core.planning.certify import Candidate, certify_each
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp
@@ -96,8 +97,8 @@ def optimize_contacts(
         SolverError: A program's answer failed its check.
     """
     check_on_faces(body, grasp)
-    coefficient(friction)
-    seed = seed_of(seed)
+    value_of(Friction, friction, "friction")
+    seed = value_of(Seed, seed, "seed")
     if finger_radius is not None:
         where = ", the object's radius in m, or None"
         number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)
@@ -182,7 +183,8 @@ def certified(
         return None
     a, b, c, d = (piece.face for piece in pieces)
     cones = tuple(ForceCone(piece.normal, math.atan(friction)) for piece in pieces)
-    regions = regions_of(point_region, pieces, cones, placement)
-    candidate = Candidate(name, (a, b, c, d), "regulus", pieces, cones, placement, regions)
+    candidate = Candidate(
+        name, (a, b, c, d), "regulus", pieces, cones, placement, point_regions(placement)
+    )
     (found,) = certify_each([candidate], friction)
-    return None if found is None else to_grasps(body, friction, [found])[0]
+    return None if found is None else to_grasp(body, friction, found)

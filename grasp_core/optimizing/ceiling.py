@@ -17,25 +17,23 @@ borders.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Indices, frozen_each
-from grasp_core.checked import LARGEST, coefficient, number, several, whole
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Cases
+from grasp_core.kinds import LARGEST, Cases, Friction, Range, number, several, value_of
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best_grasp import AIMED, FINER, lowered_twists, refuted_by_one
+from grasp_core.optimizing.best_grasp import AIMED, FINER
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS
-from grasp_core.optimizing.grounds import Grounds, first_nodes, grounds_on
+from grasp_core.optimizing.grounds import Grounds, grounds_on
 from grasp_core.optimizing.search import Searching, Stop
-from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, SEARCHED_BELOW, CutTree, Slack
-from grasp_core.quality.measures import FERRARI_CANNY
-from grasp_core.settings import value_of
+from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, CutTree
 from grasp_core.solvers.ties import few_digits
 from grasp_core.values import FINGERS, FaceQuadruple
 
@@ -103,7 +101,7 @@ def quality_ceiling(
         SolverError: A program's answer failed its check.
     """
     check_planar(body, "quality_ceiling")
-    friction = coefficient(friction)
+    friction = value_of(Friction, friction, "friction")
     number(known, "known", least=0.0, most=LARGEST)
     number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
     value_of(Cases, parts, "parts")
@@ -115,12 +113,14 @@ def quality_ceiling(
             f"{radii.tolist()}"
         )
     grounds, owners = _grounds(body, faces, radii / body.radius)
-    return QualityCeiling(_lowered(grounds, owners, friction, known, gap, parts))
+    searching = Searching(grounds, friction, 1, Stop(parts), owners=owners)
+    _lower(searching, known, gap)
+    return QualityCeiling(searching.proof())
 
 
 def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Grounds, Indices]:
-    each = partial(whole, name="faces", most=len(body.faces) - 1)
-    given = several(faces, each, "faces", "indices")
+    each = partial(value_of, Annotated[int, Range(least=0, most=len(body.faces) - 1)], name="faces")
+    given: tuple[int, ...] = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
         raise InputError(f"faces must be {FINGERS} indices of faces, got {len(given)}")
     by_face = pieces_by_face(body)
@@ -139,30 +139,20 @@ def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Gro
     return grounds, np.array([finger for finger, _ in own])[places]
 
 
-def _lowered(
-    grounds: Grounds, owners: Indices, friction: float, known: float, gap: float, parts: int
-) -> CutTree:
-    alone = np.eye(3)[None]
-    proved = Slack.of(friction, len(alone), FERRARI_CANNY)
-    searched = Slack.of(friction, len(alone), FERRARI_CANNY, SEARCHED_BELOW)
-    stop = Stop(parts)
-    searching = Searching(grounds, friction, 1, stop)
-    nodes = first_nodes(grounds, alone, owners)
-    twists = lowered_twists(searching, np.random.default_rng(SEED))
-    steps, threshold = refuted_by_one(searching, len(nodes[0]), searched, twists)
+def _lower(searching: Searching, known: float, gap: float) -> None:
+    """Lower the bound of a search as far as the head of this module says."""
+    searching.begin(np.random.default_rng(SEED))
     # where the faces hold nothing a twist may refute less; a larger threshold it refutes as well
-    threshold = max(threshold, LEAST_THRESHOLD)
-    bounds = _bounds(threshold + proved.raised, known, gap)
+    searching.threshold = max(searching.threshold, LEAST_THRESHOLD)
+    bounds = _bounds(searching.bound, known, gap)
     done, last, stride = -1, len(bounds), 1  # those up to `done` are refuted, `last` is not
-    while last - done > 1 and not stop():
+    while last - done > 1 and not searching.stop():
         place = min(done + stride, (done + last) // 2)
-        bound = bounds[place]
-        tree, _ = searching.refute(nodes, bound - searched.raised, np.inf)
-        if tree is None:
-            last = place
+        refuted, _ = searching.refute(bounds[place])
+        if refuted:
+            done, stride = place, 2 * stride
         else:
-            done, stride, steps, threshold = place, 2 * stride, tree, bound - proved.raised
-    return CutTree(grounds, friction, alone, threshold, *steps, owners=owners)
+            last = place
 
 
 def _bounds(first: float, known: float, gap: float) -> list[float]:

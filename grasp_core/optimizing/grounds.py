@@ -67,8 +67,11 @@ EXACT = 1e-9
 """Largest distance between a piece's corner, or normal, as a map moves it, and another's."""
 WIDENED = 1e-8
 MOST_MAPS = 128
+ALONE = np.eye(3)[None]
+"""The symmetry that every object has, (1, 3, 3)."""
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
+REPLAY = "grasp_core.optimizing.replay_kernel"
 TWISTS = "grasp_core.optimizing.twists_kernel"
 
 
@@ -101,9 +104,17 @@ class Grounds(Declared):
         """Return the corners of each polygon in its plane, (k, 2) each."""
         return [rows[:count] for rows, count in zip(self.corners, self.counts, strict=True)]
 
-    def places(self, piece: int, at: Array) -> Array:
-        """Return points in space, (k, 3), of plane coordinates of a piece, (k, 2)."""
-        return self.origins[piece] + at @ self.frames[piece].T
+    def places(self, on: int | Indices, at: Array) -> Array:
+        """Return points in space, (k, 3), of plane coordinates, (k, 2), of one piece or of each."""
+        return self.origins[on] + np.einsum("...ij,...j->...i", self.frames[on], at)
+
+    def supports(self, on: Indices, at: Array, friction: float, twists: Array) -> Array:
+        """Compute the supports of the cones of contacts at places under twists, (k, n)."""
+        points, normals = self.places(on, at), self.normals[on]
+        u = twists[None, :, :3] + np.cross(twists[None, :, 3:], points[:, None])
+        along = np.einsum("mnj,mj->mn", u, normals)
+        across = np.linalg.norm(u - along[:, :, None] * normals[:, None], axis=2)
+        return along + friction * across
 
 
 def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
@@ -154,12 +165,11 @@ def _small(corners: Array) -> list[Array]:
 
 def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> Array:
     """Return symmetries that map pieces and loads exactly enough, (g, 3, 3); only 1 if no group."""
-    alone = np.eye(3)[None]
     found = symmetries(body)
-    every = np.concatenate([alone, found.rotations[1:], found.reflections])
+    every = np.concatenate([ALONE, found.rotations[1:], found.reflections])
     every = every[measure.keeps(every, EXACT)]
     kept = np.array([each for each in every if _images(each[None], grounds)[0].min() >= 0])
-    return kept if len(kept) <= MOST_MAPS and fitting(kept, grounds, measure) else alone
+    return kept if len(kept) <= MOST_MAPS and fitting(kept, grounds, measure) else ALONE
 
 
 def fitting(maps: Array, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> bool:
@@ -234,7 +244,7 @@ def first_nodes(
 
 def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, int]:
     """Cut a piece to the part nearer to a point of it than to the point's images, by (1)."""
-    clip = compiled(TWISTS).clip
+    clip = compiled(REPLAY).clip
     polygon, count = grounds.corners[piece].copy(), int(grounds.counts[piece])
     middle = polygon[:count].mean(axis=0)
     aside = sum(share * (polygon[k] - middle) for k, share in enumerate(ASIDE))
@@ -245,7 +255,5 @@ def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, 
         limit = 0.5 * (float((turn @ q) @ (turn @ q)) - float(q @ q))
         line = np.array([*(away @ grounds.frames[piece]), limit - away @ grounds.origins[piece]])
         line[2] += WIDENED * float(np.linalg.norm(away))
-        out = np.zeros((ROOM, 2))
-        count = clip(polygon, count, line, 1.0, out)
-        polygon = out
+        count = clip(polygon, count, line, 1.0)
     return polygon, count

@@ -25,10 +25,18 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.grounds import ROOM, SEARCH_DIGITS, TWISTS, Grounds
+from grasp_core.optimizing.grounds import (
+    ALONE,
+    REPLAY,
+    SEARCH_DIGITS,
+    TWISTS,
+    Grounds,
+    first_nodes,
+)
+from grasp_core.optimizing.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
-from grasp_core.solvers.ties import on_grid
+from grasp_core.solvers.ties import few_digits, first_best, on_grid
 from grasp_core.values import FINGERS
 
 Nodes: TypeAlias = tuple[Array, Indices, Indices]
@@ -68,6 +76,13 @@ SETTLED = 1.0 - 1e-6
 EXACT_GAP = 1e-5
 """Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
 that a search may be asked for."""
+COUNT = 384
+"""Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
+support of all polygons is smaller."""
+FIRST_STEPS = 60
+"""Steps of these descents: they settle within it."""
+ROUNDED_UP = 1e-6
+"""Share by which a threshold is rounded up at least, and less than three times as much."""
 
 
 class Stop:
@@ -133,20 +148,14 @@ def leave(part: Part) -> None:
 
 def part_from(first: Nodes, pool: Any) -> Part:
     """Return a part that begins with nodes and the twists of a pool."""
-    nodes = compiled(KERNEL)
     corners, counts, fresh = first
-    deep, pieces = max(DEEP, len(corners) + FINGERS + 1), counts.shape[2]
-    stack = nodes.Stack(
-        np.zeros((deep, FINGERS, pieces, ROOM, 2)),
-        np.zeros((deep, FINGERS, pieces), np.int64),
-        np.zeros((deep, FINGERS), np.int64), np.zeros(deep, np.int64), np.zeros(1, np.int64),
-    )  # fmt: skip
+    stack = compiled(REPLAY).vacant(max(DEEP, len(corners) + FINGERS + 1), counts.shape[2])
     n = len(corners)
     # the last one is searched first
     stack.corners[:n, :, :, : corners.shape[3]] = corners[::-1]
     stack.counts[:n], stack.fresh[:n] = counts[::-1], fresh[::-1]
     stack.top[0] = n
-    tree = nodes.Tree(
+    tree = compiled(KERNEL).Tree(
         np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
         np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
     )  # fmt: skip
@@ -160,8 +169,8 @@ def part_from(first: Nodes, pool: Any) -> Part:
 def enlarge(part: Part) -> None:
     """Make room in what is full of a part's stack and tree; few twists serve many nodes."""
     stack, tree = part.stack, part.tree
-    if int(stack.top[0]) + FINGERS >= len(stack.depths):
-        part.stack = type(stack)(*map(_doubled, stack[:4]), stack.top)
+    if int(stack.top[0]) + FINGERS >= len(stack.above):
+        part.stack = compiled(REPLAY).doubled(stack)
     sizes = [int(tree.sizes[k]) for k in (0, 0, 1, 2)]
     arrays = [
         _doubled(array) if size + 1 >= len(array) else array
@@ -176,15 +185,15 @@ def _doubled(array: Any) -> Any:
 
 def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     """Put the trees of parts into their places in the trunk's tree, and in each other's."""
-    nodes = compiled(KERNEL)
+    splice, lines_from = int(compiled(KERNEL).SPLICE), int(compiled(REPLAY).BY_PIECES)
     every = [trunk, *parts]
     sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
     starts = np.cumsum(sizes, axis=0) - sizes
     asked: dict[int, Indices] = {}
     for part, (n, _, _), (_, twists, lines) in zip(every, sizes, starts, strict=True):
-        shifts = np.where(part.tree.deeds[:n] < int(nodes.BY_PIECES), int(twists), int(lines))
+        shifts = np.where(part.tree.deeds[:n] < lines_from, int(twists), int(lines))
         asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
-    rows = list(_in_order(trunk, int(nodes.SPLICE)))
+    rows = list(_in_order(trunk, splice))
     return Steps(
         np.concatenate([part.tree.deeds[some] for part, some in rows]),
         np.concatenate([asked[id(part)][some] for part, some in rows]),
@@ -213,24 +222,34 @@ _Waiting: TypeAlias = tuple[Part, Nodes, Any]
 
 @dataclass(slots=True, eq=False)
 class Searching:
-    """What levels of a search share: pieces, loads, twists, and whether to stop."""
+    """A bound that falls from level to level, with what refutes all above, and twists to ask."""
 
     grounds: Grounds
     friction: float
     jobs: int
     stop: Stop
     measure: Measure = FERRARI_CANNY
-    spare: float = 0.0  # how far below threshold times demand a support still counts as an answer
+    maps: Array = field(default_factory=lambda: ALONE)  # these two are as in `CutTree`
+    owners: Indices | None = None
     nodes: int = 0  # how many nodes were visited in all levels
+    steps: Steps = field(init=False)  # the tree that refutes the threshold
+    threshold: float = field(init=False)
+    first: Nodes = field(init=False)
+    proved: Slack = field(init=False)
+    searched: Slack = field(init=False)
+    """Searches leave more than proofs, for a replay with other roundings."""
     pieces: Any = field(init=False)  # these three are as the kernels take them
     demand: Any = field(init=False)
     pool: Any = field(init=False)
 
     def __post_init__(self) -> None:
         kernel, grounds = compiled(TWISTS), self.grounds
+        self.first = first_nodes(grounds, self.maps, self.owners)
+        self.proved = Slack.of(self.friction, len(self.maps), self.measure)
+        self.searched = Slack.of(self.friction, len(self.maps), self.measure, SEARCHED_BELOW)
         each = (grounds.normals, grounds.origins, grounds.frames)
         numbers = (on_grid(every, SEARCH_DIGITS) for every in each)
-        self.pieces = kernel.Pieces(*numbers, float(self.friction))
+        self.pieces = compiled(REPLAY).Pieces(*numbers, float(self.friction))
         kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
         scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
         loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
@@ -240,17 +259,58 @@ class Searching:
             np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
         )  # fmt: skip
 
+    @property
+    def bound(self) -> float:
+        """Return what no contacts exceed, by the last threshold that was refuted."""
+        return self.threshold + self.proved.raised
+
+    def proof(self) -> CutTree:
+        """Return the proof of the bound."""
+        return CutTree(
+            self.grounds, self.friction, self.maps, self.threshold, *self.steps, self.measure,
+            self.owners,
+        )  # fmt: skip
+
+    def begin(self, rng: np.random.Generator) -> Array:
+        """Learn unit twists, (n, 6), that polygons resist little; the best one gives a bound."""
+        grounds, loads = self.grounds, self.measure.loads
+        on, at = np.repeat(np.arange(len(grounds.counts)), grounds.counts), grounds.polygons()
+        corners = on_grid(grounds.places(on, np.vstack(at)), SEARCH_DIGITS)
+        # a task's loads themselves, the other way, ask for most
+        found = np.vstack([-loads, rng.normal(size=(COUNT, 6))])
+        found = on_grid(found / np.linalg.norm(found, axis=1, keepdims=True))
+        for y in found[: len(loads) + COUNT // 4]:
+            compiled(TWISTS).descend(
+                self.pieces, self.demand, corners, on, len(on), y, FIRST_STEPS, 0.0
+            )
+        self.learn(found)
+        twists = np.array(self.pool.twists[: len(found)])
+        reached = grounds.supports(on, np.vstack(at), self.friction, twists).max(axis=0)
+        supports = np.maximum(reached, 0.0) + self.searched.lowered
+        thresholds = self.measure.multiples(supports, self.measure.demands(twists))
+        thresholds += self.searched.raised
+        best = first_best(-thresholds)
+        self.threshold = few_digits((1.0 + 2.0 * ROUNDED_UP) * thresholds[best], ROUNDED_UP)
+        none = np.zeros(len(self.first[0]), np.int64)
+        self.steps = Steps(none, none, twists[best : best + 1], np.empty((0, 3)))
+        return twists
+
     def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:
         """Add twists, (n, 6), to a pool, the common one by default."""
         pool = self.pool if pool is None else pool
         for y in twists:
             compiled(TWISTS).learn(pool, self.pieces, self.demand, np.array(y), now)
 
-    def refute(
-        self, nodes: Nodes, threshold: float, known: float
-    ) -> tuple[Steps | None, list[Found]]:
-        """Try to refute a threshold: return the tree or None, and contacts above what is known."""
-        corners, counts, fresh = nodes
+    def refute(self, bound: float, known: float = math.inf) -> tuple[bool, list[Found]]:
+        """Try to lower the bound; return whether that came about, and contacts above the known."""
+        steps, better = self._refuted(bound - self.searched.raised, known)
+        if steps is not None:
+            self.steps, self.threshold = steps, bound - self.proved.raised
+        return steps is not None, better
+
+    def _refuted(self, threshold: float, known: float) -> tuple[Steps | None, list[Found]]:
+        """Return a tree that refutes a threshold, or None, and contacts above what is known."""
+        corners, counts, fresh = self.first
         trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
         wave, parts, better = [trunk], list[Part](), list[Found]()
@@ -298,7 +358,14 @@ class Searching:
         )  # fmt: skip
         while not self.stop():
             search = kernel.Search(
-                pieces, part.stack, part.pool, part.tree, work, threshold, demand, self.spare
+                pieces,
+                part.stack,
+                part.pool,
+                part.tree,
+                work,
+                threshold,
+                demand,
+                self.searched.lowered,
             )
             before = int(part.tree.sizes[0])
             why = kernel.run(search, BUDGET, depth if before < PART_NODES else -1)
@@ -315,7 +382,7 @@ class Searching:
                     break
                 size = int(part.tree.sizes[0])
                 # found again: the twist refutes the contacts by less than rounding
-                if size == found_at and not kernel.divide(search, int(part.stack.top[0]) - 1):
+                if size == found_at and not kernel.divide(search):
                     break
                 found_at = size
         part.stack = None  # the memory of a part that is done
@@ -339,9 +406,10 @@ class Searching:
 
     def wrenches(self, on: Indices, at: Array) -> WrenchSet:
         """Return the wrenches of contacts on pieces, (4,), at plane coordinates, on a grid."""
-        points = np.array([self.grounds.places(p, y[None])[0] for p, y in zip(on, at, strict=True)])
         friction = np.full(FINGERS, self.friction)
-        return WrenchSet.at(points, self.grounds.normals[on], friction).on_grid()
+        return WrenchSet.at(
+            self.grounds.places(on, at), self.grounds.normals[on], friction
+        ).on_grid()
 
     def _hand_on(self, wave: Sequence[Part]) -> None:
         """Add the newest twists of each part to those that the next wave begins with."""

@@ -12,13 +12,12 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
+from grasp_core.optimizing.grounds import ROOM
+from grasp_core.optimizing.replay_kernel import BY_LINE, BY_PIECES, Nodes, Pieces, branch, split
 from grasp_core.optimizing.twists_kernel import (
-    MOST_CORNERS,
     Demand,
-    Pieces,
     Pool,
     area,
-    clip,
     cut,
     descend,
     extent,
@@ -26,10 +25,10 @@ from grasp_core.optimizing.twists_kernel import (
     multiple,
     support,
 )
+from grasp_core.values import FINGERS
 
-FINGERS = 4
-ASK, BY_PIECES, BY_LINE, SPLICE = 0, 16, 32, 64
-"""What a node does, added to fingers: a set of fingers for questions, else one finger."""
+SPLICE = 64
+"""What a node does that is a part of its own."""
 LEAST = 1e-7
 """Extent of a polygon, in object radii, below which it is not divided."""
 SEVERAL = 2.0
@@ -54,19 +53,6 @@ ASKED_ABOVE = 1.05
 was measured: after a division more twists have a single answer."""
 STEPS, CLOSE_STEPS = 40, 120
 """Steps of descents for a node, and for its middle."""
-
-
-class Stack(NamedTuple):
-    """Nodes that wait, the next one last: where each finger may be."""
-
-    corners: Array
-    """Corners of what is left of each piece, for each node and finger, (d, 4, p, MOST_CORNERS,
-    2)."""
-    counts: Indices  # how many corners each has, (d, 4, p)
-    fresh: Indices
-    """Whether a finger may still be exchanged with the other fresh ones, (d, 4)."""
-    depths: Indices  # how many nodes above each have several children, (d,)
-    top: Indices  # how many nodes wait, (1,)
 
 
 class Tree(NamedTuple):
@@ -99,7 +85,7 @@ class Search(NamedTuple):
     """All that a search works with."""
 
     pieces: Pieces
-    stack: Stack
+    stack: Nodes  # those above a node count that have several children
     pool: Pool
     tree: Tree
     work: Work
@@ -116,13 +102,13 @@ def answer_to(search: Search, k: int) -> float:
 
 
 @loop("numpy")
-def is_full(stack: Stack, tree: Tree) -> bool:
+def is_full(stack: Nodes, tree: Tree) -> bool:
     """Return whether there is no room for what one more node may need."""
     return (
         tree.sizes[0] + 1 >= len(tree.deeds)
         or tree.sizes[1] + 1 >= len(tree.twists)
         or tree.sizes[2] + 1 >= len(tree.lines)
-        or stack.top[0] + FINGERS >= len(stack.depths)
+        or stack.top[0] + FINGERS >= len(stack.above)
     )
 
 
@@ -135,44 +121,30 @@ def note(tree: Tree, deed: int, asked: int) -> None:
 
 
 @loop("numpy")
-def copy(stack: Stack, source: int, place: int) -> None:
-    """Copy a waiting node to another place of the stack."""
-    stack.counts[place] = stack.counts[source]
-    stack.fresh[place] = stack.fresh[source]
-    stack.depths[place] = stack.depths[source]
-    for i in range(FINGERS):
-        for p in range(stack.counts.shape[2]):
-            count = stack.counts[source, i, p]
-            stack.corners[place, i, p, :count] = stack.corners[source, i, p, :count]
-
-
-@loop("numpy")
-def divide(search: Search, node: int) -> bool:
-    """Replace the node by two, in which its largest finger has one half; False if it is tiny."""
+def divide(search: Search) -> bool:
+    """Replace the last node by two, in which its largest finger has one half; False if tiny."""
     stack, tree = search.stack, search.tree
+    node = stack.top[0] - 1
     chosen, live, size = _largest(stack, node)
     if size < LEAST:
         return False
-    other = node + 1
-    copy(stack, node, other)
-    for place in (node, other):
-        stack.fresh[place, chosen] = 0
-        stack.depths[place] += 1
-    stack.top[0] = other + 1
     line = tree.lines[tree.sizes[2]]
     line[:] = 0.0
     if live == 1:
-        _halve(stack, node, chosen, line)
+        _bisect(stack, node, chosen, line)
     else:
-        _sort(stack, node, chosen, live, line)
-    note(tree, (BY_LINE if live == 1 else BY_PIECES) + chosen, tree.sizes[2])
+        line[0] = _middle_piece(stack, node, chosen, live)
+    deed = chosen + (BY_LINE if live == 1 else BY_PIECES)
+    stack.above[node] += 1
+    split(stack, deed, line)
+    note(tree, deed, tree.sizes[2])
     tree.sizes[2] += 1
     search.work.changed[0] = chosen
     return True
 
 
 @loop("numpy")
-def _largest(stack: Stack, node: int) -> tuple[int, int, float]:
+def _largest(stack: Nodes, node: int) -> tuple[int, int, float]:
     """Return the finger that has most room, on how many pieces it is, and how large they are."""
     largest, chosen, several, ends = 0.0, 0, 1, np.empty(2, np.int64)
     for i in range(FINGERS):
@@ -188,38 +160,27 @@ def _largest(stack: Stack, node: int) -> tuple[int, int, float]:
 
 
 @loop("numpy")
-def _sort(stack: Stack, node: int, i: int, live: int, line: Array) -> None:
-    """Leave one half of a finger's pieces to a node, and those of lower numbers to the next."""
-    seen = 0
-    for p in range(stack.counts.shape[2]):
-        if stack.counts[node, i, p] == 0:
-            continue
-        seen += 1
-        if 2 * seen <= live:
-            stack.counts[node, i, p] = 0
-            line[0] = p + 1.0
-        else:
-            stack.counts[node + 1, i, p] = 0
+def _middle_piece(stack: Nodes, node: int, i: int, live: int) -> int:
+    """Return the number of a piece with half of a finger's pieces before it."""
+    seen, place = 0, 0
+    while 2 * (seen + 1) <= live:
+        seen += stack.counts[node, i, place] > 0
+        place += 1
+    return place
 
 
 @loop("numpy")
-def _halve(stack: Stack, node: int, i: int, line: Array) -> None:
-    """Divide a finger's polygon across its longest diagonal, between a node and the next."""
-    rest, ends = np.empty((MOST_CORNERS, 2)), np.empty(2, np.int64)
+def _bisect(stack: Nodes, node: int, i: int, line: Array) -> None:
+    """Fill in the line across the longest diagonal of a finger's polygon."""
+    ends = np.empty(2, np.int64)
     for p in range(stack.counts.shape[2]):
-        count = stack.counts[node, i, p]
-        if count == 0:
-            continue
-        corners = stack.corners[node, i, p]
-        extent(corners, count, ends)
-        one, two = corners[ends[0]], corners[ends[1]]
-        for j in range(2):
-            line[j] = two[j] - one[j]
-            line[2] += 0.5 * line[j] * (one[j] + two[j])
-        for place, side in ((node + 1, 1.0), (node, -1.0)):
-            kept = clip(stack.corners[place, i, p], count, line, side, rest)
-            stack.counts[place, i, p] = kept
-            stack.corners[place, i, p, :kept] = rest[:kept]
+        count, corners = stack.counts[node, i, p], stack.corners[node, i, p]
+        if count > 0:
+            extent(corners, count, ends)
+            for j in range(2):
+                one, two = corners[ends[0], j], corners[ends[1], j]
+                line[j] = two - one
+                line[2] += 0.5 * line[j] * (one + two)
 
 
 @loop("numpy")
@@ -299,8 +260,8 @@ def choose(search: Search, node: int) -> tuple[int, float]:
     for trial in range(count):
         if trial > 0 and costs[trial] > BESIDE * least:
             break
-        cost, answers = _measured(search, node, ranked[trial])
-        if (answers > 1 or cost <= SHRUNK) and cost < least:
+        cost = _measured(search, node, ranked[trial])
+        if cost < least:
             best, least = ranked[trial], cost
     return best, least
 
@@ -314,40 +275,48 @@ def with_new(search: Search, node: int, best: int, cost: float, k: int) -> tuple
         return choose(search, node)
     if _estimated(search, node, k) == 0.0:
         return k, 0.0
-    found, answers = _measured(search, node, k)
-    if (answers > 1 or found <= SHRUNK) and found < cost:
-        return k, found
-    return best, cost
+    found = _measured(search, node, k)
+    return (k, found) if found < cost else (best, cost)
+
+
+@loop("numpy")
+def _answering(search: Search, node: int, k: int) -> int:
+    """Return who may answer a twist, one fresh finger for all, as the sum of 2**i over fingers."""
+    found, twin = 0, False
+    fresh, work, t = search.stack.fresh[node], search.work, answer_to(search, k)
+    for i in range(FINGERS):
+        if work.reach[i, k] >= t and not (fresh[i] and twin):
+            twin = twin or fresh[i] > 0
+            found |= 1 << i
+    return found
 
 
 @loop("numpy")
 def _estimated(search: Search, node: int, k: int) -> float:
     """Return about what `_measured` does, without cutting."""
-    cost, twin, stays, answers = 0.0, False, False, 0
-    fresh, work, t = search.stack.fresh[node], search.work, answer_to(search, k)
+    cost, stays, answers, work = 0.0, False, 0, search.work
+    answering = _answering(search, node, k)
     for i in range(FINGERS):
-        if work.reach[i, k] < t or (fresh[i] and twin):
-            continue
-        twin = twin or fresh[i] > 0
-        stays = stays or work.left[i, k] > MOST_LEFT
-        answers += 1
-        cost += np.sqrt(work.left[i, k]) + 1e-9
+        if (answering >> i) & 1:
+            stays = stays or work.left[i, k] > MOST_LEFT
+            answers += 1
+            cost += np.sqrt(work.left[i, k]) + 1e-9
     return cost + 1.0 if stays and answers > 1 else cost
 
 
 @loop("numpy")
-def _measured(search: Search, node: int, k: int) -> tuple[float, int]:
-    """Return the cost of asking a twist, by what is left, and how many fingers may answer.
+def _measured(search: Search, node: int, k: int) -> float:
+    """Return the cost of asking a twist, by what is left; infinity where that is not worth it.
 
     The cost is the sum of the roots of the shares that are left: a half on either side costs 1.41.
     """
     pieces, stack, work, t = search.pieces, search.stack, search.work, answer_to(search, k)
-    cost, answers, twin, stays = 0.0, 0, False, False
-    rest, ends = np.empty((MOST_CORNERS, 2)), np.empty(2, np.int64)
+    cost, answers, stays = 0.0, 0, False
+    rest, ends = np.empty((ROOM, 2)), np.empty(2, np.int64)
+    answering = _answering(search, node, k)
     for i in range(FINGERS):
-        if work.reach[i, k] < t or (stack.fresh[node, i] and twin):
+        if not (answering >> i) & 1:
             continue
-        twin = twin or stack.fresh[node, i] > 0
         answers += 1
         left = 0.0
         for p in range(len(pieces.normals)):
@@ -358,36 +327,32 @@ def _measured(search: Search, node: int, k: int) -> tuple[float, int]:
                 left += _weight(rest, kept, ends)
         stays = stays or left > MOST_LEFT * work.whole[i]
         cost += np.sqrt(left / work.whole[i])
-    return (cost + 1.0 if stays and answers > 1 else cost), answers
+    if answers > 1:
+        return cost + 1.0 if stays else cost
+    return cost if cost <= SHRUNK else np.inf
 
 
 @loop("numpy")
 def ask(search: Search, node: int, k: int, now: int) -> None:
     """Replace the node by one for each finger that may answer, cut to where it does."""
     stack, pool, tree, work = search.stack, search.pool, search.tree, search.work
-    answering, twin, deed, total = np.zeros(FINGERS, np.int64), False, ASK, 0
-    pieces, t, rest = search.pieces, answer_to(search, k), np.empty((MOST_CORNERS, 2))
-    for i in range(FINGERS):
-        if work.reach[i, k] < t or (stack.fresh[node, i] and twin):
-            continue
-        twin = twin or stack.fresh[node, i] > 0
-        answering[total] = i
-        total += 1
-        deed += 1 << i
+    pieces, t, rest = search.pieces, answer_to(search, k), np.empty((ROOM, 2))
+    answering = _answering(search, node, k)
     if pool.names[k] < 0:
         pool.names[k] = tree.sizes[1]
         tree.twists[tree.sizes[1]] = pool.twists[k]
         tree.sizes[1] += 1
     pool.used[k] = now
-    note(tree, deed, pool.names[k])
-    # the first answer is searched first, so that it comes last; the node's own place is for the
-    # last answer, as the others are copied from it
-    for c in range(total - 1):
-        copy(stack, node, node + total - 1 - c)
-    for c in range(total):
-        place, i = node + total - 1 - c, answering[c]
-        stack.fresh[place, i] = 0
-        stack.depths[place] += total > 1
+    note(tree, answering, pool.names[k])
+    stack.above[node] += answering & (answering - 1) > 0  # with several answers
+    branch(stack, answering)
+    work.changed[0], place = ALL, stack.top[0]
+    for i in range(FINGERS):
+        if not (answering >> i) & 1:
+            continue
+        if place == stack.top[0]:  # the first answer is searched first
+            work.changed[0] = i
+        place -= 1
         for p in range(len(pieces.normals)):
             count = stack.counts[place, i, p]
             if count > 0:
@@ -395,8 +360,6 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
                 kept = cut(corners, count, at, pieces.friction, t, rest)
                 stack.counts[place, i, p] = kept
                 corners[:kept] = rest[:kept]
-    stack.top[0] = node + total
-    work.changed[0] = answering[0] if total > 0 else ALL
 
 
 @loop("numpy", beside=True)
@@ -410,7 +373,7 @@ def run(search: Search, budget: int, part_depth: int) -> int:
         node = stack.top[0] - 1
         if is_full(stack, tree):
             return FULL
-        if stack.depths[node] >= part_depth:
+        if stack.above[node] >= part_depth:
             note(tree, SPLICE, 0)
             return PART
         if not _visit(search, node, tree.sizes[0]):
@@ -424,16 +387,16 @@ def _visit(search: Search, node: int, now: int) -> bool:
     look_again(search, node)
     best, cost = choose(search, node)
     if cost > 0.0 and _is_single(search, node):
-        place, refuted = _lowered(search, node, now)
+        near, place = _lowered(search, node, now)
         best, cost = with_new(search, node, best, cost, place)
-        if not refuted:
+        if near >= search.t:
             near, place = _middle_lowered(search, node, now)
             if near >= search.t:
                 return False
             best, cost = with_new(search, node, best, cost, place)
     if best >= 0 and cost <= ASKED_ABOVE:
         ask(search, node, best, now)
-    elif not divide(search, node):
+    elif not divide(search):
         search.work.on[0] = -1
         return False
     return True
@@ -453,8 +416,8 @@ def _is_single(search: Search, node: int) -> bool:
 
 
 @loop("numpy")
-def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
-    """Lower what all corners of a node resist; return the new twist or -1, and if that refutes."""
+def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
+    """Lower what all corners of a node resist; return it, and the new twist or -1."""
     work, stack, pieces = search.work, search.stack, search.pieces
     least, first = np.inf, 0
     for k in range(search.pool.size[0]):
@@ -464,7 +427,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
         found = multiple(found + search.spare, search.pool.demands[k])
         if found < least:
             least, first = found, k
-    room = FINGERS * MOST_CORNERS
+    room = FINGERS * ROOM
     points, on, m = np.empty((room, 3)), np.empty(room, np.int64), 0
     for i in range(FINGERS):
         p = work.on[i]
@@ -475,10 +438,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[int, bool]:
             _place(pieces, p, stack.corners[node, i, p, v], points[m])
             on[m] = p
             m += 1
-    y = search.pool.twists[first].copy()
-    found = descend(pieces, search.demand, points, on, m, y, STEPS, search.spare)
-    place = _learned(search, node, y, now) if found < least else -1
-    return place, min(found, least) < search.t
+    return _descended(search, node, points[:m], on, (first, least), STEPS, now)
 
 
 @loop("numpy")
@@ -497,10 +457,19 @@ def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
         found = multiple(found + search.spare, pool.demands[k])
         if found < near:
             near, nearest = found, k
-    y = pool.twists[nearest].copy()
-    found = descend(pieces, search.demand, points, on, FINGERS, y, CLOSE_STEPS, search.spare)
-    place = _learned(search, node, y, now) if found < near else -1
-    return min(found, near), place
+    return _descended(search, node, points, on, (nearest, near), CLOSE_STEPS, now)
+
+
+@loop("numpy")
+def _descended(
+    search: Search, node: int, points: Array, on: Indices, first: tuple[int, float], steps: int,
+    now: int,
+) -> tuple[float, int]:  # fmt: skip
+    """Descend from the pool's best twist for contacts at points; learn what is better."""
+    (k, least), pieces, demand = first, search.pieces, search.demand
+    y = search.pool.twists[k].copy()
+    found = descend(pieces, demand, points, on, len(points), y, steps, search.spare)
+    return (found, _learned(search, node, y, now)) if found < least else (least, -1)
 
 
 @loop("numpy")

@@ -82,7 +82,7 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_bytes, write_parts
 from grasp_core.kinds import FrictionOrZero, Many
-from grasp_core.optimizing.grounds import Grounds, first_nodes, fitting
+from grasp_core.optimizing.grounds import REPLAY, Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
@@ -107,7 +107,8 @@ more than normal forces of sum one reach on contacts with coordinates up to two,
 below a hundred."""
 LONGEST_WRENCH = 8.0
 """More than the length of any wrench of forces with normal parts of sum one, over 1 + mu."""
-KERNEL = "grasp_core.optimizing.replay_kernel"
+LARGEST_LINE = 1e3
+"""Largest number in a line, of which a search makes none above 128: no product of it overflows."""
 
 
 class Slack(NamedTuple):
@@ -175,6 +176,7 @@ class CutTree(Declared):
         fits = lengths.min(initial=1.0) >= 1.0 - TWIST_SLACK
         longest = LONGEST_TWIST if self.measure.is_usual else 1.0 + TWIST_SLACK
         fits = fits and lengths.max(initial=1.0) <= longest
+        fits = fits and np.abs(self.lines).max(initial=0.0) <= LARGEST_LINE
         alone = len(self.maps) == 1
         if self.owners is not None:  # each piece has one, and each finger a piece
             owned = len(self.owners) == len(self.grounds.counts)
@@ -190,12 +192,12 @@ class CutTree(Declared):
         return LEAST_THRESHOLD / size <= self.threshold <= most
 
     def _replayed(self) -> bool:
-        kernel, grounds = compiled(KERNEL), self.grounds
+        kernel, grounds = compiled(REPLAY), self.grounds
         nodes = first_nodes(grounds, self.maps, self.owners)
         # (4), or the threshold itself
         answers = self.threshold * self.measure.demands(self.twists) - self._slack.lowered
         return kernel.replay(
-            kernel.Planes(grounds.normals, grounds.origins, grounds.frames, self.friction),
+            kernel.Pieces(grounds.normals, grounds.origins, grounds.frames, self.friction),
             *nodes, self.deeds.astype(np.int64), self.asked.astype(np.int64),
             np.array(self.twists), answers, np.array(self.lines), MOST_CUTS,
         )  # fmt: skip

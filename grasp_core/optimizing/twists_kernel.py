@@ -13,22 +13,13 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
+from grasp_core.optimizing.grounds import ROOM
+from grasp_core.optimizing.replay_kernel import Pieces, outline
 
-MOST_CORNERS = 24
-"""Room for the corners of a polygon; a cut that would need more is not made."""
 SLOPES = 6
 """Numbers that say how a contact of a piece answers a twist, see `slopes`."""
 CROSSING_STEPS = 4
 """Steps, from both sides, towards the point in which an edge leaves the part that answers."""
-
-
-class Pieces(NamedTuple):
-    """The convex pieces of faces on which contacts lie, at unit size."""
-
-    normals: Array  # inward unit normals, (p, 3)
-    origins: Array  # points whose plane coordinates are zero, (p, 3)
-    frames: Array  # orthonormal columns spanning the planes, (p, 3, 2)
-    friction: float
 
 
 @loop("numpy")
@@ -64,33 +55,16 @@ def support(at: Array, a: float, b: float, friction: float) -> float:
 @loop("numpy")
 def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
     """Fill in what is left of a polygon where the support reaches t; return how many corners."""
-    heights = np.empty(MOST_CORNERS)
-    reached, runs = 0, 0
+    heights, crossings = np.empty(ROOM), np.empty((ROOM, 2))
     for k in range(count):
         heights[k] = support(at, corners[k, 0], corners[k, 1], friction)
-        if heights[k] >= t:
-            reached += 1
     for k in range(count):
-        if heights[k] < t and heights[(k + 1) % count] >= t:
-            runs += 1
-    if reached == 0:
-        return 0
-    kept = 0
-    if reached == count or reached + 2 * runs > MOST_CORNERS:
-        out[:count] = corners[:count]
-        return count
-    for k in range(count):
-        following = (k + 1) % count
-        if heights[k] >= t:
-            out[kept, 0], out[kept, 1] = corners[k, 0], corners[k, 1]
-            kept += 1
-            if heights[following] < t:
-                _cross(corners[following], corners[k], at, friction, t, out[kept])
-                kept += 1
-        elif heights[following] >= t:
-            _cross(corners[k], corners[following], at, friction, t, out[kept])
-            kept += 1
-    return kept
+        after = (k + 1) % count
+        if heights[k] >= t > heights[after]:
+            _cross(corners[after], corners[k], at, friction, t, crossings[k])
+        elif heights[after] >= t > heights[k]:
+            _cross(corners[k], corners[after], at, friction, t, crossings[k])
+    return outline(corners, count, heights, t, crossings, out)
 
 
 @loop("numpy")
@@ -124,30 +98,6 @@ def _cross(low: Array, high: Array, at: Array, friction: float, t: float, out: A
         if above <= below:
             break
     out[0], out[1] = low[0] + near * da, low[1] + near * db
-
-
-@loop("numpy")
-def clip(corners: Array, count: int, line: Array, side: float, out: Array) -> int:
-    """Fill in the corners of the part of a polygon with side * (line0 a + line1 b - line2) <= 0.
-
-    Gives how many corners the part has; if there is no room for them, the polygon stays whole.
-    """
-    kept = 0
-    heights = side * (line[0] * corners[:count, 0] + line[1] * corners[:count, 1] - line[2])
-    for k in range(count):
-        following = (k + 1) % count
-        inside, next_inside = heights[k] <= 0.0, heights[following] <= 0.0
-        if kept + 2 > MOST_CORNERS:
-            out[:count] = corners[:count]
-            return count
-        if inside:
-            out[kept] = corners[k]
-            kept += 1
-        if inside != next_inside:
-            share = heights[k] / (heights[k] - heights[following])
-            out[kept] = corners[k] + share * (corners[following] - corners[k])
-            kept += 1
-    return kept
 
 
 @loop("numpy")

@@ -1,4 +1,4 @@
-"""Translates grasps and proofs from the planner's reordered copy of an object to the original.
+"""Turns what the planner certified into grasps and proofs of the object as it was given.
 
 The planner works on a copy in standard order: its faces are renumbered, and it may be mirrored, so
 that results do not depend on the mesh file (see `standard_order`). Here faces get their original
@@ -8,52 +8,98 @@ closure and regions are preserved. A separating twist (a, b) becomes (D a, -D b)
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, frozen_copy
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import altered
+from grasp_core.declared import altered, trusted
 from grasp_core.families.free import Absence
+from grasp_core.frames import kept_angle
 from grasp_core.objects.face_pieces import FacePiece
+from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import FLIP, Standard
-from grasp_core.planning.certify import Certified
-from grasp_core.values import FaceQuadruple, four
+from grasp_core.planning.certify import Certified, LateFigures
+from grasp_core.values import (
+    FINGERS,
+    Contact,
+    ContactRegion,
+    FaceQuadruple,
+    ForceCone,
+    Grasp,
+    Witness,
+    four,
+)
 
 PAIRED = ("p", "r")
 """Letters with which the ids of pencil and regulus grasps begin: their fingers (0, 1) and (2, 3)
 form pairs."""
+ORDER, UNMIRRORED = list(range(FINGERS)), np.ones(3)
+"""The order of the fingers, and the signs of the coordinates, where nothing is translated."""
 Place: TypeAlias = tuple[int, str]
 """The face on which a finger stands, by its number on the object as it was given, and the half of
 the face, `a` or `b`; empty for a whole face."""
 
 
-def as_given(found: Certified, on: Standard) -> Certified:
-    """Translate a grasp to the object as given, fingers in the order of their faces."""
+def to_grasp(
+    body: Polyhedron, friction: float, found: Certified, on: Standard | None = None
+) -> Grasp:
+    """Convert a certified placement to a grasp in the object's frame, which has late figures.
+
+    Takes `on`, the reordered copy of the object that it was found on, if it is not the object.
+    """
+    name, faces, order = (found.id, found.faces, ORDER) if on is None else _named(found, on)
+    flip = FLIP if on is not None and on.mirrored else UNMIRRORED
+    center, radius, placement = body.center_of_mass, body.radius, found.placement
+    unit_positions = frozen_copy(placement.positions[order] * flip)
+    positions = frozen_copy(center + radius * unit_positions)
+    axes = np.array([cone.axis for cone in found.cones])
+    normals, forces, axes = (
+        frozen_copy(each[order] * flip) for each in (found.normals, placement.forces, axes)
+    )
+    foci = placement.foci[::-1] if found.id[0] in PAIRED and order[0] > 1 else placement.foci
+    return trusted(
+        Grasp,
+        id=name,
+        family=found.family,
+        faces=four(faces),
+        contacts=four(
+            trusted(Contact, position=position, normal=normal)
+            for position, normal in zip(positions, normals, strict=True)
+        ),
+        focus_points=frozen_copy(center + radius * (foci * flip)),
+        force_cones=four(
+            trusted(ForceCone, axis=axis, half_angle=kept_angle(found.cones[finger].half_angle))
+            for axis, finger in zip(axes, order, strict=True)
+        ),
+        regions=four(_region(found.regions[finger], body, flip) for finger in order),
+        radius=radius * float(placement.radii.min()),
+        span_angle=kept_angle(found.span_angle),
+        closure_margin=found.margin,
+        witness=trusted(Witness, points=positions, forces=forces),
+        approach_directions=(
+            None if found.ways_out is None else frozen_copy(-found.ways_out[order] * flip)
+        ),
+        _figures=LateFigures(unit_positions, normals, friction),
+    )
+
+
+def _region(region: ContactRegion, body: Polyhedron, flip: Array) -> ContactRegion:
+    """Put a region into the object's frame; a mirrored one is listed the other way around."""
+    listed = region.polygon if flip is UNMIRRORED else region.polygon[::-1] * flip
+    corners = body.center_of_mass + body.radius * listed
+    corners.setflags(write=False)
+    radius = body.radius * region.inscribed_radius
+    return trusted(ContactRegion, kind=region.kind, polygon=corners, inscribed_radius=radius)
+
+
+def _named(found: Certified, on: Standard) -> tuple[str, Sequence[int], list[int]]:
+    """Return the id and the faces of a grasp on the object as given, and its fingers in order."""
     places = [_place(on, face) for face in found.faces]
     order = _finger_order(found.id[0], places)
-    placement = found.placement
-    swapped = found.id[0] in PAIRED and order[0] > 1
-    grasp = replace(
-        found,
-        id="-".join([found.id[0], *("{}{}".format(*places[finger]) for finger in order)]),
-        faces=four(places[finger][0] for finger in order),
-        pieces=tuple(found.pieces[finger] for finger in order),
-        cones=tuple(found.cones[finger] for finger in order),
-        regions=tuple(found.regions[finger] for finger in order),
-        placement=replace(
-            placement,
-            positions=placement.positions[order],
-            forces=placement.forces[order],
-            foci=placement.foci[::-1] if swapped else placement.foci,
-            radii=placement.radii[order],
-            planned=None if placement.planned is None else placement.planned[order],
-        ),
-        ways_out=None if found.ways_out is None else found.ways_out[order],
-    )
-    return _mirrored_grasp(grasp) if on.mirrored else grasp
+    name = "-".join([found.id[0], *("{}{}".format(*places[finger]) for finger in order)])
+    return name, [places[finger][0] for finger in order], order
 
 
 def _place(on: Standard, face: int) -> Place:
@@ -76,26 +122,6 @@ def _finger_order(letter: str, places: Sequence[Place]) -> list[int]:
     pairs = [sorted(pair, key=places.__getitem__) for pair in ((0, 1), (2, 3))]
     first, second = sorted(pairs, key=lambda pair: places[pair[0]])
     return [*first, *second]
-
-
-def _mirrored_grasp(found: Certified) -> Certified:
-    placement = found.placement
-    return replace(
-        found,
-        pieces=tuple(map(_mirrored_piece, found.pieces)),
-        cones=tuple(altered(cone, axis=frozen_copy(cone.axis * FLIP)) for cone in found.cones),
-        regions=tuple(
-            altered(each, polygon=frozen_copy(each.polygon[::-1] * FLIP)) for each in found.regions
-        ),
-        placement=replace(
-            placement,
-            positions=placement.positions * FLIP,
-            forces=placement.forces * FLIP,
-            foci=placement.foci * FLIP,
-            planned=None if placement.planned is None else placement.planned * FLIP,
-        ),
-        ways_out=None if found.ways_out is None else found.ways_out * FLIP,
-    )
 
 
 def _mirrored_piece(piece: FacePiece) -> FacePiece:

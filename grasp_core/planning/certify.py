@@ -10,21 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array, frozen_copy
+from grasp_core.arrays import Array
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.closure.critical_friction import critical_friction, critical_frictions
 from grasp_core.closure.force_closure import closing_margins, force_closure
 from grasp_core.closure.lines import classify_each
 from grasp_core.cones.spanning import span_angles
-from grasp_core.declared import altered, kept, trusted
+from grasp_core.declared import kept
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.placements import Placement
-from grasp_core.frames import kept_angle
 from grasp_core.kinds import Family, Method
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
-from grasp_core.values import Contact, ContactRegion, FaceQuadruple, ForceCone, Grasp, Witness, four
+from grasp_core.values import ContactRegion, FaceQuadruple, ForceCone, Grasp
 
 BALANCED = 1e-6
 """Largest wrench by which witness forces may miss balance, for normal parts that sum to one and an
@@ -176,55 +175,3 @@ def find_critical_frictions(grasps: Iterable[Grasp]) -> None:
     every = critical_frictions(np.array(positions), np.array(normals)).tolist()
     for grasp, each, found in zip(late, figures, every, strict=True):
         object.__setattr__(grasp, "critical_friction", min(found, each.friction))
-
-
-def to_grasps(body: Polyhedron, friction: float, found: Sequence[Certified]) -> list[Grasp]:
-    """Convert certified placements to grasps in the object's frame, which have late figures."""
-    if not found:
-        return []
-    normals = frozen_copy(np.array([each.normals for each in found]))
-    forces = frozen_copy(np.array([each.placement.forces for each in found]))
-    center, radius = body.center_of_mass, body.radius
-    positions = center + radius * np.array([each.placement.positions for each in found])
-    polygons = [region.polygon for each in found for region in each.regions]
-    corners = center + radius * np.concatenate(polygons)
-    for array in (positions, corners):
-        array.setflags(write=False)
-    ends = np.cumsum([len(polygon) for polygon in polygons]).tolist()
-    rings = iter(corners[start:end] for start, end in zip([0, *ends], ends, strict=False))
-    return [
-        trusted(
-            Grasp,
-            id=each.id,
-            family=each.family,
-            faces=each.faces,
-            contacts=four(
-                trusted(Contact, position=position, normal=normal)
-                for position, normal in zip(positions[i], normals[i], strict=True)
-            ),
-            focus_points=frozen_copy(center + radius * each.placement.foci),
-            force_cones=four(map(_kept_cone, each.cones)),
-            regions=four(
-                trusted(
-                    ContactRegion,
-                    kind=region.kind,
-                    polygon=next(rings),
-                    inscribed_radius=radius * region.inscribed_radius,
-                )
-                for region in each.regions
-            ),
-            radius=radius * float(each.placement.radii.min()),
-            span_angle=kept_angle(each.span_angle),
-            closure_margin=each.margin,
-            witness=trusted(Witness, points=positions[i], forces=forces[i]),
-            approach_directions=None if each.ways_out is None else frozen_copy(-each.ways_out),
-            _figures=LateFigures(each.placement.positions, normals[i], friction),
-        )
-        for i, each in enumerate(found)
-    ]
-
-
-def _kept_cone(cone: ForceCone) -> ForceCone:
-    """Return a force cone with the half-angle that degrees keep."""
-    half_angle = kept_angle(cone.half_angle)
-    return cone if half_angle == cone.half_angle else altered(cone, half_angle=half_angle)

@@ -32,7 +32,6 @@ from grasp_core.kinds import Method
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
 from grasp_core.planning.quadruples import Blocks, ConedQuadruples, WideQuadruples
-from grasp_core.planning.reach import Reach
 from grasp_core.planning.result import MethodCounts, Tally
 from grasp_core.solvers.ties import coarse, graded
 from grasp_core.values import FaceQuadruple, four
@@ -202,8 +201,8 @@ class MethodSearch:
 
     method: Method
     limit: int | None
-    reach: Callable[[Certified], Reach]
-    """Function that returns how fingers reach the contacts of a grasp, or why they cannot."""
+    reached: Callable[[Certified], Certified | str]
+    """Function that returns a grasp with its fingers' ways out, or why they cannot reach it."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
     _keys: list[SortKey] = field(default_factory=list[SortKey])
@@ -243,14 +242,13 @@ class MethodSearch:
         """Count grasps on one quadruple, and keep and return the ones that fingers reach."""
         kept: list[Certified] = []
         for each in found:
-            faces, way = four(sorted(each.faces)), self.reach(each)
-            if way.reason:
+            faces, one = four(sorted(each.faces)), self.reached(each)
+            if isinstance(one, str):
                 self.gathered.tally["unreachable"] += 1
-                self.unreached[faces] = way.reason
+                self.unreached[faces] = one
                 continue
-            one = each
-            if each.method != self.method or way.directions is not None:
-                one = replace(each, method=self.method, ways_out=way.directions)
+            if one.method != self.method:
+                one = replace(one, method=self.method)
             self.gathered.tally["found"] += 1
             self.held.add(faces)
             key = best_first(one)

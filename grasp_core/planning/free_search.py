@@ -28,8 +28,7 @@ from grasp_core.families.placing import (
     Settling,
     chosen_shapes,
     on_true_surface,
-    point_region,
-    regions_of,
+    point_regions,
 )
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
@@ -176,14 +175,13 @@ class _FreeSearch:
         """Contacts on the triangles of curved patches; planes without a grasp prove nothing."""
         if isinstance(answer, Placement):
             cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
-            points = regions_of(point_region, pieces, cones, answer)
             rng = self._rng(faces)
 
             def place(facets: Pieces) -> Placement | None:
                 found = self._place(facets, rng, restarts=0)
                 return found if isinstance(found, Placement) else None
 
-            settled = on_true_surface(shapes, pieces, cones, answer, points, place)
+            settled = on_true_surface(shapes, pieces, cones, answer, point_regions(answer), place)
             if settled is not None:
                 return settled
         self.gathered.undecided[faces] = 1.0
@@ -220,8 +218,9 @@ class _FreeSearch:
             if better := _upgraded(faces, pieces, construction, cones, request.friction):
                 return better
         cones = four(ForceCone(piece.normal, request.theta) for piece in pieces)
-        points = regions_of(point_region, pieces, cones, placement)
-        candidate = Candidate(named("f", faces), faces, "regulus", pieces, cones, placement, points)
+        candidate = Candidate(
+            named("f", faces), faces, "regulus", pieces, cones, placement, point_regions(placement)
+        )
         (certified,) = certify_each([candidate], request.friction)
         if certified is None:
             self.gathered.tally["rejected"] += 1

@@ -8,21 +8,22 @@ patches need not cover it.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_units
+from grasp_core.arrays import Array, Indices, frozen, frozen_units
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import plane_frame
-from grasp_core.objects.on_faces import within
+from grasp_core.geometry.polygons import circle, plane_frame
+from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
+from grasp_core.objects.triangles import areas_and_normals
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import (
@@ -56,27 +57,27 @@ class Seated:
     body: Polyhedron  # the object; a curved one with four more faces, one around each contact
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
-    moved_m: float  # largest distance of a contact from where it was given [m]
+    moved_m: float = 0.0  # largest distance of a contact from where it was given [m]
 
 
 def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
     """Move four contacts to the nearest faces of an object with fitting normals."""
     points = frozen(positions, (FINGERS, 3), "positions")
     inward = frozen_units(normals, (FINGERS, 3), "normals")
-    parts = flat_parts(body)
+    facets = facets_of(body)
     found = list[Nearest]()
     reach, margin = LARGEST_MOVE * body.radius, NEARER * body.radius
     for finger, (point, normal) in enumerate(zip(points, inward, strict=True)):
-        nearest = nearest_like(parts, point, normal, lean=LARGEST_LEAN, reach=reach, margin=margin)
+        nearest = nearest_like(facets, point, normal, lean=LARGEST_LEAN, reach=reach, margin=margin)
         if nearest is None:
             raise InputError(
                 f"contact {finger} is on no face: expected one within {reach:.3g} m whose inward "
                 f"normal is within {math.degrees(LARGEST_LEAN):.0f} deg of the given one"
             )
         found.append(nearest)
-    faces = four(each.part.face for each in found)
+    faces = four(each.face for each in found)
     if body.patches is not None:
-        around = [_around(body, each.part, each.contact) for each in found]
+        around = [_around(body, each.face, each.contact) for each in found]
         faces = four(len(body.faces) + finger for finger in range(FINGERS))
         body = replace(body, faces=(*body.faces, *around))
     contacts = four(each.contact for each in found)
@@ -116,82 +117,71 @@ def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCerti
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FlatPart:
-    """A flat convex part of a surface: a piece of a face, or a triangle of a curved surface."""
+class Facets:
+    """Triangles that make up a surface: of the convex pieces of faces, or of a curved mesh."""
 
-    face: int  # index of the face, or of the triangle where the object is curved
-    normal: Array  # unit vector into the object, (3,)
-    polygon: Array  # counter-clockwise about the normal, (k, 3) [m]
+    faces: Indices  # index of the face, or of the triangle where the object is curved, (t,)
+    normals: Array  # unit vectors into the object, (t, 3)
+    corners: Array  # counter-clockwise about the normals, (t, 3, 3) [m]
 
 
-def flat_parts(body: Polyhedron) -> tuple[FlatPart, ...]:
-    """List the flat convex parts that make up the surface of an object."""
+@lru_cache(maxsize=8)
+def facets_of(body: Polyhedron) -> Facets:
+    """List the triangles of an object's surface; kept, as they are searched for every contact."""
     if body.patches is None:
-        return tuple(
-            FlatPart(index, face.normal, piece)
-            for index, face in enumerate(body.faces)
-            for piece in face.pieces
-        )
+        fans = [fan(face) for face in body.faces]
+        faces = np.repeat(np.arange(len(fans)), [len(each) for each in fans])
+        return Facets(faces, body.normals[faces], np.concatenate(fans))
     corners = body.vertices[body.triangles[:, ::-1]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    return tuple(
-        FlatPart(index, normals[index] / lengths[index], corners[index])
-        for index in np.flatnonzero(lengths > 0.0).tolist()
+    areas, normals = areas_and_normals(corners)
+    (kept,) = np.nonzero(areas > 0.0)
+    return Facets(kept, normals[kept], corners[kept])
+
+
+def fan(face: Face) -> Array:
+    """Split the convex pieces of a face into triangles about their first corners, (t, 3, 3)."""
+    fans = (
+        np.stack([np.broadcast_to(piece[0], piece[2:].shape), piece[1:-1], piece[2:]], axis=1)
+        for piece in face.pieces
     )
+    return np.concatenate([np.empty((0, 3, 3)), *fans])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """The point of a surface that is nearest to a given one, among parts with a like normal."""
+    """The point of a surface that is nearest to a given one, among facets with a like normal."""
 
-    part: FlatPart
+    face: int  # index of the face, or of the triangle where the object is curved
     contact: Contact
     distance: float  # distance from the given point [m]
 
 
 def nearest_like(
-    parts: Sequence[FlatPart], point: Array, normal: Array, *, lean: float, reach: float,
-    margin: float,
-) -> Nearest | None:  # fmt: skip
-    """Find the point nearest to a given one on parts that lean little; None beyond reach."""
-    normals = np.array([part.normal for part in parts])
-    firsts = np.array([part.polygon[0] for part in parts])
-    heights = np.einsum("ti,ti->t", normals, point - firsts)
-    likely = np.flatnonzero((normals @ normal >= math.cos(lean)) & (np.abs(heights) <= reach))
-    best: Nearest | None = None
-    for index in likely.tolist():
-        part = parts[index]
-        at = nearest_in(part.polygon, part.normal, point)
-        distance = float(np.linalg.norm(at - point))
-        if distance <= reach and (best is None or distance < best.distance - margin):
-            best = Nearest(part, Contact(at, part.normal), distance)
-    return best
+    facets: Facets, point: Array, normal: Array, *, lean: float, reach: float, margin: float
+) -> Nearest | None:
+    """Find the point nearest to a given one on facets that lean little; None beyond reach."""
+    heights = np.abs(np.einsum("ti,ti->t", facets.normals, point - facets.corners[:, 0]))
+    (likely,) = np.nonzero((facets.normals @ normal >= math.cos(lean)) & (heights <= reach))
+    at = nearest_on_triangles(facets.corners[likely], point)
+    distances = np.linalg.norm(at - point, axis=1)
+    if not (distances <= reach).any():
+        return None
+    best = first_best(np.where(distances <= reach, -distances, -np.inf), margin)
+    index = likely[best]
+    contact = Contact(at[best], facets.normals[index])
+    return Nearest(int(facets.faces[index]), contact, float(distances[best]))
 
 
-def _around(body: Polyhedron, part: FlatPart, contact: Contact) -> Face:
+def _around(body: Polyhedron, triangle: int, contact: Contact) -> Face:
     """Make a round face around a contact on a triangle, in the triangle's plane."""
-    turns = np.linspace(0.0, 2.0 * math.pi, CORNERS, endpoint=False)
     radius = SURROUNDINGS * body.radius
-    ring = radius * np.column_stack([np.cos(turns), np.sin(turns)])
-    polygon = contact.position + ring @ plane_frame(part.normal).T
+    polygon = contact.position + radius * circle(CORNERS) @ plane_frame(contact.normal).T
     return Face(
-        normal=part.normal,
+        normal=contact.normal,
         centroid=contact.position,
         area=math.pi * radius**2,
         polygon=polygon,
         holes=(),
         pieces=(polygon,),
-        facets=np.array([part.face]),
+        facets=np.array([triangle]),
     )
-
-
-def nearest_in(polygon: Array, normal: Array, point: Array) -> Array:
-    """Compute the point of a convex polygon that is nearest to a given point, (3,) [m]."""
-    flat = point - float(normal @ (point - polygon[0])) * normal
-    if within(flat, polygon, normal, 0.0):
-        return flat
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    share = np.einsum("ki,ki->k", flat - polygon, edges) / np.einsum("ki,ki->k", edges, edges)
-    ends = polygon + np.clip(share, 0.0, 1.0)[:, None] * edges
-    return ends[first_best(-np.linalg.norm(ends - flat, axis=1))]

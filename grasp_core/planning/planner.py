@@ -11,26 +11,24 @@ import math
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from functools import partial
 from typing import cast
 
-from grasp_core.checked import function, whole
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
-from grasp_core.kinds import METHODS, ConeKind, Method, RankBy
+from grasp_core.kinds import METHODS, ConeKind, Count, Method, RankBy, function, value_of
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import Standard
-from grasp_core.planning.as_given import absence_as_given, as_given, faces_as_given
-from grasp_core.planning.certify import to_grasps
-from grasp_core.planning.methods import Progress, Searches, outcomes, prepared, run, unreached
-from grasp_core.planning.parts import finding_elsewhere
+from grasp_core.planning.as_given import absence_as_given, faces_as_given, to_grasp
+from grasp_core.planning.plan_search import PlanSearch, Progress, worth_starting
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.request import PlanRequest, check_request
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.planning.selection import chosen
+from grasp_core.processes import local_processes
 from grasp_core.values import Grasp
 
 
@@ -98,11 +96,12 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     check_request(body, request)
     if progress is not None:
         function(progress, "progress")
-    with finding_elsewhere(body, request, whole(jobs, "jobs", least=1)) as elsewhere:
-        on, searches = prepared(body, request)
-        for _ in run(on, request, searches, progress, elsewhere):
+    others = worth_starting(body, request, value_of(Count, jobs, "jobs"))
+    with local_processes(others) if others else nullcontext() as workers:
+        search = PlanSearch.of(body, request, workers)
+        for _ in search.run(progress):
             pass
-    return _planned(body, request, on, searches)
+    return _planned(search)
 
 
 def iter_grasps(  # noqa: PLR0913 - as `plan`
@@ -129,9 +128,8 @@ def iter_grasps(  # noqa: PLR0913 - as `plan`
         finger=finger, edge_clearance_m=edge_clearance_m, share_faces_m=share_faces_m,
     )  # fmt: skip
     check_request(body, request)
-    on, searches = prepared(body, request)
-    every = run(on, request, searches, None)
-    return (to_grasps(body, friction, [as_given(each, on)])[0] for each in every)
+    search = PlanSearch.of(body, request)
+    return (to_grasp(body, friction, each, search.on) for each in search.run())
 
 
 def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
@@ -139,25 +137,26 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
     return (families,) if isinstance(families, str) else cast("tuple[Method, ...]", families)
 
 
-def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Searches) -> Plan:
-    """Put together a plan from what the searches found, with the best grasps."""
-    best = chosen(body, [search.best for search in searches.values()], request)
+def _planned(search: PlanSearch) -> Plan:
+    """Put together a plan from what a search found, with the best grasps."""
+    body, on, request, methods = search.body, search.on, search.request, search.methods
+    best = chosen(body, [each.best for each in methods.values()], request)
     start = time.process_time()
-    grasps = to_grasps(body, request.friction, [as_given(found, on) for found in best])
-    each = (time.process_time() - start) / max(len(best), 1)
+    grasps = tuple(to_grasp(body, request.friction, found, on) for found in best)
+    per_grasp = (time.process_time() - start) / max(len(best), 1)
     for method, count in Counter[Method](found.method for found in best).items():
-        searches[method].seconds += count * each
+        methods[method].seconds += count * per_grasp
     counts = PlanCounts(
         len(body.faces),
         on.quadruples,
         count_spanning(body.normals, LEAST_SPAN_ANGLE) if len(body.faces) <= MAX_FACES else None,
-        {method: search.counts for method, search in searches.items()},
+        {method: each.counts for method, each in methods.items()},
     )
-    known, every = outcomes(on, searches), searches.values()
+    known, every = search.outcomes, methods.values()
     given = partial(faces_as_given, on=on)
     return Plan(
         body=body,
-        grasps=tuple(grasps),
+        grasps=grasps,
         friction=request.friction,
         theta=kept_angle(request.theta),
         seed=request.seed,
@@ -166,15 +165,17 @@ def _planned(body: Polyhedron, request: PlanRequest, on: Standard, searches: Sea
         absence=None if grasps else _absence(body, request, counts, known),
         absences={
             given(faces): tuple(absence_as_given(proof, on) for proof in proofs)
-            for s in every
-            for faces, proofs in s.gathered.absences.items()
+            for each in every
+            for faces, proofs in each.gathered.absences.items()
         },
         finger=request.finger,
         undecided={
-            given(faces): share for s in every for faces, share in s.gathered.undecided.items()
+            given(faces): share
+            for each in every
+            for faces, share in each.gathered.undecided.items()
         },
-        unreached={given(faces): why for faces, why in unreached(searches).items()},
-        seconds={method: search.seconds for method, search in searches.items()},
+        unreached={given(faces): why for faces, why in search.unreached.items()},
+        seconds={method: each.seconds for method, each in methods.items()},
     )
 
 

@@ -5,8 +5,8 @@ place p - r n, where the ball touches at p, from a given distance without touchi
 A rod is all points within r of a segment, so it is free of the object iff no triangle is nearer to
 the segment than r, and free of another rod iff the segments are 2 r apart.
 
-A segment and a triangle are nearest where they cross, at an end of the segment above the
-triangle, or at an edge of the triangle. The triangles of the curved patch that is touched do not
+A segment and a triangle are nearest where they cross, at an end of the segment, or at an edge of
+the triangle. The triangles of the curved patch that is touched do not
 count: they are not exactly in the plane that the finger is thought to touch.
 
 The directions tried are the normal and two rings around it. If none of them is free, another
@@ -19,11 +19,11 @@ from dataclasses import dataclass
 from itertools import combinations, islice, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.kinds import Quantity
+from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.settings import Settings
 from grasp_core.values import FaceQuadruple
@@ -50,29 +50,22 @@ class Finger(Settings):
     """Length of the free line on which the finger comes [m]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reach:
-    """Directions in which fingers reach their contacts, or the reason why they cannot."""
-
-    directions: Array | None
-    """Unit vectors from each tip along its rod, (k, 3); None if none were sought or found."""
-    reason: str = ""
-    """Why the fingers cannot get to their contacts; empty where they can or none was sought."""
-
-
 def reach(
     body: Polyhedron, faces: FaceQuadruple, positions: Array, normals: Array, finger: Finger
-) -> Reach:
-    """Find straight lines on which all fingers reach their contacts without a collision."""
+) -> Array | str:
+    """Find straight lines on which all fingers reach their contacts without a collision.
+
+    Gives unit vectors from each tip along its rod, (k, 3), or the reason why there are none.
+    """
     slack = TOUCHING * body.radius
     tips = positions - finger.radius_m * normals
     for i, j in combinations(range(len(tips)), 2):
         if np.linalg.norm(tips[i] - tips[j]) < 2.0 * finger.radius_m - slack:
-            return Reach(None, f"fingertips {i} and {j} overlap")
+            return f"fingertips {i} and {j} overlap"
     surroundings = [_Surroundings.of(body, face) for face in faces]
     for place, (others, tip) in enumerate(zip(surroundings, tips, strict=True)):
         if others.distance(tip, tip, finger.radius_m) < finger.radius_m - slack:
-            return Reach(None, f"fingertip {place} meets the object beside its contact")
+            return f"fingertip {place} meets the object beside its contact"
     free: list[list[Array]] = []
     for most in (1, None):  # most fingers come along their normals
         free = [
@@ -85,11 +78,11 @@ def reach(
             for others, tip, normal in zip(surroundings, tips, normals, strict=True)
         ]
         if all(free) and (chosen := _apart(tips, free, finger, slack)) is not None:
-            return Reach(chosen)
+            return chosen
     blocked = [place for place, ways in enumerate(free) if not ways]
     if blocked:
-        return Reach(None, f"finger {blocked[0]} has no free line to its contact")
-    return Reach(None, "the fingers' lines cross")
+        return f"finger {blocked[0]} has no free line to its contact"
+    return "the fingers' lines cross"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,26 +151,16 @@ def _apart(tips: Array, ways: list[list[Array]], finger: Finger, slack: float) -
 
 def segment_distances(start: Array, end: Array, triangles: Array) -> Array:
     """Compute the distance of a segment from each triangle (t, 3, 3), (t,) [m]."""
-    after = np.roll(triangles, -1, axis=1)
+    after, ends = np.roll(triangles, -1, axis=1), np.array([start, end])
     edges = [_between(start, end, triangles[:, k], after[:, k]) for k in range(3)]
-    found = np.minimum(np.minimum(edges[0], edges[1]), edges[2])
+    feet = np.linalg.norm(nearest_on_triangles(triangles, ends) - ends[:, None], axis=2)
+    found = np.minimum(np.min(edges, axis=0), feet.min(axis=0))
     normals = np.cross(after[:, 0] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    normals = normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-    heights = [np.einsum("ti,ti->t", normals, point - triangles[:, 0]) for point in (start, end)]
-    for point, height in zip((start, end), heights, strict=True):
-        over = _inside(point - height[:, None] * normals, triangles, after, normals)
-        found = np.where(over, np.minimum(found, np.abs(height)), found)
-    crossing = heights[0] * heights[1] < 0.0
-    share = np.where(crossing, heights[0], 0.0) / np.where(crossing, heights[0] - heights[1], 1.0)
-    at = start + share[:, None] * (end - start)
-    return np.where(crossing & _inside(at, triangles, after, normals), 0.0, found)
-
-
-def _inside(points: Array, triangles: Array, after: Array, normals: Array) -> NDArray[np.bool_]:
-    turns = np.cross(after - triangles, points[:, None] - triangles)
-    sides = np.einsum("tki,ti->tk", turns, normals)
-    return (sides >= 0.0).all(axis=1) & normals.any(axis=1)
+    heights = np.einsum("ti,eti->et", normals, ends[:, None] - triangles[:, 0])
+    # the line of the segment passes all edges on the same side
+    sides = np.cross(triangles - start, after - start) @ (end - start)
+    through = (sides >= 0.0).all(axis=1) | (sides <= 0.0).all(axis=1)
+    return np.where(through & (heights[0] * heights[1] < 0.0), 0.0, found)
 
 
 def _between(start: Array, end: Array, tails: Array, heads: Array) -> Array:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import get_args
 
 from grasp_core.arrays import UNIT_SLACK
-from grasp_core.checked import SMALLEST, number
 from grasp_core.errors import InputError
-from grasp_core.kinds import METHODS, Family, Method
+from grasp_core.kinds import METHODS, SMALLEST, Family, Method, number
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
@@ -63,23 +62,15 @@ def methods_for(body: Polyhedron) -> tuple[Method, ...]:
 def check_request(body: Polyhedron, request: PlanRequest) -> None:
     """Refuse keywords out of range, and objects with too many faces for the request."""
     check_body(body)
-    _check_lengths(body, request)
-    _check_size(body, request)
-
-
-def _check_lengths(body: Polyhedron, request: PlanRequest) -> None:
-    number(request.edge_clearance_m, "edge_clearance_m", below=body.radius, where=ITS_RADIUS)
+    size, finger = body.radius, request.finger
+    number(request.edge_clearance_m, "edge_clearance_m", below=size, where=ITS_RADIUS)
     if request.share_faces_m is not None:
-        size, where = 2.0 * body.radius, ", the object's size, or None"
-        number(request.share_faces_m, "share_faces_m", below=size, where=where)
-    if request.finger is not None:
-        radius, approach = request.finger.radius_m, request.finger.approach_m
-        number(radius, "finger.radius_m", most=body.radius, where=ITS_RADIUS)
-        farthest = FARTHEST_APPROACH * body.radius
-        number(approach, "finger.approach_m", most=farthest, where=", a thousand radii")
-
-
-def _check_size(body: Polyhedron, request: PlanRequest) -> None:
+        where = ", the object's size, or None"
+        number(request.share_faces_m, "share_faces_m", below=2.0 * size, where=where)
+    if finger is not None:
+        number(finger.radius_m, "finger.radius_m", most=size, where=ITS_RADIUS)
+        farthest, where = FARTHEST_APPROACH * size, ", a thousand radii"
+        number(finger.approach_m, "finger.approach_m", most=farthest, where=where)
     faces = len(body.faces)
     if faces > MOST_FACES:
         raise InputError(

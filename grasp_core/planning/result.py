@@ -1,5 +1,6 @@
 """Holds a plan: the grasps found on one object, what was tried, and what was ruled out."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,14 +10,16 @@ from typing import Annotated, Any, Protocol, TypeAlias, runtime_checkable
 from grasp_core.declared import Declared, InNotebooks, counted, summary
 from grasp_core.figures import Shown, figure
 from grasp_core.files.records import UNRECORDED, Key
-from grasp_core.grasp_tables import ById, chosen, data_frame
-from grasp_core.kinds import Friction, Method, Number, Seed
+from grasp_core.grasp_tables import ById, frame_of
+from grasp_core.kinds import Friction, Method, Number, Seed, function, number, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.values import Bounds, FaceQuadruple, Grasp, HalfAngle
 
 LONGEST_REASON = 160
 """Most characters of a reason in the `repr` of a plan, so that it takes two lines at most."""
+FREE_IDS = "f-"
+"""Beginning of the ids of grasps that the free method made, whose family is that of their lines."""
 
 
 @runtime_checkable
@@ -183,21 +186,44 @@ class Plan(Declared, ById[Grasp], InNotebooks):
         Raises:
             InputError: A demand is not a number, or there is no such family.
         """
-        kept = chosen(
-            self.grasps, where, family, min_radius_m, min_closure_margin, max_critical_friction,
-            min_ferrari_canny_n,
-        )  # fmt: skip
-        return replace(self, grasps=kept)
+        listed = (family,) if isinstance(family, str) else family
+        families = None if listed is None else value_of(tuple[Method, ...], listed, "family")
+        most = max_critical_friction
+        for name, bound in (
+            ("min_radius_m", min_radius_m), ("min_closure_margin", min_closure_margin),
+            ("max_critical_friction", most), ("min_ferrari_canny_n", min_ferrari_canny_n),
+        ):  # fmt: skip
+            if bound is not None:
+                number(bound, name)
+        if where is not None:
+            function(where, "where")
+
+        def meets(grasp: Grasp) -> bool:
+            """Whether a grasp meets the demands; only figures that are asked for are computed."""
+            own = {grasp.family, "free"} if grasp.id.startswith(FREE_IDS) else {grasp.family}
+            return (
+                (families is None or not own.isdisjoint(families))
+                and (min_radius_m is None or grasp.radius >= min_radius_m)
+                and (min_closure_margin is None or grasp.closure_margin >= min_closure_margin)
+                and (most is None or grasp.critical_friction <= most)
+                and (min_ferrari_canny_n is None or grasp.ferrari_canny[0] >= min_ferrari_canny_n)
+                and (where is None or bool(where(grasp)))
+            )
+
+        return replace(self, grasps=tuple(grasp for grasp in self.grasps if meets(grasp)))
 
     def to_dataframe(self) -> Any:
         """Return a `pandas.DataFrame` with a row for each grasp, indexed by id.
 
-        Columns are named as in `grasps.json`, see `grasp_core.grasp_tables.data_frame`.
+        Columns are named as in `grasps.json`, with angles in degrees: `family`, `radius_m`,
+        `span_angle_deg`, `critical_friction`, `closure_margin`, `ferrari_canny_lower_n` and
+        `_upper_n`; for each finger `face_0`, its contact `position_0_x_m`, its inward normal
+        `normal_0_x`, etc.
 
         Raises:
             InputError: The library pandas is not installed.
         """
-        return data_frame(self.grasps)
+        return frame_of([_row(grasp) for grasp in self.grasps], [grasp.id for grasp in self.grasps])
 
     def __repr__(self) -> str:
         """Return a summary: number of grasps, largest radius, and outcomes of all quadruples."""
@@ -209,3 +235,23 @@ class Plan(Declared, ById[Grasp], InNotebooks):
             parts.append(repr(shorten(self.absence, LONGEST_REASON)))
         radius = max((grasp.radius for grasp in self.grasps), default=0.0)
         return summary("Plan", *parts, friction=self.friction, largest_radius=radius)
+
+
+def _row(grasp: Grasp) -> Mapping[str, object]:
+    lower, upper = grasp.ferrari_canny
+    row: dict[str, object] = {
+        "family": grasp.family,
+        "radius_m": grasp.radius,
+        "span_angle_deg": math.degrees(grasp.span_angle),
+        "critical_friction": grasp.critical_friction,
+        "closure_margin": grasp.closure_margin,
+        "ferrari_canny_lower_n": lower,
+        "ferrari_canny_upper_n": upper,
+    }
+    for finger, face in enumerate(grasp.faces):
+        row[f"face_{finger}"] = face
+    for finger, contact in enumerate(grasp.contacts):
+        for axis, at, along in zip("xyz", contact.position, contact.normal, strict=True):
+            row[f"position_{finger}_{axis}_m"] = float(at)
+            row[f"normal_{finger}_{axis}"] = float(along)
+    return row

@@ -5,9 +5,10 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
+from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.errors import NoForcesError
-from grasp_core.execution.best_squeeze import GAP, best_squeeze, searched
+from grasp_core.execution.best_squeeze import GAP, searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
 from grasp_core.objects.polyhedron import Polyhedron
@@ -54,40 +55,38 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
             return -LateFigures(positions, normals, request.friction).ferrari_canny()[0]
 
         return quality, SAME_SHARE
-    loads, tip = any_direction(1.0), _tip_radius(body, request.finger)
 
-    def looseness(found: Certified) -> float:
-        """Return minus the mass that the best squeeze survives [kg]; zero where none holds.
-
-        The mass is certified in any orientation, in the linear model.
-        """
-        count = len(found.normals)
-        start = Grip(
-            body.radius * found.placement.positions, found.normals,
-            np.full(count, request.friction), np.zeros((count, 3)),
-            springs(STIFFNESS_N_PER_M, count), np.full(count, tip),
-        )  # fmt: skip
-        try:
-            return -searched(start, loads, PUSH_N).scale
-        except NoForcesError:
-            return 0.0
+    def lightness(found: Certified) -> float:
+        points = body.radius * found.placement.positions
+        return -_carried(body, points, found.normals, request.friction, request.finger)
 
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
-    return looseness, 2.0 * GAP
+    return lightness, 2.0 * GAP
 
 
-def _tip_radius(body: Polyhedron, finger: Finger | None) -> float:
-    return TIP_RADIUS * body.radius if finger is None else finger.radius_m
+def _carried(
+    body: Polyhedron, points: Array, normals: Array, friction: float, finger: Finger | None
+) -> float:
+    """Return the mass that the best squeeze of contacts survives in any orientation [kg].
+
+    It is certified, in the linear model; zero where no squeeze holds. Takes contact points about
+    the centre of mass.
+    """
+    count, tip = len(points), TIP_RADIUS * body.radius if finger is None else finger.radius_m
+    start = Grip(
+        points, normals, np.full(count, friction), np.zeros((count, 3)),
+        springs(STIFFNESS_N_PER_M, count), np.full(count, tip),
+    )  # fmt: skip
+    try:
+        return searched(start, any_direction(1.0), PUSH_N).scale
+    except NoForcesError:
+        return 0.0
 
 
 def carried(body: Polyhedron, grasp: Grasp, friction: float, finger: Finger | None) -> float:
     """Return the mass in any orientation that ranks a grasp [kg]; 0 if none is held."""
-    loads, tip = any_direction(1.0), _tip_radius(body, finger)
-    try:
-        found = best_squeeze(body, grasp, friction, loads, max_push_n=PUSH_N, tip_radius_m=tip)
-    except NoForcesError:
-        return 0.0
-    return found.scale
+    points = grasp.positions - body.center_of_mass
+    return _carried(body, points, grasp.normals, friction, finger)
 
 
 def _largest_first(found: Iterable[Certified]) -> list[Certified]:

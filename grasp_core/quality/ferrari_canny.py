@@ -34,11 +34,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Figure, Shape
-from grasp_core.checked import number
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.compiled import compiled
 from grasp_core.declared import Declared, trusted
+from grasp_core.kinds import Range, value_of
 from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.values import Contact, Grasp
 
@@ -47,6 +47,7 @@ GAP = 1e-4
 FINEST_GAP = 1e-7
 """Smallest gap that may be asked for: below it, rounding of the planes of tiny simplices costs more
 than they gain."""
+QualityGap = Annotated[float, Range(least=FINEST_GAP, below=1.0)]
 MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
 """Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
 apart."""
@@ -159,7 +160,7 @@ def ferrari_canny(
         InputError: Shapes, lengths or signs are wrong.
         SolverError: The cone program's answer failed its check.
     """
-    number(gap, "gap", least=FINEST_GAP, below=1.0)
+    value_of(QualityGap, gap, "gap")
     wrenches = WrenchSet.of(
         positions, normals, friction, center=center, torque_scale=torque_scale, norm=norm,
         torsion_m=torsion_m,

@@ -3,25 +3,37 @@
 Solved: the method of `ferrari_canny`, from the first simplex to the last, for one set. The answer
 gives the forces at the points, the points that bound each simplex, and the normals; `ferrari_canny`
 checks that these simplices enclose zero and takes its bounds from them.
+
+The hull grows point by point. A point sees simplices, first the lowest one, then neighbours of
+those it sees. Across each corner j of a seen simplex f lies a neighbour: if it is not seen, the
+point takes the place of corner j. That new simplex adjoins
+
+    across the point             the neighbour that is not seen,
+    across another corner c      the new simplex found by turning around the corners that both
+                                 keep: from f across c into the next seen simplex, then across
+                                 the corner that has been common to the last two, until what
+                                 lies across is not seen.
+
+Turning needs no look-up of ridges, and pairs the right ones where a ridge has more than two
+simplices. A corner is found by the sums of corners, which are exact. Functions take arrays out of
+the hull once: in loops that would cost more than the arithmetic.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.solvers.hull_kernel import (
-    DEAD,
-    D,
-    enclose,
-    extend,
-    larger,
-    look,
-    lowest,
-    vacant_hull,
-)
 
+D = 6
+"""Number of coordinates of each point of the hull."""
+DEAD = 1e300
+"""Offset that marks a simplex as removed."""
+SINGULAR = 1e-13
+"""Smallest pivot accepted while the first simplex is built, whose points are widely spread."""
+TINY = 1e-300
+"""Smallest square that is divided by: a simplex may be folded flat."""
 FLATNESS = 1e-9
 """Points closer than this to a common plane, relative to their extent, span nothing more."""
 ABOVE = 1e-12
@@ -153,3 +165,259 @@ def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
     for j in range(D):
         extent = max(extent, points[: D + 1, j].max() - points[: D + 1, j].min())
     return ABOVE * extent
+
+
+class Hull(NamedTuple):
+    """The simplices of a hull, kept and removed, with what the latest point sees."""
+
+    normals: Array
+    """Outward unit normals of the simplices, (room, 6)."""
+    offsets: Array
+    corners: Indices
+    """Indices of the points of each simplex, (room, 6)."""
+    neighbors: Indices
+    """Neighbour of each simplex across the ridge opposite each corner, (room, 6)."""
+    sums: Indices
+    """Sum of the point indices in `corners` of each simplex, (room,)."""
+    heights: Array
+    """Height, above each simplex, of the latest point that was compared with it, (room,)."""
+    rounds: Indices
+    """Index of the latest point that was compared with each simplex, (room,)."""
+    made: Indices
+    """New simplex across the ridge opposite each corner of a seen simplex, (room, 6)."""
+    seen: Indices
+    """Indices of the simplices that the latest point sees, (room,)."""
+    free: Indices
+    """Indices of removed simplices, which new ones may replace, (room,)."""
+    counts: Indices
+    """Number of simplices ever made, and number of free places, (2,)."""
+
+
+@loop()
+def vacant_hull(room: int) -> Hull:
+    """Make an empty hull with room for `room` simplices."""
+    return Hull(
+        np.empty((room, D)), np.empty(room), np.empty((room, D), np.int64),
+        np.empty((room, D), np.int64), np.empty(room, np.int64), np.empty(room),
+        np.empty(room, np.int64), np.empty((room, D), np.int64), np.empty(room, np.int64),
+        np.empty(room, np.int64), np.zeros(2, np.int64),
+    )  # fmt: skip
+
+
+@loop()
+def larger(hull: Hull) -> Hull:
+    """Copy a hull with room for twice as many simplices and for all that one point can add."""
+    room = 2 * len(hull.offsets) + D * hull.counts[0]
+    return Hull(
+        _longer(hull.normals, room), _longer(hull.offsets, room), _longer(hull.corners, room),
+        _longer(hull.neighbors, room), _longer(hull.sums, room), _longer(hull.heights, room),
+        _longer(hull.rounds, room), _longer(hull.made, room), _longer(hull.seen, room),
+        _longer(hull.free, room), hull.counts,
+    )  # fmt: skip
+
+
+@loop()
+def _longer(old: Any, room: int) -> Any:
+    new = np.empty((room, *old.shape[1:]), old.dtype)
+    new[: len(old)] = old
+    return new
+
+
+@loop()
+def enclose(hull: Hull, points: Array) -> bool:
+    """Make the seven simplices around the first points; return False if these are nearly flat.
+
+    With the points as columns over ones in the matrix A, row i of inv(A) is the affine function
+    that is one at point i and zero at the others.
+    """
+    n = D + 1
+    A = np.zeros((n, 2 * n))
+    for i in range(n):
+        A[D, i] = A[i, n + i] = 1.0
+        for j in range(D):
+            A[j, i] = points[i, j]
+    if not _eliminate(A):
+        return False
+    for i in range(n):
+        for j in range(D):
+            hull.normals[i, j] = -A[i, n + j]
+            hull.corners[i, j] = hull.neighbors[i, j] = j if j < i else j + 1
+        hull.offsets[i] = A[i, n + D]
+        _normalize(hull.normals, hull.offsets, i)
+        hull.sums[i], hull.rounds[i] = D * n // 2 - i, 0
+    hull.counts[0] = n
+    return True
+
+
+@loop()
+def _eliminate(A: Array) -> bool:
+    """Turn (A, 1) into (1, inv(A)); return False if A is nearly singular."""
+    for i in range(len(A)):
+        best = i
+        for k in range(i, len(A)):
+            if abs(A[k, i]) > abs(A[best, i]):
+                best = k
+        pivot = A[best, i]
+        if abs(pivot) <= SINGULAR:
+            return False
+        for j in range(A.shape[1]):
+            A[i, j], A[best, j] = A[best, j], A[i, j]
+            A[i, j] /= pivot
+        _clear(A, i)
+    return True
+
+
+@loop()
+def _clear(A: Array, i: int) -> None:
+    """Subtract multiples of row i from the others, so that column i is zero there."""
+    for k in range(len(A)):
+        share = A[k, i]
+        if k != i:
+            for j in range(A.shape[1]):
+                A[k, j] -= share * A[i, j]
+
+
+@loop()
+def lowest(hull: Hull) -> int:
+    """Return the simplex whose plane has the least offset."""
+    offsets, found = hull.offsets, 0
+    for i in range(hull.counts[0]):
+        if offsets[i] < offsets[found]:
+            found = i
+    return found
+
+
+@loop()
+def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[int, int]:
+    """Find the simplices that a point sees; return their number and that of ridges around them."""
+    normals, offsets, neighbors = hull.normals, hull.offsets, hull.neighbors
+    heights, rounds, seen = hull.heights, hull.rounds, hull.seen
+    count, ridges, at = 0, 0, 0
+    heights[first], rounds[first] = _height(normals, offsets, first, point), now
+    if heights[first] > slack:
+        seen[0] = first
+        count = 1
+    while at < count:  # a simplex is listed once, as it is compared with the point only once
+        for j in range(D):
+            other = neighbors[seen[at], j]
+            new = rounds[other] != now
+            if new:
+                heights[other], rounds[other] = _height(normals, offsets, other, point), now
+            if heights[other] <= slack:
+                ridges += 1
+            elif new:
+                seen[count] = other
+                count += 1
+        at += 1
+    return count, ridges
+
+
+@loop()
+def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
+    along = 0.0
+    for j in range(D):
+        along += normals[i, j] * point[j]
+    return along - offsets[i]
+
+
+@loop()
+def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
+    """Replace the first `count` seen simplices by new ones; return False if that fails."""
+    seen = hull.seen[:count]
+    _raise(hull, seen, point, slack)
+    joined = _join(hull, seen, slack)
+    _bury(hull, seen)
+    return joined
+
+
+@loop()
+def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
+    """Make a new simplex wherever a seen simplex has a neighbour that is not seen."""
+    normals, offsets, corners, neighbors = hull.normals, hull.offsets, hull.corners, hull.neighbors
+    sums, heights, free, counts = hull.sums, hull.heights, hull.free, hull.counts
+    for f in seen:
+        for j in range(D):
+            outer = neighbors[f, j]
+            if heights[outer] > slack:
+                continue
+            new = _vacant(free, counts)
+            hull.made[f, j] = new
+            e, u = heights[f], heights[outer]
+            for i in range(D):
+                normals[new, i] = e * normals[outer, i] - u * normals[f, i]
+                corners[new, i], neighbors[new, i] = corners[f, i], -1
+            offsets[new] = e * offsets[outer] - u * offsets[f]
+            _normalize(normals, offsets, new)
+            beyond = sums[outer] - sums[f] + corners[f, j]
+            neighbors[outer, _place(corners, outer, beyond)] = new
+            neighbors[new, j] = outer
+            sums[new] = sums[f] - corners[f, j] + point
+            corners[new, j], hull.rounds[new] = point, 0
+
+
+@loop()
+def _vacant(free: Indices, counts: Indices) -> int:
+    """Return the place for a new simplex: that of a removed one, or one at the end."""
+    if counts[1] > 0:
+        counts[1] -= 1
+        return int(free[counts[1]])
+    counts[0] += 1
+    return counts[0] - 1
+
+
+@loop()
+def _normalize(normals: Array, offsets: Array, i: int) -> None:
+    square = 0.0
+    for j in range(D):
+        square += normals[i, j] * normals[i, j]
+    shrink = 1.0 / np.sqrt(max(square, TINY))
+    for j in range(D):
+        normals[i, j] *= shrink
+    offsets[i] *= shrink
+
+
+@loop()
+def _join(hull: Hull, seen: Indices, slack: float) -> bool:
+    """Connect new simplices with their neighbours; return False if one has no neighbour."""
+    corners, neighbors, made = hull.corners, hull.neighbors, hull.made
+    sums, heights = hull.sums, hull.heights
+    for f in seen:
+        for j in range(D):
+            if heights[neighbors[f, j]] > slack:
+                continue
+            new = made[f, j]
+            for c in range(D):
+                if neighbors[new, c] >= 0:
+                    continue
+                here, i, kept, steps = f, c, corners[f, j], 0
+                there = neighbors[here, i]
+                while heights[there] > slack:
+                    beyond = sums[there] - sums[here] + corners[here, i]
+                    here, i, kept = there, _place(corners, there, kept), beyond
+                    there = neighbors[here, i]
+                    steps += 1
+                    if steps > len(seen):
+                        return False
+                other = made[here, i]
+                neighbors[new, c] = other
+                neighbors[other, _place(corners, here, kept)] = new
+    return True
+
+
+@loop()
+def _bury(hull: Hull, seen: Indices) -> None:
+    """Free the places of the removed simplices for new ones."""
+    for f in seen:
+        hull.offsets[f] = DEAD
+        hull.free[hull.counts[1]] = f
+        hull.counts[1] += 1
+
+
+@loop()
+def _place(corners: Indices, i: int, corner: int) -> int:
+    """Return at which place a simplex has a corner; 0 if it has not, which later checks detect."""
+    place = 0
+    for j in range(D):  # without a way out, which would be predicted wrongly most of the time
+        if corners[i, j] == corner:
+            place = j
+    return place

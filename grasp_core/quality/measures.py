@@ -56,11 +56,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, Figure, Shape, frozen
-from grasp_core.checked import LARGEST, SMALLEST, one_of
 from grasp_core.closure.contacts import WRENCH
-from grasp_core.closure.wrench_sets import WrenchSet, force_rows, into_cones
+from grasp_core.closure.wrench_sets import WrenchSet, contact_program, into_cones
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
+from grasp_core.kinds import LARGEST, SMALLEST, one_of
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
     GAP,
@@ -70,7 +70,7 @@ from grasp_core.quality.ferrari_canny import (
     is_unit,
     wrench_set_quality,
 )
-from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.conic import minimize
 from grasp_core.solvers.ties import first_best
 
 MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
@@ -325,16 +325,15 @@ class TaskLimit(NamedTuple):
 
 def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
     """Find the largest multiple of each load of a task that contacts in force closure resist."""
-    k, n = len(wrenches.friction), wrenches.G.shape[1]
-    parts, sides = force_rows(wrenches.friction, 3)
-    rows = np.vstack([wrenches.G, parts.sum(axis=0), -parts, sides])
-    q, b = np.append(np.zeros(n), -1.0), np.zeros(len(rows))
-    b[WRENCH] = 1.0
+    n = wrenches.G.shape[1]
+    forces, multiple_of = np.eye(n, n + 1), np.eye(n + 1)[n]
+    pushes = forces[:: wrenches.width].sum(axis=0)
     found = list[TaskLimit]()
     for load in measure.loads:
         size = float(np.linalg.norm(load))
-        A = np.column_stack([rows, np.append(load / size, np.zeros(1 + k + n))])
-        answer = minimize(ConicProgram(q, A, b, WRENCH + 1, k, (3,) * k))
+        balance = wrenches.G @ forces + (load / size)[:, None] * multiple_of
+        equal = [(balance, 0.0), (pushes[None], 1.0)]
+        answer = minimize(contact_program(-multiple_of, wrenches.friction, wrenches.width, equal))
         multiple = float(answer.x[-1]) / size
         if not multiple > 0.0:
             raise SolverError(
@@ -347,12 +346,14 @@ def task_limits(wrenches: WrenchSet, measure: Measure) -> list[TaskLimit]:
 
 def _limiting_twist(wrenches: WrenchSet, load: Array) -> Array:
     """Return a twist that bounds the resisted multiple of a load, by the program (4), (6,)."""
-    k, n = len(wrenches.friction), wrenches.G.shape[1]
-    parts, sides = force_rows(wrenches.friction, 3)
-    # rows: normal parts sum to one, are not negative, distance >= |wrench + m load|, cones
-    rows = np.vstack([parts.sum(axis=0), -parts, np.zeros(n), -wrenches.G, sides])
-    rest = slice(2 + k, 2 + k + WRENCH)
-    more, b = np.zeros((len(rows), 2)), np.zeros(len(rows))
-    more[rest, 0], more[1 + k, 1], b[0] = -load / np.linalg.norm(load), -1.0, 1.0
-    A, q = np.hstack([rows, more]), np.concatenate([np.zeros(n), [-1.0, STEEP]])
-    return minimize(ConicProgram(q, A, b, 1, k, (1 + WRENCH, *(3,) * k))).z[rest]
+    n = wrenches.G.shape[1]
+    forces, (multiple_of, distance) = np.eye(n, n + 2), np.eye(n + 2)[n:]
+    pushes = forces[:: wrenches.width].sum(axis=0)
+    unit = load / np.linalg.norm(load)
+    missed = wrenches.G @ forces + unit[:, None] * multiple_of
+    program = contact_program(
+        STEEP * distance - multiple_of, wrenches.friction, wrenches.width, [(pushes[None], 1.0)],
+        cones=[(-np.vstack([distance, missed]), 0.0)],
+    )  # fmt: skip
+    start = program.zeros + program.nonnegatives + 1
+    return minimize(program).z[start : start + WRENCH]

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen
-from grasp_core.checked import MOST_EDGES, whole
 from grasp_core.closure.contacts import (
     WRENCH,
     contact_arrays,
@@ -26,6 +25,7 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.wrench_sets import WrenchSet, scaled_arms
 from grasp_core.errors import InputError
+from grasp_core.kinds import Edges, value_of
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import Contact, Grasp
 
@@ -37,7 +37,7 @@ UNREACHABLE = 1e-9
 
 def pyramid_wrenches(wrenches: WrenchSet, edges: int) -> Array:
     """Compute wrenches of pyramid edges inscribed in friction cones, (k edges, 6)."""
-    whole(edges, "edges", least=3, most=MOST_EDGES)
+    value_of(Edges, edges, "edges")
     turns = 2.0 * np.pi * np.arange(edges) / edges
     circle = np.column_stack([np.ones(edges), np.cos(turns), np.sin(turns)])
     slopes = wrenches.friction

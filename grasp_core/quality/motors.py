@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Shape, frozen, frozen_each
-from grasp_core.checked import LARGEST, SMALLEST, instance
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.kinds import LARGEST, SMALLEST, instance
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

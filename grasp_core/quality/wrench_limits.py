@@ -36,28 +36,31 @@ at a wrench that is locally the weakest. Torques are compared with forces throug
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Amount, Array, Figure, Points, Shape, Wrench, cross, frozen
-from grasp_core.checked import LARGEST, SMALLEST, positive
 from grasp_core.closure.contacts import (
+    LOCAL,
     WRENCH,
     contact_arrays,
     contact_frames,
     contact_frictions,
+    contact_torsions,
     grasp_map,
     in_frames,
+    torsion_lengths,
+    with_torques,
 )
-from grasp_core.closure.soft_contacts import LOCAL, contact_torsions, torsion_lengths
-from grasp_core.closure.wrench_sets import WrenchSet, force_rows, with_torques
+from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
+from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
 from grasp_core.quality.motors import Motors, motors_for
-from grasp_core.solvers.conic import ConicProgram, minimize
+from grasp_core.solvers.conic import minimize
 from grasp_core.solvers.ties import first_best, smallest_first
 from grasp_core.values import Contact, Grasp
 
@@ -102,7 +105,7 @@ class WrenchBody:
         motors: Motors | None = None, torsions: Array | None = None,
     ) -> None:  # fmt: skip
         """Set up the conic program; its last column will hold the wrench in question."""
-        self.max_normal_force = positive(max_normal_force, "max_normal_force")
+        self.max_normal_force = value_of(Quantity, max_normal_force, "max_normal_force")
         self.count = k = len(arms)
         self.motors = motors_for(motors, k)
         # at the contacts' own middle and at unit size all numbers are of order one
@@ -118,15 +121,16 @@ class WrenchBody:
         self.width = LOCAL if torsions is not None else 3
         levers = in_frames(self.motors.levers, self.frames)
         self.levers = levers if torsions is None else np.zeros((0, LOCAL * k))
-        # rows of (1) in units of f_max: G f + lambda w = 0, then 0 <= normal parts <= 1, then the
-        # torques of each joint over its limit, both ways, then the cones
-        parts, sides = force_rows(friction, self.width)
-        shares = self.max_normal_force * self.levers / self.motors.limits[:, None]
-        rows = np.vstack([self.G, parts, -parts, shares, -shares, sides])
-        self.A = np.column_stack([rows, np.zeros(len(rows))])
-        carried = self.motors.gravity / self.motors.limits
-        capped = [np.zeros(WRENCH), np.ones(k), np.zeros(k), 1.0 - carried, 1.0 + carried]
-        self.b = np.concatenate([*capped, np.zeros(len(sides))])
+        # (1) in units of f_max: G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques
+        # of each joint over its limit, both ways
+        n, carried = self.width * k, self.motors.gravity / self.motors.limits
+        forces, multiple = np.eye(n, n + 1), np.eye(n + 1)[n]
+        shares = self.max_normal_force * (self.levers @ forces) / self.motors.limits[:, None]
+        pushes = forces[:: self.width]
+        self.program = contact_program(
+            -multiple, friction, self.width, [(self.G @ forces, 0.0)],
+            [(pushes, 1.0), (-pushes, 0.0), (shares, 1.0 - carried), (-shares, 1.0 + carried)],
+        )  # fmt: skip
 
     def largest(self, wrench: Array, carried: Array) -> Farthest:
         """Find the largest multiple of a wrench that is resisted while joints carry as many times.
@@ -136,17 +140,15 @@ class WrenchBody:
         """
         unit = self.about_middle(wrench)
         length = float(np.linalg.norm(unit))
-        A = self.A.copy()
+        A = self.program.A.copy()
         k, joints = self.count, len(self.levers)
         # a wrench of unit length keeps lambda of order one; it is scaled back below
         A[:6, -1] = unit / length
         share = self.max_normal_force / length
-        torques = 6 + 2 * k + np.arange(2 * joints)
+        torques = self.program.zeros + 2 * k + np.arange(2 * joints)
         asked = carried / self.motors.limits
         A[torques, -1] = share * np.concatenate([asked, -asked])
-        q = np.zeros(A.shape[1])
-        q[-1] = -1.0
-        answer = minimize(ConicProgram(q, A, self.b, 6, 2 * (k + joints), (self.width,) * k))
+        answer = minimize(replace(self.program, A=A))
         # the equations' multipliers, scaled to (2), and those of the torques alike
         more, less = answer.z[torques].reshape(2, joints)
         power = -float(answer.z[:6] @ unit) - self.max_normal_force * float((more - less) @ asked)

@@ -11,14 +11,21 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Shape
-from grasp_core.checked import LARGEST, LARGEST_FRICTION, SMALLEST
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
-from grasp_core.files.json_text import object_of, value_of
+from grasp_core.files.json_text import json_of, object_of
 from grasp_core.files.records import Key, from_record
-from grasp_core.kinds import FrictionOrZero, Many, Quantity, Range
+from grasp_core.kinds import (
+    LARGEST,
+    LARGEST_FRICTION,
+    SMALLEST,
+    FrictionOrZero,
+    Many,
+    Quantity,
+    Range,
+)
 from grasp_core.records.grasps_json import grasps_from_json
 
 FEWEST_CONTACTS = 2
@@ -121,7 +128,7 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     for a `grasps.json`). Without a torque scale, the largest distance of a contact from that centre
     makes torques comparable with forces (the object's radius for a `grasps.json`).
     """
-    found = value_of(text)
+    found = json_of(text)
     if isinstance(found, dict) and "schema" in found and "contacts" not in found:
         return _planned(text, overrides)
     file = from_record(ContactsFile, object_of(text, "contacts file", nulls=False))

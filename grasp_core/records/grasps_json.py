@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Annotated
 
 from grasp_core.arrays import Array, Indices, Point, Shape
-from grasp_core.checked import instance, path_of
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of, shown, text_of
 from grasp_core.files.records import from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
+from grasp_core.kinds import instance, path_of
 from grasp_core.mesh_files.limits import MeshLimits, PatchLimits
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.on_faces import check_on_faces

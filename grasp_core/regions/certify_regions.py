@@ -11,12 +11,10 @@ normals are used there, and the friction angle is reduced by the angle between s
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, number, switch
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.errors import InputError, SolverError, UndecidedError
@@ -30,14 +28,13 @@ from grasp_core.geometry.polygons import (
     tidy,
     with_fewer_corners,
 )
-from grasp_core.kinds import MaxCones, Reserve
+from grasp_core.kinds import Friction, MaxCones, Reserve, number, value_of
 from grasp_core.objects.face_pieces import FacePiece, inscribed_radius, piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.growth import better_centers, larger_inside, shared_out
 from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
 from grasp_core.regions.proof import PLACED, CertifiedRegions
-from grasp_core.settings import value_of
 from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
@@ -84,10 +81,10 @@ def certify_regions(
     """
     check_on_faces(body, grasp)
     value_of(Reserve, reserve, "reserve")
-    switch(recenter, "recenter")
+    value_of(bool, recenter, "recenter")
     number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
     value_of(MaxCones, max_cones, "max_cones")
-    left = coefficient(friction) * (1.0 - reserve)
+    left = value_of(Friction, friction, "friction") * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)
     if not force_closure(positions, normals, left).closed:
         raise InputError(
@@ -156,8 +153,8 @@ def _pieces(
         corners = tidy(clip(whole.corners, whole.E, whole.b - clearance / unit.scale))
         if len(corners) < 3:  # noqa: PLR2004 - not a polygon
             return None
-        clear = piece_of(index, normal, whole.origin + corners @ whole.frame.T)
-        found.append(replace(clear, spread=face.spread, depth=face.depth / unit.scale))
+        places = whole.origin + corners @ whole.frame.T
+        found.append(piece_of(index, normal, places, face.spread, face.depth / unit.scale))
     return tuple(found)
 
 

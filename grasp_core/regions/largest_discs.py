@@ -21,7 +21,7 @@ import numpy as np
 from grasp_core.arrays import Array, to_digits
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import SAME_CORNER, clip
+from grasp_core.geometry.polygons import SAME_CORNER, clip_to_disc
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.regions.proof import LEAF, TWIST, TwistCover
 from grasp_core.solvers.ties import GRID_DIGITS, coarse, on_grid
@@ -161,10 +161,7 @@ class Grounds:
                 radii[i] = radius
                 polygons.append(y[None])
             else:
-                # the corners of a polygon around the disc
-                turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
-                rows = np.column_stack([np.cos(turns), np.sin(turns)])
-                polygons.append(clip(piece.corners, rows, rows @ y + radius))
+                polygons.append(clip_to_disc(piece.corners, y, radius, SIDES))
         return self.around(ys, polygons, radii)
 
     def axes(self, ys: Array) -> Array:

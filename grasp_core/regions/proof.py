@@ -51,19 +51,7 @@ from typing import Annotated
 
 import numpy as np
 
-from grasp_core.arrays import (
-    Amount,
-    Array,
-    Indices,
-    Point,
-    Polygon,
-    Shape,
-    Wrench,
-    are_frictions,
-    are_units,
-    is_array,
-)
-from grasp_core.checked import LARGEST_FRICTION
+from grasp_core.arrays import Amount, Array, Indices, Point, Polygon, Shape, Wrench, is_array
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
@@ -71,12 +59,12 @@ from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,
     FlatPolygon,
-    flat_polygon,
+    convex_polygon,
     has_inscribed_radius,
     holds_disc,
     plane_frame,
 )
-from grasp_core.kinds import Quantity, Range
+from grasp_core.kinds import LARGEST_FRICTION, Quantity, Range
 from grasp_core.values import FINGERS, ContactRegion
 
 TWIST = 6
@@ -139,7 +127,8 @@ class TwistCover(Declared):
         if not self.is_sound():
             return False
         k = self.forces.shape[1]
-        if not (are_units(normals, k, 3, slack=SLACK) and are_frictions(friction, k)):
+        units = is_array(normals, k, 3, units=True, slack=SLACK)
+        if not (units and is_array(friction, k, least=0.0, most=LARGEST_FRICTION)):
             return False
         placed = isinstance(regions, list | tuple) and len(regions) == k
         placed = placed and all(is_array(each, None, 3) and len(each) > 0 for each in regions)
@@ -280,35 +269,35 @@ class CertifiedRegions(Declared):
         for i, region in enumerate(self.regions):
             if region.kind != "certified":
                 return False
-            border, polygon = self._flat(i, self.borders[i]), self._flat(i, region.polygon)
-            center = self._at(i, self.centers[i])
+            border, polygon = self._polygon(i, self.borders[i]), self._polygon(i, region.polygon)
+            center = self._flat(i, self.centers[i : i + 1])
             if border is None or polygon is None or center is None:
                 return False
             width, radius = region.inscribed_radius / self.scale, self.radius / self.scale
             if not (
                 border.holds(polygon.corners, PLACED)
-                and polygon.holds(center[None], PLACED)
+                and polygon.holds(center, PLACED)
                 and has_inscribed_radius(polygon, width)
-                and holds_disc(polygon, border, center, radius)
+                and holds_disc(polygon, border, center[0], radius)
             ):
                 return False
             away = np.linalg.norm(border.corners - center, axis=1)
             farthest = max(farthest, float(away.max()))
         return self.radius <= (farthest + PLACED) * self.scale
 
-    def _flat(self, i: int, polygon: Array) -> FlatPolygon | None:
-        """Write a convex polygon in the plane of a finger's border, at unit size; else None."""
-        if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS:
+    def _flat(self, i: int, points: Array) -> Array | None:
+        """Write points in the plane of a finger's border, at unit size, (n, 2); None if off it."""
+        arms = (points - self.borders[i][0]) / self.scale
+        if float(np.abs(arms @ self.normals[i]).max()) > PLACED:
             return None
-        start = self.borders[i][0]
-        return flat_polygon((polygon - start) / self.scale, self.normals[i], PLACED)
+        return arms @ plane_frame(self.normals[i])
 
-    def _at(self, i: int, point: Array) -> Array | None:
-        """Write a point in the coordinates of `_flat`, (2,); None if it is off the plane."""
-        arm = (point - self.borders[i][0]) / self.scale
-        if abs(float(arm @ self.normals[i])) > PLACED:
+    def _polygon(self, i: int, corners: Array) -> FlatPolygon | None:
+        """Write a convex polygon in the coordinates of `_flat`; None if it is none."""
+        if not FEWEST_CORNERS <= len(corners) <= MOST_CORNERS:
             return None
-        return arm @ plane_frame(self.normals[i])
+        flat = self._flat(i, corners)
+        return None if flat is None else convex_polygon(flat, PLACED)
 
     def _is_open(self) -> bool:
         """Return whether `open_choice` lies on the borders at radius `limit`, without closure."""
@@ -318,8 +307,8 @@ class CertifiedRegions(Declared):
         if self.limit == math.inf:
             return False
         for i, place in enumerate(choice):
-            border, at = self._flat(i, self.borders[i]), self._at(i, place)
-            if border is None or at is None or not border.holds(at[None], PLACED):
+            border, at = self._polygon(i, self.borders[i]), self._flat(i, place[None])
+            if border is None or at is None or not border.holds(at, PLACED):
                 return False
         away = float(np.linalg.norm(choice - self.centers, axis=1).max())
         proof = ClosureCertificate(False, 0.0, choice, self.normals, self.friction, None, wrench)

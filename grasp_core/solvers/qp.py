@@ -32,9 +32,9 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import one_of
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
+from grasp_core.kinds import one_of
 
 PROXQP = "proxqp"
 """Name of the usual solver."""

@@ -38,28 +38,18 @@ positive outwards, because normals point into the part.
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import instance, number
 from grasp_core.declared import Declared, counted
-from grasp_core.errors import InputError
 from grasp_core.files.records import Key
-from grasp_core.kinds import FaceTurn, Vector
-from grasp_core.objects.on_faces import ON_FACE
+from grasp_core.kinds import FaceTurn, Vector, number, value_of
+from grasp_core.objects.on_faces import ON_FACE, nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
-from grasp_core.planning.given_contacts import (
-    FlatPart,
-    Nearest,
-    flat_parts,
-    nearest_in,
-    nearest_like,
-)
-from grasp_core.settings import value_of
+from grasp_core.planning.given_contacts import Nearest, facets_of, fan, nearest_like
 from grasp_core.transferring.settings import Carrying
 
 SHARE_OF_SIZE = 0.05
@@ -112,28 +102,12 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
     )
 
 
-def check_planar(body: Polyhedron, name: str) -> None:
-    """Refuse a value that is no part, or a part whose faces are patches of a curved surface."""
-    instance(body, Polyhedron, name, "gc.load_polyhedron reads one from a mesh file")
-    if body.patches is not None:
-        raise InputError(
-            f"{name} must have exact planar faces, but {body.name} was read as patches of a curved "
-            "surface; read it with faces='planar', or plan on the changed part anew"
-        )
-
-
 def place_of(
     new: Polyhedron, point: Array, normal: Array, rule: Likeness, reach: float
 ) -> Nearest | None:
     """Find the nearest point on a like face of a changed part, within reach; None if none is."""
     lean = rule.angle + SAME
-    return nearest_like(_parts(new), point, normal, lean=lean, reach=reach, margin=rule.same)
-
-
-@lru_cache(maxsize=8)
-def _parts(body: Polyhedron) -> tuple[FlatPart, ...]:
-    """List the parts of a surface once: they are searched for every contact."""
-    return flat_parts(body)
+    return nearest_like(facets_of(new), point, normal, lean=lean, reach=reach, margin=rule.same)
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,15 +235,12 @@ def _successor(
         heights = np.abs((centers - plane.centroid) @ plane.normal)
         if float(np.average(heights, weights=weights)) > min(reach, least):
             continue
-        mean = float(np.average([_distance(plane, at) for at in centers], weights=weights))
+        feet = nearest_on_triangles(fan(plane), centers)
+        gaps = np.linalg.norm(feet - centers[:, None], axis=2).min(axis=1)
+        mean = float(np.average(gaps, weights=weights))
         if mean <= reach and mean < least - rule.same:
             best, least = index, mean
     return best
-
-
-def _distance(face: Face, point: Array) -> float:
-    feet = (nearest_in(piece, face.normal, point) for piece in face.pieces)
-    return min(float(np.linalg.norm(foot - point)) for foot in feet)
 
 
 def _change(

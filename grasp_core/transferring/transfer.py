@@ -27,15 +27,15 @@ it is refused.
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain, count
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, instance, several
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, counted, summary
@@ -43,13 +43,13 @@ from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
 from grasp_core.files.records import UNRECORDED, Key, recorded
-from grasp_core.kinds import Friction, Null, OrInfinity
+from grasp_core.kinds import Friction, Null, OrInfinity, instance, several, value_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS
 from grasp_core.objects.face_pieces import piece_of
-from grasp_core.objects.on_faces import check_on_faces
-from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
+from grasp_core.objects.on_faces import check_on_faces, check_planar
+from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.objects.shells import SMALL
 from grasp_core.planning.given_contacts import Seated, grasp_of
 from grasp_core.planning.reach import Finger, reach
@@ -61,7 +61,6 @@ from grasp_core.transferring.face_changes import (
     Likeness,
     added_faces,
     changes_in_words,
-    check_planar,
     face_changes,
     likeness,
     place_of,
@@ -241,9 +240,9 @@ def transfer(
             range.
         SolverError: A program's answer failed its check.
     """
-    for body, name in ((old, "old"), (new, "new")):
+    for body, name in ((old, "the old part"), (new, "the changed part")):
         check_planar(body, name)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     if finger is not None:
         instance(finger, Finger, "finger")
     rule = likeness(old, distance, angle_deg)
@@ -251,10 +250,10 @@ def transfer(
     for grasp in listed:
         check_on_faces(old, grasp)
     changes = face_changes(old, new, rule)
-    judge, taken = _Judge(old, new, friction, rule, finger), set[str]()
+    judge = _Judge(old, new, friction, rule, finger)
     return Transfer(
         old, new, friction, rule.distance, rule.angle, changes, added_faces(changes, new),
-        tuple(judge.carried(grasp, taken) for grasp in listed),
+        tuple(judge.carried(grasp) for grasp in listed),
     )  # fmt: skip
 
 
@@ -265,43 +264,40 @@ class _Judge:
     friction: float
     rule: Likeness
     finger: Finger | None
+    taken: set[str] = field(default_factory=set[str])
+    """Ids of the grasps that were carried over."""
 
-    def carried(self, grasp: Grasp, taken: set[str]) -> CarriedGrasp:
-        """Carry a grasp over; its new id joins those that are taken."""
-        before = self._before(grasp)
+    def carried(self, grasp: Grasp) -> CarriedGrasp:
+        """Carry a grasp over and judge it on both parts."""
         contacts = tuple(
             self._contact(finger, face, contact)
             for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True))
         )
-        lost = list[str]()
-        for each in (each for each in contacts if each.contact is None):
-            near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
-            if math.isfinite(each.distance):
-                near = f"the nearest face like it is {MM * each.distance:.2f} mm away"
-            lost.append(f"finger {each.finger} has lost face {each.old_face}: {near}")
+        before, _ = judged(Seated(self.old, grasp.faces, grasp.contacts), self.friction, grasp.id)
+        # undecided: at its critical friction, so neither better nor closed for sure
+        before = before or GraspFigures(0.0, self.friction, (0.0, 0.0))
+        lost = "; ".join(self._lost(each) for each in contacts if each.contact is None)
         if lost:
-            return CarriedGrasp(grasp, "gone", "; ".join(lost), contacts, before, None, None)
-        wanted, number = _id_on(grasp, contacts), 1
-        name = wanted
-        while name in taken:
-            number += 1
-            name = f"{wanted}-{number}"
-        try:
-            seated = Seated(
-                self.new, four(each.new_face for each in contacts if each.new_face is not None),
-                four(each.contact for each in contacts if each.contact is not None),
-                float(np.max([each.distance for each in contacts])),
-            )  # fmt: skip
-            figures, now = judged(self.new, seated, self.friction, name)
-        except UndecidedError as error:
-            why = f"whether its contacts are still in force closure is too close to call: {error}"
-            return CarriedGrasp(grasp, "gone", why, contacts, before, None, None)
-        held = self._held(figures, now)
-        if isinstance(held, str):
-            return CarriedGrasp(grasp, "gone", held, contacts, before, figures, None)
-        taken.add(name)
-        status, reason = compared(before, figures, self.friction)
-        return CarriedGrasp(grasp, status, reason, contacts, before, figures, held)
+            return CarriedGrasp(grasp, "gone", lost, contacts, before, None, None)
+        seated = Seated(
+            self.new, four(each.new_face for each in contacts if each.new_face is not None),
+            four(each.contact for each in contacts if each.contact is not None),
+        )  # fmt: skip
+        name = self._free_id(_id_on(grasp, contacts))
+        after, now = judged(seated, self.friction, name)
+        if isinstance(now, Grasp) and self.finger is not None:
+            ways = reach(self.new, now.faces, now.positions, now.normals, self.finger)
+            reached = not isinstance(ways, str)
+            now = replace(now, approach_directions=-ways) if reached else f"out of reach: {ways}"
+        if after is None or isinstance(now, str):
+            return CarriedGrasp(grasp, "gone", str(now), contacts, before, after, None)
+        self.taken.add(name)
+        status, reason = compared(before, after, self.friction)
+        return CarriedGrasp(grasp, status, reason, contacts, before, after, now)
+
+    def _free_id(self, wanted: str) -> str:
+        later = (f"{wanted}-{number}" for number in count(2))
+        return next(name for name in chain([wanted], later) if name not in self.taken)
 
     def _contact(self, finger: int, face: int, contact: Contact) -> CarriedContact:
         at, normal = contact.position, contact.normal
@@ -312,44 +308,33 @@ class _Judge:
         turn = turn_of(normal, near.contact.normal)
         if place is None:
             return CarriedContact(finger, face, None, None, near.distance, turn)
-        return CarriedContact(finger, face, place.part.face, place.contact, place.distance, turn)
+        return CarriedContact(finger, face, place.face, place.contact, place.distance, turn)
 
-    def _before(self, grasp: Grasp) -> GraspFigures:
-        seated = Seated(self.old, grasp.faces, grasp.contacts, 0.0)
-        try:
-            return judged(self.old, seated, self.friction, grasp.id)[0]
-        except UndecidedError:  # at its critical friction, so neither better nor closed for sure
-            return GraspFigures(0.0, self.friction, (0.0, 0.0))
-
-    def _held(self, figures: GraspFigures, grasp: Grasp | None) -> Grasp | str:
-        """Return the grasp that contacts make, within reach, or why they make none."""
-        if figures.closure_margin <= 0.0:
-            needed = figures.critical_friction
-            said = f"above {needed:.4f} they are" if math.isfinite(needed) else "none suffices"
-            return f"its contacts are not in force closure at friction {self.friction:g}: {said}"
-        if grasp is None:
-            return "its friction cones leave too little room for a witness of force closure"
-        if self.finger is None:
-            return grasp
-        ways = reach(self.new, grasp.faces, grasp.positions, grasp.normals, self.finger)
-        if ways.directions is None:
-            return f"out of reach: {ways.reason}"
-        return replace(grasp, approach_directions=-ways.directions)
+    def _lost(self, lost: CarriedContact) -> str:
+        near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
+        if math.isfinite(lost.distance):
+            near = f"the nearest face like it is {MM * lost.distance:.2f} mm away"
+        return f"finger {lost.finger} has lost face {lost.old_face}: {near}"
 
 
-def judged(
-    body: Polyhedron, seated: Seated, friction: float, name: str
-) -> tuple[GraspFigures, Grasp | None]:
-    """Judge contacts on the faces of a part, and make a grasp of them if they are closed.
+def judged(seated: Seated, friction: float, name: str) -> tuple[GraspFigures | None, Grasp | str]:
+    """Judge contacts on the faces of a part; make a grasp of them, or say why they make none.
 
     The forces of a certificate may all meet, as at the face centres of a regular solid, so the
-    grasp gets balanced forces whose lines are skew; it is None if the cones leave no room for them.
+    grasp gets balanced forces whose lines are skew. There are no figures if closure is undecided.
     """
-    found = grasp_of(seated, friction, name)
-    if isinstance(found, ClosureCertificate):
-        critical = critical_friction(found.positions, found.normals)
-        return GraspFigures(found.margin, critical, (0.0, 0.0)), None
+    try:
+        found = grasp_of(seated, friction, name)
+        if isinstance(found, ClosureCertificate):
+            needed = critical_friction(found.positions, found.normals)
+            said = f"above {needed:.4f} they are" if math.isfinite(needed) else "none suffices"
+            said = f"its contacts are not in force closure at friction {friction:g}: {said}"
+            return GraspFigures(found.margin, needed, (0.0, 0.0)), said
+    except UndecidedError as error:
+        said = f"whether its contacts are still in force closure is too close to call: {error}"
+        return None, said
     figures = GraspFigures(found.closure_margin, found.critical_friction, found.ferrari_canny)
+    body = seated.body
     center, size = body.center_of_mass, body.radius
     faces = [(index, body.faces[index]) for index in found.faces]
     pieces = [
@@ -361,7 +346,7 @@ def judged(
         skew = of_general_type(pieces, plain, friction, np.random.default_rng(draw))
         if skew is not None:
             return figures, replace(found, witness=Witness(found.positions, skew.forces))
-    return figures, None
+    return figures, "its friction cones leave too little room for a witness of force closure"
 
 
 def compared(old: GraspFigures, new: GraspFigures, friction: float) -> tuple[Change, str]:
@@ -402,33 +387,16 @@ SAME_LENGTH = 1e-6
 """Largest relative difference of two lengths that differ by rounding and joined vertices only."""
 
 
-def load_changed_part(
-    path: Path,
-    old: Polyhedron,
-    unit: str,
-    limits: MeshLimits = DEFAULT_LIMITS,
-    *,
-    scale: float = 1.0,
-) -> Polyhedron:
-    """Read a changed part from its mesh file, with exact planar faces.
+def as_read(old: Polyhedron) -> dict[str, Any]:
+    """Return the keywords of `load_polyhedron` that read a changed part as the old one was read.
 
-    A centre of mass that was given for the old part is kept; otherwise it is that of uniform
-    density.
+    Faces are planar. A centre of mass that was given is kept; else it is that of uniform density.
     """
-    return load_polyhedron(
-        path,
-        unit=unit,
-        scale=scale,
-        faces="planar",
-        largest_part=old.surface.dropped > SMALL,
-        center_of_mass=given_center(old),
-        limits=limits,
-    )
-
-
-def given_center(body: Polyhedron) -> Array | None:
-    """Return the centre of mass of a part if it was given and is not that of uniform density."""
-    return body.center_of_mass if body.surface.center_given else None
+    return {
+        "faces": "planar",
+        "largest_part": old.surface.dropped > SMALL,
+        "center_of_mass": old.center_of_mass if old.surface.center_given else None,
+    }
 
 
 def growth(old: Polyhedron, new: Polyhedron) -> float:

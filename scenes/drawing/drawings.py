@@ -19,8 +19,8 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.checked import coefficient, instance
 from grasp_core.cones.spanning import angles_between
+from grasp_core.kinds import Friction, instance, value_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import SAME_SHARE, first_best
@@ -90,7 +90,7 @@ def between(segments: Sequence[Array]) -> tuple[Array, ...]:
 def check_drawn(body: Polyhedron, grasp: Grasp, friction: float, view: View | None = None) -> None:
     """Refuse an object, grasp, friction or view that cannot be drawn."""
     check_on_faces(body, grasp)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     if view is not None:
         instance(view, View, "view", "View.of_angles makes one")
 

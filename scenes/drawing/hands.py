@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays import Shape as ArrayShape
-from grasp_core.checked import instance
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
@@ -32,6 +31,7 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays
 from grasp_core.hands.kinematics import places
 from grasp_core.hands.reach import HandReach, with_balls
+from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp

@@ -23,11 +23,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import path_of
 from grasp_core.declared import ByValue, counted
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
+from grasp_core.kinds import path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp

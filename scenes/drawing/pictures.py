@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from grasp_core.arrays import Array, cross
-from grasp_core.checked import path_of, switch
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
+from grasp_core.kinds import path_of, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.values import Grasp
@@ -133,7 +133,7 @@ def grasp_sheet(
 ) -> Sheet:  # fmt: skip
     """Draw a grasp in the style of the paper, or with the hand in it."""
     check_drawn(body, grasp, friction, view)
-    switch(legend, "legend")
+    value_of(bool, legend, "legend")
     name = f"Grasp {grasp.id} of {body.name}"
     if held is not None:
         name += f" with the hand {held.hand.name}"

@@ -8,9 +8,8 @@ from typing import Annotated, Self, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Point, Shape
-from grasp_core.checked import number
 from grasp_core.declared import Declared
-from grasp_core.kinds import Quantity
+from grasp_core.kinds import Quantity, number
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp

@@ -6,11 +6,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from grasp_core.checked import path_of, several, text
 from grasp_core.errors import InputError
 from grasp_core.hands.hand import FEWEST_FINGERS, MOST_FINGERS, Hand
 from grasp_core.hands.named_hands import HANDS
 from grasp_core.hands.named_hands import load_hand as built_in_hand
+from grasp_core.kinds import path_of, several, value_of
 
 ENDINGS = (".xml", ".mjcf", ".urdf")
 
@@ -27,7 +27,7 @@ def load_hand(hand: str | Path, fingertips: Iterable[str] = ()) -> Hand:
     Raises:
         InputError: The hand is unknown, or the file is refused; the message says what to do.
     """
-    names = several(fingertips, partial(text, name="fingertips"), "fingertips", "names")
+    names = several(fingertips, partial(value_of, str, name="fingertips"), "fingertips", "names")
     if isinstance(hand, str) and hand in HANDS:
         if names:
             raise InputError(f"the built-in hand {hand} has its own fingertips; leave them out")

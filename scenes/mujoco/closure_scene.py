@@ -21,10 +21,10 @@ from typing import get_args
 import numpy as np
 
 from grasp_core.arrays import to_digits
-from grasp_core.checked import instance, one_of, path_of
 from grasp_core.closure.contacts import listed_contacts
 from grasp_core.declared import InNotebooks
 from grasp_core.files.text_files import write_parts
+from grasp_core.kinds import instance, one_of, path_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
-from grasp_core.checked import instance, positive
 from grasp_core.closure.contacts import WRENCH, contact_frames, grasp_map
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.scene_parts import TOUCH
@@ -189,7 +189,7 @@ def held_layout(
     """Place an object between the springs of a grip."""
     check_body(body)
     check_grip(grip)
-    reach = body.radius if reach_m is None else positive(reach_m, "reach_m")
+    reach = body.radius if reach_m is None else value_of(Quantity, reach_m, "reach_m")
     mass = instance(settings, HeldSettings, "settings").mass_of(body)
     if not (grip.tip_radius_m > 0.0).all():
         raise InputError("tip_radius_m must be above zero: points cannot be simulated")

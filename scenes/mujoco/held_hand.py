@@ -29,13 +29,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from grasp_core.arrays import Array, cross, rounded, to_digits
-from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import HandGrip, hand_motors
 from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
+from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.chains_mjcf import Chains, add_hand

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import instance
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
+from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.held import HeldLayout, held_layout
 from scenes.mujoco.mjcf_text import Element, SceneText, add_element, document

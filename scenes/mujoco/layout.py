@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, rounded, to_digits
-from grasp_core.checked import coefficient, number
 from grasp_core.closure.contacts import contact_frames, unit_size
 from grasp_core.closure.decision import deepest_forces
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import ByValue, Declared
 from grasp_core.errors import UndecidedError
+from grasp_core.kinds import Friction, number, value_of
 from grasp_core.objects.on_faces import face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
@@ -184,7 +184,7 @@ def arrange(
     visible motions. Everything after the rounding is plain arithmetic with the same result on every
     machine.
     """
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     fingers = fingers or FingerSettings()
     contacts = grasp.contacts if isinstance(grasp, Grasp) else tuple(grasp)
     x, y, z = to_digits(np.array([contact.normal for contact in contacts])).T

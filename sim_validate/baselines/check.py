@@ -158,12 +158,15 @@ class Checked:
 
 def check(
     before: Baseline, now: Present, where: str, how: How, processors: int = 1,
-    report: Report = _silent,
+    report: Report = _silent, name: str | None = None,
 ) -> Checked:  # fmt: skip
-    """Simulate grasps again and compare them with a baseline."""
+    """Simulate grasps again, or the one with an id, and compare them with a baseline."""
     now = now.first(before.limit)
+    if name is not None:
+        now, own = now.only(name), tuple(each for each in before.entries if each.id == name)
+        before = replace(before, entries=own, limit=None)
     how = with_planned_fingers(how, before, now.saved)
-    if now.gone and not now.saved.grasps:
+    if not now.saved.grasps and (now.gone or name is not None):
         found = _nothing_measured(before, now)
     else:
         found = measured(now.saved, (where, before.limit), how, processors, report)
@@ -173,16 +176,6 @@ def check(
         found,
         bands_between(before, found.baseline, carried)[1],
     )
-
-
-def check_one(before: Baseline, now: Present, where: str, how: How, name: str) -> Checked:
-    """Simulate one grasp again, by its id, and compare it with a baseline."""
-    one = now.first(before.limit).only(name)
-    kept = replace(before, entries=tuple(e for e in before.entries if e.id == name), limit=None)
-    if one.saved.grasps or one.gone:
-        return check(kept, one, where, how)
-    gone = _nothing_measured(kept, one)
-    return Checked(compare(kept, gone.baseline, carried=_carried(one)), gone, "")
 
 
 def _carried(now: Present) -> Carried | None:

@@ -13,7 +13,7 @@ from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.baseline import How, check_writable, read_baseline, write_baseline
 from sim_validate.baselines.check import Checked, check, complete, measured, seen_from, setup_for
 from sim_validate.baselines.compare import Finding, Status, failing
-from sim_validate.baselines.part import Present, present, source_of, testable
+from sim_validate.baselines.part import Present, present, testable
 from sim_validate.closure.command import check_noise
 from sim_validate.engine.setup import Agenda, setup_from_file
 from sim_validate.kit.console import TABLE_ROWS, Reporter
@@ -76,8 +76,7 @@ def _present(
 ) -> Present:
     """Carry grasps over to their part as it is now, as the flags about changed parts ask for."""
     asked = command.changed_part.with_scale(recorded_scale)
-    source = source_of(saved, grasps, [baseline.parent], command.object, asked.scale)
-    return present(saved, grasps, source, asked)
+    return present(saved, grasps, [baseline.parent], asked, command.object)
 
 
 def _say_mesh(now: Present, reporter: Reporter) -> None:

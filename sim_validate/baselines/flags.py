@@ -6,10 +6,10 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg, subcommand
 
-from grasp_core.kinds import Count, Seed
+from grasp_core.kinds import Seed
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import IfChanged
-from sim_validate.kit.command_flags import PLAIN, Jobs, Spoken
+from sim_validate.kit.command_flags import PLAIN, FirstOnly, GraspsFile, Jobs, Spoken
 from sim_validate.kit.processes import available_cores
 from sim_validate.settings import ChosenTrials
 
@@ -23,12 +23,10 @@ MeshFile = Annotated[Path | None, arg(help=(
 class Record(Spoken):
     """Simulate grasps and write a baseline: a file that records how stable each grasp is."""
 
-    grasps: Positional[Path]
-    """The grasps.json with the grasps to simulate."""
+    grasps: Positional[GraspsFile]
     out: Annotated[Path, arg(aliases=("-o",))]
     """Path of the baseline to write."""
-    limit: Count | None = None
-    """Number of grasps to simulate, from the first; all of them if not given."""
+    limit: FirstOnly = None
     setup: Path | None = None
     """TOML file of simulation settings (see docs/files.md)."""
     wrenches: Path | None = None

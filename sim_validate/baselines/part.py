@@ -14,6 +14,7 @@ from pathlib import Path
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
 from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
@@ -21,7 +22,6 @@ from grasp_core.transferring.face_changes import (
     FaceChange,
     added_faces,
     changes_in_words,
-    check_planar,
     face_changes,
     likeness,
 )
@@ -29,9 +29,9 @@ from grasp_core.transferring.settings import IfChanged
 from grasp_core.transferring.transfer import (
     CarriedGrasp,
     Transfer,
+    as_read,
     fitting_lengths,
     fitting_unit,
-    load_changed_part,
     transfer,
 )
 from sim_validate.baselines.baseline import Baseline, RecordedPart
@@ -278,8 +278,15 @@ class Present:
         return replace(found, since=since)
 
 
-def present(saved: Plan, path: Path, source: Source, asked: IfChanged = CARRY) -> Present:
-    """Carry grasps over to their part as it is now; they stay as they are if it has not changed."""
+def present(
+    saved: Plan, path: Path, folders: Iterable[Path], asked: IfChanged = CARRY,
+    named: Path | None = None,
+) -> Present:  # fmt: skip
+    """Carry the grasps of a file over to their part as it is now, if its mesh file has changed.
+
+    Folders, or the name of the mesh file, are as `source_of` takes them.
+    """
+    source = source_of(saved, path, folders, named, asked.scale)
     if source.note and asked.missing == "fail":
         raise ChangedPartError(
             f"{path}: the mesh file that its grasps were planned from, {saved.body.name!r} with "
@@ -305,7 +312,8 @@ def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str
         check_planar(saved.body, "the old part")
         scale = asked.scale or 1.0
         unit = asked.unit or fitting_unit(file, saved.body, RECORDED, scale=scale)
-        new = load_changed_part(file, saved.body, unit, RECORDED, scale=scale)
+        same = as_read(saved.body)
+        new = load_polyhedron(file, unit=unit, scale=scale, limits=RECORDED, **same)
         return unit, transfer(
             saved.body, new, saved.grasps, saved.friction, distance=asked.distance_m,
             angle_deg=asked.angle_deg, finger=saved.finger,

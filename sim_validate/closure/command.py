@@ -30,11 +30,10 @@ from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
 from sim_validate.kit.command_flags import Testing
 from sim_validate.kit.compiling import EVERYTHING, compile_loops
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
+from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import write_arrays
+from sim_validate.kit.files import alone_in, remove_results, write_arrays
 from sim_validate.kit.processes import available_cores
-from sim_validate.kit.result_folders import alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.planning.wrenches_json import weights, wrenches_from_file
 from sim_validate.settings import ChosenTrials, Noise
@@ -82,10 +81,10 @@ def simulate_grasps(
             write_arrays(folder / "traces" / f"{verdict.id}.npz", trace_arrays(verdict))
         return verdict.held
 
-    results = reporter.counted("simulating", validated(tasks, jobs), len(tasks), "held", kept)
     collect = partial(Verdicts.of, saved.body, saved.friction, gate)
-    path = folder and folder / Verdicts.FILE
-    found = finished(results, len(tasks), collect, path, reporter)
+    found = reporter.collected(
+        "simulating", validated(tasks, jobs), len(tasks), ("held", kept), collect, folder
+    )
     _show(found, setup, reporter)
     good = all(verdict.good for verdict in found)
     return (Exit.GOOD if good else Exit.NEGATIVE), found

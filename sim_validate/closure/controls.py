@@ -28,9 +28,8 @@ from grasp_core.forces.contact_forces import least_friction_forces
 from grasp_core.kinds import Friction, Many
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from sim_validate.engine.bench import Bench
+from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace, judge
 

@@ -31,10 +31,8 @@ from sim_validate.closure.controls import (
 )
 from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
-from sim_validate.engine.bench import Bench
-from sim_validate.engine.limits import PlannedLoad, planned_loads
-from sim_validate.engine.rig import Rig, Watched, squeezed
-from sim_validate.engine.schedules import Load
+from sim_validate.engine.bench import Load
+from sim_validate.engine.rig import Analysis, PlannedLoad, Rig, Watched, closed_on
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
 from sim_validate.planning.asked_objects import GRASPS, grasp_with_id, some
@@ -221,9 +219,8 @@ def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
     if recorded.control is not None:
         return _opened(body, recorded.control, contacts, friction, setup)
     scene = setup.scene(body, recorded.grasp or contacts, friction)
-    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-    rig = squeezed(bench, setup, scene.layout.squeeze_forces, friction)
-    planned = planned_loads(body, contacts, friction, rig.idle, recorded.agenda, setup)
+    rig = closed_on(scene, setup, friction)
+    planned = Analysis(body, contacts, friction, setup, None).planned(rig.idle, recorded.agenda)
     if recorded.trial is None or recorded.grasp is None:
         return rig, planned, contacts
     setup, agenda = for_repeats(setup, scene), recorded.agenda

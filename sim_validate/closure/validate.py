@@ -32,9 +32,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, function, instance, several, whole
 from grasp_core.closure.contacts import contact_frames, stacked
 from grasp_core.errors import InputError, UndecidedError
+from grasp_core.kinds import Count, Friction, function, instance, several, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces, within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
@@ -56,17 +56,17 @@ from sim_validate.engine.gate import (
     require_faithful,
     require_touch,
 )
-from sim_validate.engine.limits import (
+from sim_validate.engine.rig import (
+    Analysis,
     CriticalFriction,
     PlannedLoad,
+    Rig,
     SimulatedLimit,
     bisected_limits,
-    loads_as_they_are,
-    planned_loads,
+    closed_on,
     ramped_limits,
     released_friction,
 )
-from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
 from sim_validate.kit.processes import Shared, each, processes
@@ -103,16 +103,15 @@ def tested(
     """Test a grasp whose closure is proved, with a simulator that was checked before."""
     require_touch(body, grasp.contacts, setup)
     scene = setup.scene(body, grasp, friction)
-    bench, layout = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s), scene.layout
-    rig = squeezed(bench, setup, layout.squeeze_forces, friction)
-    loads = planned_loads(body, grasp.contacts, friction, rig.idle, agenda, setup)
+    layout, rig = scene.layout, closed_on(scene, setup, friction)
+    loads = Analysis(body, grasp.contacts, friction, setup, None).planned(rig.idle, agenda)
     overlap = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
     wrenches = held_wrenches(rig, loads, agenda, overlap)
     critical = CriticalFriction(grasp.critical_friction)
     if agenda.critical_friction:
         with suppress(UndecidedError):
             critical = released_friction(
-                bench, grasp.positions, grasp.normals, critical.predicted, setup
+                rig.bench, grasp.positions, grasp.normals, critical.predicted, setup
             )
     controls, repeats = tuple[ControlVerdict, ...](), None
     if agenda.controls:
@@ -250,7 +249,7 @@ def verdict_of(job: Job) -> Verdict:
     """Validate one grasp."""
     body, grasp, friction, setup = job.body, job.grasp, job.friction, job.setup
     check_on_faces(body, grasp)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     critical = setup.critical_friction(grasp)
     closed = friction > critical
     if not (closed and setup.closure(grasp, friction).closed):
@@ -294,11 +293,11 @@ def validate_all(
         UnfaithfulError: The simulator fails its checks with these settings.
     """
     check_body(body)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     kind = partial(instance, kind=Grasp, name="grasps")
     listed = several(grasps, kind, "grasps", "Grasp values")
     agenda, setup = asked_for(agenda, setup)
-    whole(jobs, "jobs", least=1)
+    value_of(Count, jobs, "jobs")
     if progress is not None:
         function(progress, "progress")
     tasks = [Job(body, grasp, friction, agenda, setup) for grasp in listed]
@@ -479,7 +478,7 @@ def noisy_case(
     )
     text = to_text(layout, planned.physics)
     scene = replace(planned, xml=text, layout=layout)
-    bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
-    rig = squeezed(bench, setup, scene.layout.squeeze_forces, case.friction)
+    rig = closed_on(scene, setup, case.friction)
     heavy = [(name, case.mass * wrench) for name, wrench in loads]
-    return rig, loads_as_they_are(body, case.contacts, case.friction, rig.idle, heavy, setup)
+    analysis = Analysis(body, case.contacts, case.friction, setup, None)
+    return rig, analysis.as_they_are(rig.idle, heavy)

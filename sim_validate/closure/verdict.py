@@ -6,7 +6,7 @@ other. They are also what `verdicts.json` holds.
 
 import importlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -14,13 +14,11 @@ from typing import Annotated, Any, Self
 import numpy as np
 
 from grasp_core.arrays import Array, Shape, Wrench
-from grasp_core.checked import path_of
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared, InNotebooks
-from grasp_core.figures import Compared, Shown, figure, less, more, scalars
-from grasp_core.files.records import FLAT, UNRECORDED, RecordFile, recorded
-from grasp_core.grasp_tables import ById, frame_of
-from grasp_core.kinds import Friction, Many, Measured, OrInfinity
+from grasp_core.figures import Compared, Shown, figure, less, more
+from grasp_core.files.records import FLAT, UNRECORDED, recorded
+from grasp_core.kinds import Friction, Many, Measured, OrInfinity, path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
@@ -28,10 +26,10 @@ from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.layout import FingerDrive
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
-from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
+from sim_validate.engine.rig import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
-from sim_validate.kit.files import AboutObject
+from sim_validate.kit.files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 
 AGREEMENT = 0.02
@@ -71,6 +69,37 @@ class WrenchVerdict(Declared):
         if self.let_go_at and abs(self.let_go_at.share - 1.0) > AGREEMENT:
             return f"{self.name}: let go at {self.let_go_at.share:.4g} of the predicted limit"
         return ""
+
+
+class HoldsWrenches(Declared):
+    """Base of the verdicts on what a grasp, or a hand in it, holds."""
+
+    __slots__ = ()
+    wrenches: tuple[WrenchVerdict, ...]
+    agenda: Agenda
+
+    @property
+    def failures(self) -> tuple[WrenchVerdict, ...]:
+        """The wrenches that were not held, in order."""
+        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
+
+    @property
+    def _weakest(self) -> WrenchVerdict:
+        return next(trial for trial in self.wrenches if trial.name == WEAKEST)
+
+    def _largest_n(self, radius_m: float) -> float:
+        """Return the size of the weakest wrench at its predicted limit, torques over a radius."""
+        weakest, scale = self._weakest, np.array([1.0] * 3 + [radius_m] * 3)
+        return weakest.predicted_limit * float(np.linalg.norm(weakest.wrench / scale))
+
+    def _contradictions(self) -> Iterator[str]:
+        """Yield where the trials of wrenches contradict the analysis, and limits not found."""
+        yield from (each.contradiction for each in self.wrenches if each.contradiction)
+        if self.agenda.limits != "none":
+            yield from (
+                f"{each.name}: the limit was not found near the predicted one"
+                for each in self.wrenches if each.let_go_at is None
+            )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +196,7 @@ CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Verdict(Declared, InNotebooks):
+class Verdict(HoldsWrenches, InNotebooks):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
     id: Annotated[str, Shown("grasp", compared=None)]
@@ -232,24 +261,13 @@ class Verdict(Declared, InNotebooks):
 
         Torques are divided by the object's radius.
         """
-        weakest = self._weakest
-        scaled = weakest.wrench / np.array([1.0] * 3 + [self.scale.object_radius_m] * 3)
-        return weakest.predicted_limit * float(np.linalg.norm(scaled))
+        return self._largest_n(self.scale.object_radius_m)
 
     @figure
     def simulated_limit_n(self) -> Annotated[float | None, Compared(less)]:
         """The one found in simulation [N]; None if it was not measured or not found."""
         found = self._weakest.let_go_at
         return None if found is None else self.limit_n * found.share
-
-    @property
-    def _weakest(self) -> WrenchVerdict:
-        return next(trial for trial in self.wrenches if trial.name == WEAKEST)
-
-    @property
-    def failures(self) -> tuple[WrenchVerdict, ...]:
-        """The wrenches that were not held, in order."""
-        return tuple(trial for trial in self.wrenches if trial.hold.outcome is not Outcome.HELD)
 
     @recorded
     def outcome(self) -> Annotated[Outcome, Shown("outcome", compared=ENDED)]:
@@ -279,12 +297,9 @@ class Verdict(Declared, InNotebooks):
     @recorded
     def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
         """Where simulation contradicts the analysis, one sentence each."""
-        found = [trial.contradiction for trial in self.wrenches if trial.contradiction]
+        found = list(self._contradictions())
         if self.agenda.critical_friction and (fault := _disagreement(self.critical_friction)):
             found.append(f"critical friction: {fault}")
-        if self.agenda.limits != "none":
-            found += [f"{trial.name}: the limit was not found near the predicted one"
-                      for trial in self.wrenches if trial.let_go_at is None]  # fmt: skip
         if self.robustness is not None:
             found += self.robustness.contradictions
         return tuple(found)
@@ -351,20 +366,13 @@ def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Verdicts(RecordFile, ById[Verdict]):
-    """The verdicts on an object's grasps, as `verdicts.json` holds them.
-
-    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
-    """
+class Verdicts(AboutGrasps[Verdict]):
+    """The verdicts on an object's grasps, as `verdicts.json` holds them."""
 
     ITEMS = "verdicts"
     FILE = "verdicts.json"
     SCHEMA = 2
 
-    object: AboutObject
-    friction: Friction
-    complete: bool
-    """Whether every grasp that was asked for was tested."""
     gate: Gate
     """How the simulator did on cases with known answers."""
     verdicts: tuple[Verdict, ...]
@@ -378,11 +386,6 @@ class Verdicts(RecordFile, ById[Verdict]):
         """Collect verdicts on the grasps of an object for a file."""
         return cls(AboutObject.of(body), friction, complete, gate, verdicts)
 
-    @property
-    def object_sha256(self) -> str:
-        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
-        return self.object.content_sha256
-
     @recorded
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps that held, of negative controls that let go, and contradictions."""
@@ -395,17 +398,6 @@ class Verdicts(RecordFile, ById[Verdict]):
             "controls_let_go": sum(control.let_go for control in controls),
             "mismatches": sum(len(verdict.mismatches) for verdict in self.verdicts),
         }
-
-    def to_dataframe(self) -> Any:
-        """Return a `pandas.DataFrame` with a row for each verdict, indexed by the grasp's id.
-
-        It has a column for each figure of a verdict that is a number or a word; of the mismatches,
-        how many there are.
-
-        Raises:
-            InputError: The library pandas is not installed.
-        """
-        return frame_of([scalars(each) for each in self.verdicts], [v.id for v in self.verdicts])
 
 
 def load_verdicts(path: str | Path) -> Verdicts:

@@ -15,7 +15,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby
+from itertools import groupby, product
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -32,7 +32,7 @@ from sim_validate.datasets.config import (
     config_to_toml,
     quoted,
 )
-from sim_validate.datasets.manifest import (
+from sim_validate.datasets.open_dataset import (
     MANIFEST,
     QUARANTINE,
     LeftOut,
@@ -43,23 +43,17 @@ from sim_validate.datasets.manifest import (
     read_manifest,
     write_manifest,
 )
-from sim_validate.datasets.parquet import TableFiles, pyarrow
+from sim_validate.datasets.parquet import joined, pyarrow, write_files
 from sim_validate.datasets.rows import ROWS, dataset_tables
 from sim_validate.datasets.units import WorkUnit, given_text, provenance, units_of, units_sha256
 from sim_validate.datasets.workers import Engine, Staging, UnitRecord, drive
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
-from sim_validate.kit.files import path_inside
-from sim_validate.kit.result_folders import alone_in
+from sim_validate.kit.files import alone_in, path_inside
 
 CARD = "README.md"
-SIZES = (
-    (10**3, "n<1K"), (10**4, "1K<n<10K"), (10**5, "10K<n<100K"), (10**6, "100K<n<1M"),
-    (10**7, "1M<n<10M"), (10**8, "10M<n<100M"), (10**9, "100M<n<1B"), (10**10, "1B<n<10B"),
-)  # fmt: skip
-"""Bounds on the number of rows, and the name that the Hugging Face Hub has for datasets below each.
-"""
-LARGEST = "10B<n<100B"
+SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
+"""Powers of ten, from a thousand, as the Hugging Face Hub names sizes of datasets."""
 MARKS = frozenset("\\`*_[]<>|~&#!$@")
 """Characters that can begin Markdown or HTML within a line."""
 SPDX = re.compile(r"[A-Za-z0-9.+-]+")
@@ -227,18 +221,21 @@ def _sorted_out(
 def _write_tables(
     config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
 ) -> list[Listed]:
-    tables = dataset_tables(config.groups)
+    tables, found = dataset_tables(config.groups), list[Listed]()
     about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
-    with TableFiles(folder / DATA, about, tables) as files:
-        for (_, split), same in groupby(good, key=lambda each: (each[1].object_id, each[1].split)):
-            of_object = [unit for unit, _ in same]
-            for name in tables:
-                chosen = of_object[:1] if name == "objects" else of_object
-                files.add(name, str(split), [staging.table(unit, name) for unit in chosen])
-        return [
+    objects = groupby(good, key=lambda each: (each[1].object_id, each[1].split))
+    units = [(split, [unit for unit, _ in same]) for (_, split), same in objects]
+    for name, (split, _) in product(tables, SPLITS):
+        parts = (
+            joined([staging.table(unit, name) for unit in chosen], name, tables)
+            for own, of_object in units if own == split
+            for chosen in [of_object[:1] if name == "objects" else of_object]
+        )  # fmt: skip
+        found += [
             replace(listed(folder, path), table=name, split=split, rows=rows)
-            for name, split, path, rows in files.close()
+            for path, rows in write_files(folder / DATA / name, split, parts, about)
         ]
+    return found
 
 
 def card_text(config: DatasetConfig, manifest: Manifest) -> str:
@@ -265,13 +262,19 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
             "Published": _as_markdown(config.published),
             "Licence": _as_address(config.license),
         },
-        size=next((size for upto, size in SIZES if sum(rows.values()) < upto), LARGEST),
+        size=_size(sum(rows.values())),
         chances=", ".join(reversed(chances)),
         split=next(iter(of_grasps), "train"),
         quoted=quoted,
         markdown=_as_markdown,
         references=_reference,
     )
+
+
+def _size(rows: int) -> str:
+    """Return the name that the Hugging Face Hub has for datasets of about as many rows."""
+    place = min(max(len(str(rows)) - 3, 0), len(SIZES) - 1)
+    return f"{SIZES[place - 1]}<n<{SIZES[place]}" if place else f"n<{SIZES[0]}"
 
 
 def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:

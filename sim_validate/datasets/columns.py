@@ -207,8 +207,10 @@ def row_of(kind: type[RowOf], cells: Cells, where: str = "") -> RowOf:
 
 def agrees(kind: type, name: str, stated: Any, value: Any) -> bool:
     """Return whether a cell is what was computed again, as far as its kind asks for it."""
-    within = next((mark for mark in rules(types(kind)[name]) if isinstance(mark, Within)), None)
     value = _plain(value)
-    if within is None or stated is None or value is None:
+    if stated is None or value is None:
+        return stated is value
+    within = next((mark for mark in rules(types(kind)[name]) if isinstance(mark, Within)), None)
+    if within is None:
         return stated == value
-    return math.isclose(stated, value, rel_tol=within.relative, abs_tol=within.absolute)
+    return np.allclose(stated, value, rtol=within.relative, atol=within.absolute)

@@ -13,9 +13,18 @@ from datetime import date
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias, cast, get_args
 
-from grasp_core.checked import MOST_COUNT, shown
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import METHODS, ConeKind, Count, Friction, Method, RandomWrenches, Range
+from grasp_core.kinds import (
+    METHODS,
+    MOST_COUNT,
+    ConeKind,
+    Count,
+    Friction,
+    Method,
+    RandomWrenches,
+    Range,
+    shown,
+)
 from grasp_core.mesh_files.limits import FaceKind, Lengths
 from grasp_core.settings import Settings, as_table
 from sim_validate.settings import ExecutionSettings, LimitSearch

@@ -22,6 +22,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
+from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.layout import arrange
@@ -30,7 +31,7 @@ from sim_validate.datasets.config import SHORT, Name, SplitName, quoted
 from sim_validate.datasets.open_dataset import Selection, mesh_path, select, stored_body
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow
-from sim_validate.kit.files import whole_folder, write_lines
+from sim_validate.kit.files import whole_folder
 
 AXES = "xyz"
 HEAD = """\
@@ -84,7 +85,8 @@ def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) 
         of_object = sorted(rows, key=lambda row: row.friction)
         for friction, same in groupby(of_object, key=lambda row: row.friction):
             path = _new_path(folder, f"{object_id[:SHORT]}-{friction}-{body.name}")
-            write_lines(path, _lines(object_id, body, list(same), facts))
+            lines = _lines(object_id, body, list(same), facts)
+            write_parts(path, (line.encode() for line in lines))
         objects += 1
         grasps += len(rows)
         report(objects, total)

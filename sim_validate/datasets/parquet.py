@@ -9,10 +9,11 @@ import importlib
 import io
 import math
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
+from itertools import chain
 from pathlib import Path
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +92,13 @@ def each_batch(path: Path, name: Name, tables: Tables = TABLES) -> Iterator[Any]
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
     with _opened(path, name, tables) as file:
         yield from file.iter_batches(GROUP_ROWS)
+
+
+def joined(paths: Iterable[Path], name: Name, tables: Tables) -> Any:
+    """Read some files of one table as one Arrow table, sorted by its keys."""
+    return _in_order(
+        pyarrow().concat_tables([read_table(each, name, tables) for each in paths]), name
+    )
 
 
 def read_table(path: Path, name: Name, tables: Tables) -> Any:
@@ -178,93 +186,45 @@ def schema_of(columns: tuple[Column, ...]) -> Any:
     return arrow.schema(found)
 
 
-class TableFiles:
-    """Writes the files of all tables, one after another for each table and split.
+def write_files(
+    folder: Path, split: str, parts: Iterable[Any], about: Mapping[str, str]
+) -> list[tuple[Path, int]]:
+    """Write tables, one after another, into files of a split; list these with their rows.
 
-    Rows are kept back until there are enough for a group of rows, so memory does not grow. Use it
-    in a `with` block; at its end no file is open, whatever happens.
+    Rows are kept back until there are enough for a group of rows, so memory does not grow. At the
+    end no file is open, whatever happens.
     """
-
-    def __init__(self, folder: Path, about: Mapping[str, str], tables: Tables = TABLES) -> None:
-        self._folder, self._tables = folder, tables
-        self._about = dict(sorted(about.items()))
-        self._parts: dict[tuple[Name, str], _Part] = {}
-
-    def __enter__(self) -> "TableFiles":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for part in self._parts.values():
-            part.abandon()
-
-    def add(self, name: Name, split: str, paths: Iterable[Path]) -> None:
-        """Add the rows of some files; their keys must come after all that were added before."""
-        tables = [read_table(path, name, self._tables) for path in paths]
-        table = _in_order(pyarrow().concat_tables(tables), name)
-        if table.num_rows:
-            part = self._parts.setdefault((name, split), _Part(self._folder / name, split))
-            part.add(table.replace_schema_metadata(self._about))
-
-    def close(self) -> list[tuple[Name, str, Path, int]]:
-        """Write the rows that still wait; list the files with table, split and number of rows."""
-        return [
-            (name, split, path, rows)
-            for (name, split), part in sorted(self._parts.items())
-            for path, rows in part.close()
-        ]
-
-
-class _Part:
-    """Writes the files of one table and split."""
-
-    def __init__(self, folder: Path, split: str) -> None:
-        self._folder, self._split = folder, split
-        self._waiting: list[Any] = []
-        self._writer: Any = None
-        self._stream: BinaryIO | None = None
-        self._rows: list[int] = []
+    found, groups = list[tuple[Path, int]](), _groups(parts, dict(sorted(about.items())))
+    while (first := next(groups, None)) is not None:
         folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f".{split}-{len(found):05}"
+        found.append((path, _write_file(path, chain([first], groups), first.schema)))
+    named = (f"{split}-{place:05}-of-{len(found):05}.parquet" for place in range(len(found)))
+    return [
+        (path.rename(folder / name), rows)
+        for (path, rows), name in zip(found, named, strict=True)
+    ]  # fmt: skip
 
-    def add(self, table: Any) -> None:
-        self._waiting.append(table)
-        if sum(each.num_rows for each in self._waiting) >= GROUP_ROWS:
-            self._flush()
 
-    def close(self) -> list[tuple[Path, int]]:
-        if self._waiting:
-            self._flush()
-        self._end_file()
-        files = len(self._rows)
-        named = [self._folder / f"{self._split}-{i:05}-of-{files:05}.parquet" for i in range(files)]
-        return [
-            (self._path(i).rename(path), rows)
-            for i, (path, rows) in enumerate(zip(named, self._rows, strict=True))
-        ]
+def _groups(parts: Iterable[Any], about: Mapping[str, str]) -> Iterator[Any]:
+    """Yield the rows of tables in groups that are large enough, but for the last."""
+    waiting = list[Any]()
+    for part in parts:
+        waiting += [part.replace_schema_metadata(about)] if part.num_rows else []
+        if sum(each.num_rows for each in waiting) >= GROUP_ROWS:
+            yield pyarrow().concat_tables(waiting)
+            waiting.clear()
+    if waiting:
+        yield pyarrow().concat_tables(waiting)
 
-    def _path(self, number: int) -> Path:
-        return self._folder / f".{self._split}-{number:05}"
 
-    def _flush(self) -> None:
-        table = pyarrow().concat_tables(self._waiting)
-        self._waiting.clear()
-        if self._writer is None:
-            path = self._path(len(self._rows))
-            self._stream = path.open("wb")
-            self._writer = pyarrow_parquet().ParquetWriter(self._stream, table.schema, **PAGES)
-            self._rows.append(0)
-        self._writer.write_table(table, row_group_size=table.num_rows)
-        self._rows[-1] += table.num_rows
-        if self._rows[-1] >= FILE_ROWS:
-            self._end_file()
-
-    def _end_file(self) -> None:
-        if self._writer is not None and self._stream is not None:
-            self._writer.close()
-            self._stream.close()
-            self._writer = self._stream = None
-
-    def abandon(self) -> None:
-        """Close the open file after a failure such as a full disk."""
-        if self._stream is not None:
-            with suppress(OSError):
-                self._stream.close()
+def _write_file(path: Path, groups: Iterable[Any], schema: Any) -> int:
+    """Write groups of rows until the file is full, and return the number of rows."""
+    rows = 0
+    with path.open("wb") as stream, pyarrow_parquet().ParquetWriter(stream, schema, **PAGES) as to:
+        for group in groups:
+            to.write_table(group, row_group_size=group.num_rows)
+            rows += group.num_rows
+            if rows >= FILE_ROWS:
+                break
+    return rows

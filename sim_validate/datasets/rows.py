@@ -121,9 +121,9 @@ class GraspRow(Declared):
     """Largest distance by which a given contact was moved."""
     force_closed: bool | None = None
     """Whether it is proved to be in force closure."""
-    closure_margin: Known = None
+    closure_margin: Annotated[Known, Within(ROUNDING, 1e-7)] = None
     """Margin of the exact test of force closure."""
-    critical_friction: Known = None
+    critical_friction: Annotated[Known, Within(10.0 * ROUNDING, 1e-7)] = None
     """Smallest coefficient with force closure."""
     region_radius_m: Known = None
     """Radius of the smallest contact region; 0 for points."""
@@ -185,7 +185,7 @@ class GraspRow(Declared):
     """The grasp that a varied one was made from; null for others."""
     friction_ratio: Annotated[Known, Asked("kinds")] = None
     """Friction over critical friction; null where none is known."""
-    displaced_m: Annotated[Lengths | None, Asked("kinds")] = None
+    displaced_m: Annotated[Lengths | None, Asked("kinds"), Within(0.0, ROUNDING)] = None
     """Distance of each contact from that of `made_from`."""
     region_exit_m: Annotated[Lengths | None, Asked("kinds")] = None
     """How far the region reached in the direction of that move; null where the contact did not
@@ -250,6 +250,7 @@ class GraspRow(Declared):
             raise InputError(f"held is {self.held}, but `outcome` is {self.outcome!r}")
 
         self._check_execution()
+        self._check_pose()
 
     def _check_execution(self) -> None:
         """Refuse results of an execution that was not simulated; without a squeeze all is lost."""
@@ -258,6 +259,19 @@ class GraspRow(Declared):
         control = self.executed and self.control_of is not None
         if control or (claims and not self.executed and not lost):
             raise InputError("the row claims results of an execution, although none was simulated")
+        if self.executed and (self.squeeze_n is None or None in (self.mass_kg, self.load_multiple)):
+            raise InputError("an executed row must have its squeeze, its mass and what it carries")
+
+    def _check_pose(self) -> None:
+        """Refuse a hand that is reached without a pose, or not reached without a reason."""
+        if self.hand_reached is not None and self.hand_reached == bool(self.hand_reason):
+            raise InputError(
+                f"hand_reason is {self.hand_reason!r}, but hand_reached is {self.hand_reached}"
+            )
+        pose = (self.hand_joints_rad, self.T_object_palm_m, self.hand_fingers, self.hand_points_m,
+                self.hand_normals)  # fmt: skip
+        if {each is not None for each in pose} != {bool(self.hand_reached)}:
+            raise InputError("the pose of a hand must be there exactly where hand_reached is true")
 
     @property
     def was_tried(self) -> bool:

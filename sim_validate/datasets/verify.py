@@ -3,44 +3,73 @@
 With the same packages and code, on processors that round alike, every cell of the sample must be
 the same. Otherwise each family must have as many grasps as before, and grasps that come out with
 the same contacts must have the same verdict and critical friction.
+
+A row is checked against its contacts and trials, and the grasp that it was made from. The multiple
+of the weight that a squeeze carries follows from contacts, squeeze, mass and springs alone, so it
+is proved again for every row; what a trial did is only simulated again in a sample. A pose of a
+hand is not searched for again: it counts if joints are within their ranges, fingertips touch the
+object at the stated contacts, the hand overlaps neither the object nor itself, and the contacts are
+proved to be in force closure at the row's friction.
 """
 
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from grasp_core.errors import GraspError, InputError
+from grasp_core.arrays import Array
+from grasp_core.closure.critical_friction import critical_friction
+from grasp_core.closure.force_closure import force_closure
+from grasp_core.errors import GraspError, InputError, UndecidedError
+from grasp_core.execution.grips import grip
+from grasp_core.execution.loads import any_direction
+from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.files.text_files import read_text
+from grasp_core.frames import POSE
+from grasp_core.hands.collisions import clearances, tip_distances
+from grasp_core.hands.hand import Hand
+from grasp_core.objects.on_faces import Surface
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import seat
 from grasp_core.provenance import arithmetic
+from grasp_core.values import FINGERS
 from sim_validate.datasets.build import CONFIG, CONTACTS, TWIN
-from sim_validate.datasets.columns import Cells
-from sim_validate.datasets.config import KEYS, DatasetConfig, Name, config_from_toml, id_beginning
-from sim_validate.datasets.make_unit import made_of
-from sim_validate.datasets.manifest import (
+from sim_validate.datasets.columns import Cells, agrees
+from sim_validate.datasets.config import (
+    KEYS,
+    NAMES,
+    DatasetConfig,
+    Name,
+    config_from_toml,
+    id_beginning,
+)
+from sim_validate.datasets.learning import RATIOS, contact_cells, hand_named, ratio_of, trial_cells
+from sim_validate.datasets.open_dataset import (
     MANIFEST,
     QUARANTINE,
-    Listed,
     Manifest,
-    listed,
+    Selection,
+    by_object,
+    file_faults,
     read_left_out,
     read_manifest,
+    stored_body,
+    stored_surface,
 )
-from sim_validate.datasets.open_dataset import Selection, by_object, stored_body
 from sim_validate.datasets.parquet import pyarrow
-from sim_validate.datasets.rows import GraspRow, ObjectRow, Rows
-from sim_validate.datasets.units import WorkUnit, provenance, read_given
-from sim_validate.datasets.verify_rows import object_faults
-from sim_validate.execution.verdict import may_slip
-from sim_validate.kit.files import path_inside
+from sim_validate.datasets.rows import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
+from sim_validate.datasets.units import PLANNED, WorkUnit, made_of, provenance, read_given
+from sim_validate.engine.traces import Outcome
+from sim_validate.execution.execute import tip_radius
+from sim_validate.execution.verdict import ExecutionTrial, may_slip
+from sim_validate.settings import ExecutionSettings
 
-OTHER_ROUNDING = 1e-6
-"""Relative difference that numbers may have when other packages or processors round them."""
 MOST_NAMED = 20
 """Largest number of faults that are listed for one object at one friction."""
 
@@ -64,11 +93,10 @@ def verify(folder: Path, sample: Sample | None = None) -> list[str]:
     the row; and for a sample, whether planning and simulating again gives the same rows.
     """
     pyarrow()  # before any work, so that a missing library is named at once
-    manifest = read_manifest(folder)
-    if faults := list(_file_faults(folder, manifest.files)):
-        return faults
-    faults: list[str] = []
+    manifest, faults = read_manifest(folder), list[str]()
     try:
+        if faults := list(file_faults(folder, manifest.files)):
+            return faults
         config = config_from_toml(folder / CONFIG)
         faults += _manifest_faults(folder, manifest, config)
         faults += _content_faults(folder, manifest, config)
@@ -86,39 +114,14 @@ def _content_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> 
                 f"{each.path}: the manifest lists this file under the split {each.split}, unlike "
                 "its name"
             )
+    for split, rows in _split_rows(folder, manifest):
+        yield from object_faults(folder, config, split, rows)
+
+
+def _split_rows(folder: Path, manifest: Manifest) -> Iterator[tuple[str, Rows]]:
+    """Yield the rows of each object, with the split whose files they are in."""
     for split in sorted({each.split for each in manifest.files if each.split is not None}):
-        for rows in by_object(Selection(folder, manifest, split)):
-            yield from object_faults(folder, config, split, rows)
-
-
-def _file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
-    names = {each.path for each in files}
-    there = {
-        path.relative_to(folder).as_posix()
-        for path in folder.rglob("*")
-        if path.is_file() and path.name != MANIFEST
-    }
-    # staged files no longer matter
-    there = {name for name in there if not name.startswith("staging/")}
-    yield from (
-        f"{path}: this file is not listed in the manifest" for path in sorted(there - names)
-    )
-    for each in files:
-        if each.path not in there:
-            yield f"{each.path}: this file is listed in the manifest, but missing"
-            continue
-        try:
-            found = listed(folder, path_inside(folder, each.path))
-        except InputError as error:
-            yield str(error)
-            continue
-        if found.bytes != each.bytes:
-            yield (
-                f"{each.path}: the file has {found.bytes} bytes, but the manifest lists "
-                f"{each.bytes}"
-            )
-        elif found.sha256 != each.sha256:
-            yield f"{each.path}: the file differs from what was written (its sha256 differs)"
+        yield from ((split, rows) for rows in by_object(Selection(folder, manifest, split)))
 
 
 def _manifest_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
@@ -143,11 +146,9 @@ def _sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator
         for friction in redoing.frictions(row)
     ]
     chosen = {*drawn(sorted(units), sample)}
-    splits = sorted({each.split for each in manifest.files if each.split is not None})
-    for split in splits:
-        for rows in by_object(Selection(folder, manifest, split)):
-            for row in rows.objects:
-                yield from redoing.faults(row, rows, chosen)
+    for _, rows in _split_rows(folder, manifest):
+        for row in rows.objects:
+            yield from redoing.faults(row, rows, chosen)
 
 
 class _Redoing:
@@ -254,10 +255,10 @@ def _loose_differences(stored: Rows, made: Rows) -> Iterator[str]:
     counts = [Counter(row.family for row in rows.values()) for rows in (before, after)]
     if counts[0] != counts[1]:
         yield f"grasps: {dict(counts[0])} by family, but {dict(counts[1])} when computed again"
-    for name in sorted(before.keys() & after.keys()):
-        yield from (
-            f"grasps: {name}: {said}" for said in loose_differences(before[name], after[name])
-        )
+    yield from (
+        f"grasps: {name}: {said}" for name in sorted(before.keys() & after.keys())
+        for said in loose_differences(before[name], after[name])
+    )  # fmt: skip
 
 
 def loose_differences(one: GraspRow, other: GraspRow) -> Iterator[str]:
@@ -265,15 +266,330 @@ def loose_differences(one: GraspRow, other: GraspRow) -> Iterator[str]:
 
     A grasp whose contacts slip may be kept or lost by a hair, so its survival does not count.
     """
-    if one.contacts != other.contacts or not np.allclose(
-        one.points, other.points, rtol=OTHER_ROUNDING, atol=0.0
-    ):
+    same = one.contacts == other.contacts
+    if not same or not np.allclose(one.points, other.points, rtol=ROUNDING, atol=0.0):
         return  # the best contacts are not unique
-    if (one.held, one.force_closed) != (other.held, other.force_closed):
-        yield f"outcome is {one.outcome}, but {other.outcome} when computed again"
     slips = any(map(may_slip, (one.predicted_first_slip, other.predicted_first_slip)))
-    if one.survived != other.survived and not slips:
-        yield f"survived is {one.survived}, but {other.survived} when executed again"
-    frictions = [row.critical_friction or 0.0 for row in (one, other)]
-    if not np.isclose(*frictions, rtol=OTHER_ROUNDING, atol=0.0):
-        yield f"critical friction {frictions[0]}, done again {frictions[1]}"
+    names = ("held", "force_closed", "critical_friction", *(() if slips else ("survived",)))
+    again = {name: getattr(other, name) for name in names}
+    yield from _disagreements(one, again, "computing it again")
+
+
+ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
+"""Largest distance of contacts from the mesh, for grasps and negative controls, relative to the
+object's radius. Planar faces are as flat as six digits show. Negative controls are moved in
+the planes of patches, from which a curved surface departs."""
+BAND = 1e-3
+"""Share by which a ratio may leave its band: frictions and masses are rounded to four digits."""
+LABELS = {"grasp": PLANNED, GIVEN: GIVEN}
+"""Kind of the rows of a label; other labels but `varied` are kinds themselves."""
+OFF = 1e-9
+"""Wrench that balanced forces leave, relative to the forces, at object radius one."""
+TOUCHES_M = 2e-5
+"""Largest distance of a fingertip from its contact [m]: twice what the search allows."""
+APART_M = 4e-4
+"""Least distance of the hand's links from each other [m]; the search keeps 0.5 mm."""
+ROUNDED = 1e-9
+"""How far rounding may move an angle beyond its range [rad], a link into the object [m], a pose
+from a rigid motion, or a direction from unit length."""
+
+
+def object_faults(folder: Path, config: DatasetConfig, split: str, rows: Rows) -> Iterator[str]:
+    """Yield sentences on what is wrong with the rows of one object, and with its mesh."""
+    yield from _table_faults(split, rows)
+    yield from _row_faults(rows, config.frictions)
+    yield from _mesh_faults(folder, rows)
+    if config.execution is not None or config.learning is not None:
+        yield from _requested_faults(folder, config, rows)
+
+
+def _disagreements(row: GraspRow, wanted: Mapping[str, Any], source: str) -> Iterator[str]:
+    """Yield cells of a row that something else says otherwise, beyond what their kinds allow."""
+    for name, value in wanted.items():
+        stated = getattr(row, name)
+        if not agrees(GraspRow, name, stated, value):
+            yield f"{name} is {stated}, but {value} by {source}"
+
+
+def _table_faults(split: str, rows: Rows) -> Iterator[str]:
+    if any(row.split != split for row in (*rows.objects, *rows.grasps)):
+        yield f"objects or grasps: files of the split {split} have rows of another split"
+    for name in NAMES:
+        keys = Counter(tuple(getattr(row, key) for key in KEYS[name]) for row in rows.of(name))
+        if any(count > 1 for count in keys.values()):
+            yield f"{name}: two rows have the same {' and '.join(KEYS[name])}"
+
+
+def _row_faults(rows: Rows, frictions: Sequence[float]) -> Iterator[str]:
+    splits = {row.object_id: row.split for row in rows.objects}
+    names = {row.grasp_id for row in rows.grasps}
+    ended: dict[str, list[Outcome]] = {}
+    for trial in rows.trials:
+        ended.setdefault(trial.grasp_id, []).append(trial.hold.outcome)
+    yield from (
+        f"trials: {name} has no row in the table of grasps" for name in sorted(ended.keys() - names)
+    )
+    for row in rows.grasps:
+        faults = list[str]()
+        if splits.get(row.object_id) != row.split:
+            faults.append("the row's object is missing, or in another split")
+        if row.control_of is not None and row.control_of not in names:
+            faults.append(f"{row.control_of}, named in control_of, has no row")
+        outcomes = ended.get(row.grasp_id, [])
+        held = all(one is Outcome.HELD for one in outcomes) if row.was_tried else None
+        by_trials = {"trials": len(outcomes), "held": held}
+        faults += _disagreements(row, by_trials, "the table of trials")
+        own = row.control_of is None and row.label != VARIED
+        if own and row.friction not in frictions:
+            faults.append(f"friction {row.friction} is not among those of {CONFIG}")
+        if row.was_tried:
+            faults += _contact_faults(row)
+        yield from (f"grasps: {row.grasp_id}: {fault}" for fault in faults)
+
+
+def _mesh_faults(folder: Path, rows: Rows) -> Iterator[str]:
+    for row in rows.objects:
+        try:
+            mesh = stored_surface(folder, row.object_id)
+        except InputError as error:
+            yield str(error)
+            continue
+        surface = Surface(mesh.vertices, mesh.triangles)
+        tried = (each for each in rows.grasps if each.object_id == row.object_id and each.was_tried)
+        on_it = [on for each in tried for on in _on_surface(surface, each, row.radius_m)]
+        if off := on_it.count(False):
+            yield (
+                f"grasps: {off} contacts of {row.source_name} are not on the object, or not "
+                "with its normals"
+            )
+
+
+def _on_surface(surface: Surface, row: GraspRow, radius_m: float) -> Iterator[bool]:
+    """Yield for each contact whether it is on the object, with its normal if it is no control's."""
+    for point, normal in zip(row.points, row.normals, strict=True):
+        if row.control_of is None:
+            yield surface.holds(point, normal, ON_SURFACE * radius_m)
+        else:  # some controls have a flipped normal
+            yield surface.holds(point, None, NEAR_SURFACE * radius_m)
+
+
+def _contact_faults(row: GraspRow) -> Iterator[str]:
+    """Compute the closure of a contact set from the contacts alone."""
+    try:
+        found = force_closure(row.points, row.normals, row.friction)
+    except UndecidedError as error:
+        if row.force_closed:
+            yield f"force closure of the contacts cannot be decided ({error})"
+        return
+    except GraspError as error:
+        yield f"force closure of the contacts cannot be computed ({error})"
+        return
+    margin = {"closure_margin": found.margin} if found.closed and row.force_closed else {}
+    yield from _disagreements(row, {"force_closed": found.closed, **margin}, "the contacts")
+
+
+def _requested_faults(folder: Path, config: DatasetConfig, rows: Rows) -> Iterator[str]:
+    trials: dict[str, list[ExecutionTrial]] = {}
+    for trial in rows.executions:
+        trials.setdefault(trial.grasp_id, []).append(trial.tried)
+    by_name = {row.grasp_id: row for row in rows.grasps}
+    yield from (
+        f"executions: {name} has no row in the table of grasps"
+        for name in sorted(trials.keys() - by_name.keys())
+    )
+    for of_object in rows.objects:
+        name = of_object.object_id
+        body = stored_body(folder, name, of_object.source_name, config.faces)
+        for row in (each for each in rows.grasps if each.object_id == name):
+            found = list[str]()
+            if config.execution is not None:
+                own = trials.get(row.grasp_id, [])
+                found += _trial_faults(row, own, has_margins=config.learning is not None)
+                found += [] if found else _squeeze_faults(row, body, config.execution)
+            if config.learning is not None:
+                found += _learning_faults(row, by_name, of_object, body, config)
+            yield from (f"grasps: {row.grasp_id}: {fault}" for fault in found)
+
+
+def _learning_faults(
+    row: GraspRow, by_name: Mapping[str, GraspRow], of_object: ObjectRow, body: Polyhedron,
+    config: DatasetConfig,
+) -> Iterator[str]:  # fmt: skip
+    if row.label == VARIED:
+        yield from _varied_faults(row, by_name, is_curved=of_object.curved)
+    else:
+        yield from _disagreements(row, {"kind": LABELS.get(row.label, row.label)}, "label")
+    ratio = {"friction_ratio": ratio_of(row.friction, row.critical_friction)}
+    yield from _disagreements(row, ratio, "the critical friction")
+    if row.was_tried:
+        yield from _disagreements(row, contact_cells(config, body, row.placed), "the contacts")
+    if row.witness_forces_n is not None:
+        yield from _witness_faults(row, row.witness_forces_n, body)
+    if config.learning is not None and config.learning.hand:
+        yield from _hand_faults(row, hand_named(config.learning.hand), body)
+
+
+def _varied_faults(
+    row: GraspRow, by_name: Mapping[str, GraspRow], *, is_curved: bool
+) -> Iterator[str]:
+    source = by_name.get(row.made_from or "")
+    if source is None:
+        yield f"{row.made_from}, named in made_from, has no row"
+        return
+    stated, exits = row.displaced_m, row.region_exit_m
+    if stated is None or exits is None or len(row.points) != len(source.points):
+        yield "displaced_m or region_exit_m is missing, or contacts of made_from are"
+        return
+    moves = np.linalg.norm(row.points - source.points, axis=1)
+    yield from _disagreements(row, {"displaced_m": moves}, "the contacts of made_from")
+    if (row.kind == "moved_out") == (not stated.any()):
+        yield f"contacts of the kind {row.kind} are not where they must be"
+    # where a contact did not move, its exit is NaN, which nothing is below
+    if not is_curved and (stated <= exits * (1.0 - ROUNDING)).any():
+        yield "a contact was moved, but is still in its region"
+    try:
+        critical = critical_friction(row.points, row.normals)
+    except GraspError as error:
+        yield f"the critical friction cannot be computed ({error})"
+        return
+    yield from _disagreements(row, {"critical_friction": critical}, "the contacts")
+    if row.kind in RATIOS:
+        least, most = RATIOS[row.kind]
+        ratio = row.mass_ratio if row.kind == "mass_near" else row.friction_ratio
+        if ratio is None or not least * (1.0 - BAND) <= ratio <= most * (1.0 + BAND):
+            yield f"the ratio {ratio} is none of the kind {row.kind}"
+
+
+def _trial_faults(
+    row: GraspRow, trials: Sequence[ExecutionTrial], *, has_margins: bool
+) -> Iterator[str]:
+    """Check that a row agrees with its trials, and has none if it was not executed."""
+    if not row.executed:
+        if trials:
+            yield "the table of executions has trials of it, although none was simulated"
+        return
+    wanted = trial_cells(trials)
+    loss = wanted.pop("predicted_loss")
+    yield from _disagreements(row, wanted, "the table of executions")
+    if has_margins:
+        yield from _disagreements(row, {"predicted_loss": loss}, "the table of executions")
+        carried = (row.load_multiple or 0.0) * (row.mass_kg or 0.0)
+        yield from _disagreements(row, {"payload_kg": carried}, "load_multiple times the mass")
+
+
+def _squeeze_faults(row: GraspRow, body: Polyhedron, asked: ExecutionSettings) -> Iterator[str]:
+    """Check the mass, and prove again that the squeeze carries what the row says."""
+    yield from _proved(row, body, asked, "load_multiple")
+    if row.least_squeeze_n is not None:
+        # it carries the weight itself, with no larger push
+        least = replace(row, squeeze_n=row.least_squeeze_n, load_multiple=1.0)
+        yield from _proved(least, body, asked, "least_push_n", row.least_push_n)
+
+
+def _proved(
+    row: GraspRow,
+    body: Polyhedron,
+    asked: ExecutionSettings,
+    claim: str,
+    push_n: float | None = None,
+) -> Iterator[str]:
+    """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
+    if row.squeeze_n is None or row.load_multiple is None or row.mass_kg is None:
+        return  # nothing was executed
+    try:
+        settings = asked.for_body(body)
+        if row.mass_ratio is not None:
+            settings = replace(settings, mass_kg=row.mass_kg)
+        if row.label in (GIVEN, VARIED):  # on curved surfaces they have faces of their own
+            body = seat(body, row.points, row.normals).body
+        held = grip(
+            body, row.placed, row.friction, row.squeeze_n[: row.contacts],
+            stiffness=settings.tip_stiffness_n_per_m,
+            tip_radius_m=tip_radius(body, row.placed, settings),
+        )  # fmt: skip
+    except GraspError as error:
+        yield f"the contacts cannot be squeezed as the row says ({error})"
+        return
+    if faults := list(_disagreements(row, {"mass_kg": settings.object_kg}, CONFIG)):
+        yield from faults
+        return
+    survival = Survival.of(held, any_direction(settings.object_kg))
+    reactions = survival.reactions(held.local_squeeze)
+    multiple = row.load_multiple * (1.0 - ROUNDING)
+    pushes = reactions.start[:, 0] + multiple * reactions.swing
+    most_n = settings.push_n if push_n is None else push_n
+    limited = bool((pushes <= most_n * (1.0 + ROUNDING)).all())
+    if not (limited and reactions.survives(multiple, reactions.multipliers(multiple))):
+        yield (
+            f"{claim} is {getattr(row, claim):.9g}, but the squeeze is not proved to carry as much"
+        )
+
+
+def _witness_faults(row: GraspRow, forces: Array, body: Polyhedron) -> Iterator[str]:
+    arms = (row.points - body.center_of_mass) / body.radius
+    pushes = np.einsum("ki,ki->k", forces, row.normals)
+    across = np.linalg.norm(forces - pushes[:, None] * row.normals, axis=1)
+    left = np.concatenate([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
+    in_cones = (across <= row.friction * pushes * (1.0 + ROUNDING) + OFF).all()
+    if not in_cones or np.abs(left).max() > ROUNDING or abs(pushes.sum() - 1.0) > ROUNDING:
+        yield "witness_forces_n are no balanced forces in the friction cones"
+
+
+def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
+    """Check a pose by itself, with what it must keep to."""
+    if bool(row.force_closed) != (row.hand_reached is not None):
+        yield f"hand_reached is {row.hand_reached}, but force_closed is {row.force_closed}"
+    joints, pose, fingers = row.hand_joints_rad, row.T_object_palm_m, row.hand_fingers
+    points, normals = row.hand_points_m, row.hand_normals
+    if joints is None or pose is None or fingers is None or points is None or normals is None:
+        return  # the hand does not reach the grasp
+    standing: list[int] = fingers.tolist()
+    if len({*standing}) < FINGERS or fingers.max() >= len(hand.fingers):
+        yield f"hand_fingers are {standing}, not {FINGERS} of the hand's {len(hand.fingers)}"
+        return
+    surface, turn = Surface(body.vertices, body.triangles), pose[:3, :3]
+    roundings = np.array([hand.fingers[finger].tip.core[1] for finger in standing])
+    behind = points - roundings[:, None] * normals  # within the tips, as deep as they are rounded
+    gaps = tip_distances(hand, joints, pose, standing, behind) + roundings
+    found, way = clearances(hand, body, joints, pose, fingers), row.hand_approach
+    rules = {
+        "hand_joints_rad are not within the ranges of the joints": _in_ranges(joints, hand),
+        "hand_open_joints_rad are not within the ranges of the joints": (
+            row.hand_open_joints_rad is None or _in_ranges(row.hand_open_joints_rad, hand)
+        ),
+        "T_object_palm_m is not a rigid motion": (
+            np.abs(turn @ turn.T - np.eye(3)).max() <= ROUNDED and np.linalg.det(turn) > 0.0
+            and pose[3].tolist() == np.eye(POSE)[3].tolist()
+        ),
+        "hand_approach is not of unit length": (
+            way is None or abs(np.linalg.norm(way) - 1.0) <= ROUNDED
+        ),
+        "hand_points_m are not on the object, or hand_normals not its normals there": all(
+            surface.holds(point, normal, TOUCHES_M)
+            for point, normal in zip(points, normals, strict=True)
+        ),
+        "the fingertips of hand_joints_rad do not touch the object at hand_points_m": (
+            gaps.max() <= TOUCHES_M
+        ),
+        # a link whose tip touches the object may come as near to it as it likes
+        "the hand of hand_joints_rad overlaps the object or itself": (
+            found.itself >= APART_M and found.object >= -ROUNDED and found.tips >= -TOUCHES_M
+        ),
+        "hand_points_m are not proved to be in force closure": (
+            _is_proved(points, normals, row.friction)
+        ),
+    }  # fmt: skip
+    yield from (fault for fault, fits in rules.items() if not fits)
+
+
+def _in_ranges(angles: Array, hand: Hand) -> bool:
+    low, high = hand.ranges.T
+    return bool(((angles >= low - ROUNDED) & (angles <= high + ROUNDED)).all())
+
+
+def _is_proved(points: Array, normals: Array, friction: float) -> bool:
+    try:
+        certificate = force_closure(points, normals, friction)
+        return certificate.closed and certificate.verify()
+    except GraspError:
+        return False

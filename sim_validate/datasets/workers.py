@@ -24,22 +24,20 @@ import signal
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
-from grasp_core.checked import shown
-from grasp_core.declared import FieldError
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import read_bytes
+from grasp_core.kinds import FieldError, shown
 from sim_validate.datasets.config import Name, SplitName
-from sim_validate.datasets.make_unit import Made, made_of
 from sim_validate.datasets.parquet import parquet_bytes
 from sim_validate.datasets.rows import dataset_tables
-from sim_validate.datasets.units import WorkerError, WorkUnit, body_of, provenance
+from sim_validate.datasets.units import Made, WorkerError, WorkUnit, body_of, made_of, provenance
 from sim_validate.kit.files import path_inside
 from sim_validate.kit.processes import check_interrupted
 
@@ -264,44 +262,35 @@ def drive(
 
     Takes `report` (finished, total).
     """
-    own = dict(provenance())
-    told = -1
-    waiting = deque(Task(unit, staging, own, timeout_s, work) for unit in units)
-    again, finished = list[Task](), 0
-    under_way: dict[Future[None], Task] = {}
-    while waiting or under_way:
-        while waiting and len(under_way) < AHEAD * engine.workers:
-            task = waiting.popleft()
-            under_way[engine.submit(do_task, task)] = task
-        done, _ = wait(under_way, timeout=LOOK_S, return_when=FIRST_COMPLETED)
-        for future in done:
-            task = under_way.pop(future)
-            if _succeeded(future, task, engine):
-                finished += 1
-            else:
-                again.append(task)
-        check_interrupted()
-        if finished > told:
-            told = finished
-            report(finished, len(units))
-    for task in again:
-        _try_alone(task, engine)
+    own, finished, again = dict(provenance()), 0, list[Task]()
+    tasks = [Task(unit, staging, own, timeout_s, work) for unit in units]
+    report(finished, len(units))
+    for task, good in _ended(tasks, engine, AHEAD * engine.workers):
+        again += [] if good else [task]
+        finished += good
+        report(finished, len(units))
+    for task in again:  # with no other unit under way
+        began = time.monotonic()
+        ((_, good),) = _ended([task], engine, 1)
+        if not good:
+            late = timeout_s is not None and time.monotonic() - began >= timeout_s
+            reason = "took too long, twice" if late else "its worker ended, twice"
+            staging.quarantine(task.unit, reason)
         finished += 1
         report(finished, len(units))
 
 
-def _try_alone(task: Task, engine: Engine) -> None:
-    """Try a unit once more with no other unit under way; quarantine it if it fails again."""
-    began = time.monotonic()
-    future = engine.submit(do_task, task)
-    while not wait([future], timeout=LOOK_S).done:
+def _ended(tasks: Sequence[Task], engine: Engine, ahead: int) -> Iterator[tuple[Task, bool]]:
+    """Yield each task when it has ended, with whether it is done or its worker process has died."""
+    waiting, under_way = deque(tasks), dict[Future[None], Task]()
+    while waiting or under_way:
+        while waiting and len(under_way) < ahead:
+            task = waiting.popleft()
+            under_way[engine.submit(do_task, task)] = task
+        for future in wait(under_way, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
+            task = under_way.pop(future)
+            yield task, _succeeded(future, task, engine)
         check_interrupted()
-    if _succeeded(future, task, engine):
-        return
-    took_s = time.monotonic() - began
-    late = task.timeout_s is not None and took_s >= task.timeout_s
-    reason = "took too long, twice" if late else "its worker ended, twice"
-    task.staging.quarantine(task.unit, reason)
 
 
 def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:

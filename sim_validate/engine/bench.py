@@ -3,6 +3,22 @@
 The text of a scene is always what is compiled, so that the text is the whole experiment. All trials
 of a scene run together; each is bit for bit what a plain loop over `mj_step` gives, whatever the
 number of threads.
+
+Every trial is a schedule: the forces planned for the fingers, the external wrench and the friction
+in each sample. Loads change smoothly, because long objects spring loose under a sudden start.
+
+Wrench hold. The fingers squeeze with planned forces while friction is raised, so that the
+transients of loading cannot slip a contact that would hold at rest. Then the wrench and the forces
+planned for it are applied together, the object settles, friction is lowered to the value under
+test, and the object must stay where it is.
+
+Largest wrench. The object is either held at several shares of the predicted limit (bisection), or
+loaded in one slow rise through it (ramp). It lets go where it has moved by a threshold. The mass
+must first be accelerated, so a ramp finds the limit late, never early.
+
+Critical friction. Fingers squeeze the unloaded object with the forces that balance at the predicted
+critical friction, friction is lowered to a trial value, and the object must stay; the trial value
+is bisected.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -10,7 +26,7 @@ number of threads.
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeAlias
 
@@ -21,10 +37,12 @@ from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.errors import InputError
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
-from sim_validate.engine.schedules import Schedule
+from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 
 STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")
 """Parts of a state, which lie in the order of their bits."""
+CLOCK = 0
+"""Place of the time in a state."""
 
 
 def compiled(xml: str) -> mujoco.MjModel:
@@ -60,16 +78,6 @@ def step(
         trials.step(running, nstep=steps)
     except batch.SimulationError as failure:
         errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
-
-
-def faults(trials: batch.Batch, trial: int, error: str) -> tuple[str, ...]:
-    """Say what went wrong in a trial, in words."""
-    found = [error] if error else []
-    if not np.isfinite(trials.state[trial]).all():
-        found.append("a number of the simulator's state is not finite")
-    if warnings := int(trials.warning[trial, :, 1].sum()):
-        found.append(f"the simulator raised {warnings} warnings")
-    return tuple(found)
 
 
 def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> tuple[Array, Array]:
@@ -138,6 +146,169 @@ class Health:
         )
 
 
+Following: TypeAlias = Callable[[Indices, Indices], Indices]
+"""Function that is told which trials are at which samples, and gives the sample after it for each;
+one beyond its last sample ends a trial."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stepped:
+    """What was read of m trials, and how the simulator did in each."""
+
+    series: tuple[Array, ...]
+    """Each view that was to be kept, after each sample, (m, n, ...); zero after a trial's end."""
+    counts: Indices
+    """Numbers of samples that were simulated, (m,)."""
+    health: tuple[Health, ...]
+
+
+def stepped(
+    model: mujoco.MjModel, trials: batch.Batch, steps: int, told: Sequence[tuple[Array, Array]],
+    kept: Sequence[Array], lengths: Sequence[int], following: Following | None = None,
+    deadline: float = math.inf,
+) -> Stepped:  # fmt: skip
+    """Step m trials through their samples, of so many steps each.
+
+    Before a sample each view of the simulator in `told` gets its values, (m, n, ...); after it the
+    views to be kept are read.
+    """
+    count, every = len(lengths), np.array(lengths)
+    clock = trials.state[:count, CLOCK]
+    begun = clock.copy()
+    series = [np.zeros((count, every.max(), *view.shape[1:])) for view in kept]
+    samples, counts = np.zeros(count, dtype=np.intp), np.zeros(count, dtype=np.intp)
+    going, errors = np.arange(count), dict[int, str]()
+    with unlogged():
+        while going.size and time.monotonic() <= deadline:
+            now = samples[going]
+            rows, at, to = going, now, counts[going]
+            if going.size == count and (now == now[0]).all():  # slices are quicker than indices
+                rows, at, to = slice(count), now[0], to[0]
+            for view, values in told:
+                view[rows] = values[rows, at]
+            step(trials, errors, steps, going)
+            for found, view in zip(series, kept, strict=True):
+                found[rows, to] = view[rows]
+            counts[going] += 1
+            samples[going] = then = now + 1 if following is None else following(going, now)
+            left = then < every[going]
+            going = going if left.all() else going[left]
+    late = np.isin(np.arange(count), going)
+    off = clock - (begun + steps * counts * float(model.opt.timestep))
+    warned = trials.warning[:count, :, 1].sum(axis=1)
+    health = tuple(
+        Health(
+            all(np.isfinite(each[trial]).all() for each in (trials.state, series[0])),
+            int(warned[trial]), float(off[trial]), errors.get(trial, ""), bool(late[trial]),
+        )
+        for trial in range(count)
+    )  # fmt: skip
+    return Stepped(tuple(series), counts, health)
+
+
+def samples(duration_s: float, sample_s: float) -> int:
+    """Return the whole number of samples nearest to a duration, at least one."""
+    return max(1, round(duration_s / sample_s))
+
+
+def smooth(count: int) -> Array:
+    """Return numbers that rise from zero to one with no slope at either end, (count,)."""
+    time = np.arange(1, count + 1) / count
+    return time**2 * (3.0 - 2.0 * time)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Load:
+    """An external wrench with the contact forces planned to balance it."""
+
+    wrench: Array
+    """External wrench, (6,) [N, N m], torque about the centre of mass, world axes."""
+    forces: Array
+    """Contact forces on the object, (k, 3) [N], world axes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Schedule:
+    """Wrench (n, 6), finger forces (n, k, 3) and friction in each of the n samples of a trial."""
+
+    wrenches: Array
+    forces: Array
+    friction: Array
+    watched: int
+    """Index of the first sample from which the object must stay where it is."""
+    resting: int
+    """Index of the first sample from which load and finger forces no longer change."""
+
+    @staticmethod
+    def squeeze(
+        forces: Array, friction: float, sample_s: float, protocol: HoldProtocol
+    ) -> "Schedule":
+        """Schedule the fingers to close on the unloaded object."""
+        shares, still = smooth(samples(protocol.squeeze_s, sample_s)), np.zeros(6)
+        count, opened = len(shares), Load(still, np.zeros_like(forces))
+        return _between(opened, Load(still, forces), shares, (friction, friction), count, count)
+
+    @staticmethod
+    def hold(
+        idle: Load, load: Load, frictions: tuple[float, float], sample_s: float,
+        protocol: HoldProtocol,
+    ) -> "Schedule":  # fmt: skip
+        """Schedule a hold: load the squeezed object at high friction, settle, lower it, watch."""
+        rise, rest = samples(protocol.load_s, sample_s), samples(protocol.settle_s, sample_s)
+        shares = np.concatenate([smooth(rise), np.ones(rest + samples(protocol.hold_s, sample_s))])
+        return _between(idle, load, shares, frictions, rise + rest, rise)
+
+    @staticmethod
+    def ramp(
+        idle: Load, limit: Load, shares: tuple[float, float], friction: float, sample_s: float,
+        protocols: tuple[HoldProtocol, LimitProtocol],
+    ) -> tuple["Schedule", Array]:  # fmt: skip
+        """Schedule a load that rises slowly through the largest one that is resisted.
+
+        The load rises to the first share of the limit as in `hold`, then slowly to the second. The
+        forces balance the load all the way, whether the fingers can apply them or not.
+
+        Gives the schedule, and the share of the limit that is applied in each watched sample.
+        """
+        holding, limiting = protocols
+        rise, rest = samples(holding.load_s, sample_s), samples(holding.settle_s, sample_s)
+        lower, upper = shares
+        count = samples(limiting.ramp_s, sample_s)
+        climb = lower + (upper - lower) * np.arange(1, count + 1) / count
+        applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
+        high = holding.settling_friction * friction
+        return _between(idle, limit, applied, (high, friction), rise + rest, len(applied)), climb
+
+    @staticmethod
+    def release(
+        still: Load, frictions: tuple[float, float], sample_s: float, protocol: FrictionProtocol, *,
+        settled: bool = False,
+    ) -> "Schedule":  # fmt: skip
+        """Schedule a release: lower the friction of a squeezed object without load, and watch."""
+        rest = 0 if settled else samples(protocol.settle_s, sample_s)
+        shares = np.ones(rest + samples(protocol.hold_s, sample_s))
+        return _between(still, still, shares, frictions, rest, 0)
+
+    @staticmethod
+    def settle(
+        still: Load, friction: float, sample_s: float, protocol: FrictionProtocol
+    ) -> "Schedule":
+        """Schedule what comes before a release: a squeezed object without load settles."""
+        count = samples(protocol.settle_s, sample_s)
+        return _between(still, still, np.ones(count), (friction, friction), count, 0)
+
+
+def _between(
+    start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
+    resting: int,
+) -> Schedule:  # fmt: skip
+    friction = np.full(len(shares), frictions[0])
+    friction[watched:] = frictions[1]
+    wrenches = start.wrench + shares[:, None] * (end.wrench - start.wrench)
+    forces = start.forces + shares[:, None, None] * (end.forces - start.forces)
+    return Schedule(wrenches, forces, friction, watched, resting)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """Where object and fingertips were in each of the n samples of a trial, in the world frame."""
@@ -197,75 +368,40 @@ class Bench:
         self, schedules: Sequence[Schedule], start: Array | None = None, ends: Ends | None = None
     ) -> tuple[Motion, ...]:
         """Simulate trials of equal length, all from the same state."""
-        trials = self._trials(len(schedules))
+        count, trials = len(schedules), self._trials(len(schedules))
         if start is not None:
-            trials.state[: len(schedules)] = start
-        clock = trials.state[:, self.parts["time"]][:, 0]
-        begun = float(clock[0])
-        every, counts, skipped, stopped, errors = self._step_through(trials, schedules, ends)
-        warned = trials.warning[:, :, 1].sum(axis=1)
-        times = self.model.opt.timestep * (CHUNK * np.arange(1, every.shape[1] + 1))
-        found: list[Motion] = []
-        for trial, count in enumerate(counts):
-            joints, state = every[trial, :count], trials.state[trial].copy()
-            expected = begun + CHUNK * int(count) * self.model.opt.timestep
-            health = Health(
-                bool(np.isfinite(state).all() and np.isfinite(joints).all()), int(warned[trial]),
-                float(clock[trial] - expected), errors.get(trial, ""), bool(stopped[trial]),
-            )  # fmt: skip
-            found.append(Motion(times[:count], joints, state, health, int(skipped[trial])))
-        return tuple(found)
-
-    def _step_through(
-        self, trials: batch.Batch, schedules: Sequence[Schedule], ends: Ends | None
-    ) -> tuple[Array, Indices, Indices, Mask, dict[int, str]]:
-        """Step m trials to their ends.
-
-        Gives joint positions, (m, n, q), of which each trial has filled in its own number of
-        samples; these numbers, those of samples left out, and whether time ran out, (m,) each; and
-        the simulator's own messages by trial.
-        """
-        wrenches, controls, frictions = self._applied(schedules)
-        count, length = frictions.shape
-        watched = np.array([schedule.watched for schedule in schedules])
+            trials.state[:count] = start
         applied, servos, joints, speeds = (
             trials.state[:, self.parts[name]] for name in ("xfrc_applied", "ctrl", "qpos", "qvel")
         )
         applied = applied.reshape(len(applied), -1, 6)[:, self.body]
         friction = trials.expand("geom_friction")[:, self.touching, 0]
-        every = np.empty((count, length, joints.shape[1]))
-        counts, skipped, sample = (np.zeros(count, dtype=np.intp) for _ in range(3))
-        going, stopped, errors = np.arange(count), np.zeros(count, dtype=bool), dict[int, str]()
-        # before any may end, all trials are at the same sample: slices are quicker than indices
-        alike = length if ends is None else ends.earliest
-        with unlogged():
-            while going.size:
-                if time.monotonic() > self.deadline:
-                    stopped[going] = True
-                    break
-                together = sample[0] < alike
-                rows = slice(count) if together else going
-                now = int(sample[0]) if together else sample[going]
-                done = now if together else counts[going]
-                applied[rows] = wrenches[rows, now]
-                servos[rows] = controls[rows, now]
-                friction[rows] = frictions[rows, now, None]
-                step(trials, errors, CHUNK, going)
-                every[rows, done] = joints[rows]
-                counts[rows] += 1
-                if ends is not None and not together:
-                    settled, answered = ends.look(
-                        going, sample[going], joints[going], speeds[going]
-                    )
-                    early = going[settled]
-                    if early.size:
-                        skipped[early] += watched[early] - 1 - sample[early]
-                        sample[early] = watched[early] - 1
-                    going = going[~answered]
-                sample[rows] += 1
-                if not together or now == length - 1:
-                    going = going[sample[going] < length]
-        return every, counts, skipped, stopped, errors
+        wrenches, controls, frictions = self._applied(schedules)
+        length = frictions.shape[1]
+        watched = np.array([schedule.watched for schedule in schedules])
+        skipped = np.zeros(count, dtype=np.intp)
+
+        def following(going: Indices, samples: Indices) -> Indices:
+            after = samples + 1
+            if ends is not None and samples.min() >= ends.earliest:
+                settled, answered = ends.look(going, samples, joints[going], speeds[going])
+                skipped[going[settled]] += (watched[going] - after)[settled]
+                after = np.where(settled, watched[going], after)
+                after[answered] = length
+            return after
+
+        told = [(applied, wrenches), (servos, controls), (friction, frictions[..., None])]
+        done = stepped(
+            self.model, trials, CHUNK, told, [joints], [length] * count, following, self.deadline
+        )
+        times = self.model.opt.timestep * (CHUNK * np.arange(1, length + 1))
+        return tuple(
+            Motion(
+                times[:samples], done.series[0][trial, :samples], trials.state[trial].copy(),
+                done.health[trial], int(skipped[trial]),
+            )
+            for trial, samples in enumerate(done.counts.tolist())
+        )  # fmt: skip
 
     def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
         """Return what is applied in each of n samples of m trials, as the simulator takes it.

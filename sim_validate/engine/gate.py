@@ -22,7 +22,7 @@ With mu the friction and N the normal force of a contact:
 
 The loads and frictions at which the boxes slip are found and judged as those of grasps are, by
 holds, ramps and releases, but every trial has its full length: that trials of grasps may end early
-presumes that nothing slips later (`early_ends`). So thresholds too loose to notice a slip are
+presumes that nothing slips later (`traces`). So thresholds too loose to notice a slip are
 refused, like settings that slip falsely. The cases have the friction and the size of the object
 under test.
 
@@ -39,6 +39,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -53,8 +54,9 @@ from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, first_touch
-from sim_validate.engine.limits import (
+from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, Load, Schedule, first_touch
+from sim_validate.engine.rig import (
+    Rig,
     SimulatedLimit,
     bisected,
     bisected_limits,
@@ -62,9 +64,8 @@ from sim_validate.engine.limits import (
     part,
     ramped_limits,
     released_friction,
+    squeezed,
 )
-from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.schedules import Load, Schedule
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import holds
 
@@ -130,6 +131,14 @@ class Case:
         """Scale an example object to the size under test."""
         return sized(name, self.radius_m)
 
+    def checks(self) -> tuple[Check, ...]:
+        """Measure all figures on pads, as controls always are, and on the mesh if asked for."""
+        checks = known_answers(replace(self, setup=replace(self.setup, surface="pads")))
+        if self.setup.surface != "mesh":
+            return checks
+        meshes = (*mesh_touches(self), *known_answers(self))
+        return checks + tuple(replace(each, name=f"on a mesh: {each.name}") for each in meshes)
+
     def squeezed(
         self, body: Polyhedron, contacts: Sequence[Contact], forces: Array, friction: float
     ) -> Rig:
@@ -151,6 +160,7 @@ def tetrahedron(case: Case) -> tuple[Rig, list[Load]]:
 
 
 AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
+AT_AZIMUTHS = [f", at {azimuth:g} deg" for azimuth in AZIMUTHS_DEG]
 SIDES = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
 """Signs of the places of four contacts, two on each of two opposite faces."""
 SLIP_TOLERANCE = 0.005
@@ -200,7 +210,8 @@ def _incline(case: Case) -> list[Check]:
         Load(resting.wrench + np.concatenate([pull, torque]), resting.forces)
         for pull, torque in zip(pulls, torques, strict=True)
     ]
-    return _slips("slope at which a box slides, over friction", bisected_limits(rig, limits))
+    name = "slope at which a box slides, over friction"
+    return _slips(name, bisected_limits(rig, limits), AT_AZIMUTHS)
 
 
 def _pulled_box(case: Case) -> list[Check]:
@@ -213,11 +224,7 @@ def _pulled_box(case: Case) -> list[Check]:
         Load(np.array([0, *(largest * way), 0, 0, 0]), forces - np.array([0, *(largest * way / 4)]))
         for way in _ways()
     ]
-    name = "pull at which a held box slips, over 4 mu N"
-    return [
-        *_slips(f"{name}, by holds", bisected_limits(rig, limits)),
-        *_slips(f"{name}, by ramps", ramped_limits(rig, limits)),
-    ]
+    return _by_both("pull at which a held box slips, over 4 mu N", rig, limits, AT_AZIMUTHS)
 
 
 def _held_across(case: Case, body: Polyhedron, length: float, lever: float) -> Rig:
@@ -247,11 +254,7 @@ def _twisted_box(case: Case) -> list[Check]:
         rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in SIDES]),
     )
     name = "twist at which a held box turns, over 4 N sqrt((mu a)^2 + mu_t^2)"
-    return [
-        near(f"{name}, by {way}", found and found.share, SLIP_TOLERANCE)
-        for way, search in (("holds", bisected_limits), ("ramps", ramped_limits))
-        for found in search(rig, [limit])
-    ]
+    return _by_both(name, rig, [limit], [""])
 
 
 def _ways() -> list[Array]:
@@ -259,11 +262,17 @@ def _ways() -> list[Array]:
     return list(np.column_stack([np.cos(turns), np.sin(turns)]))
 
 
-def _slips(name: str, found: Sequence[SimulatedLimit | None]) -> list[Check]:
+def _by_both(name: str, rig: Rig, limits: Sequence[Load], ways: Sequence[str]) -> list[Check]:
+    """Find the loads at which a box slips by holds and by ramps."""
+    held, ramped = bisected_limits(rig, limits), ramped_limits(rig, limits)
+    return [*_slips(f"{name}, by holds", held, ways), *_slips(f"{name}, by ramps", ramped, ways)]
+
+
+def _slips(name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str]) -> list[Check]:
     """Compare the loads at which a box slips with those of statics, one check per direction."""
     return [
-        near(f"{name}, at {azimuth:g} deg", at and at.share, SLIP_TOLERANCE)
-        for azimuth, at in zip(AZIMUTHS_DEG, found, strict=True)
+        near(f"{name}{way}", at and at.share, SLIP_TOLERANCE)
+        for way, at in zip(ways, found, strict=True)
     ]
 
 
@@ -510,6 +519,25 @@ class Gate(Declared):
             )
 
 
+class Cases(Protocol):
+    """Settings with which a simulator is checked on cases with known answers."""
+
+    def checks(self) -> tuple[Check, ...]:
+        """Measure all figures."""
+        ...
+
+
+@lru_cache(maxsize=256)
+def measured(cases: Cases) -> Gate:
+    """Check the simulator on known cases, once per process for the same settings."""
+    return Gate(cases.checks(), versions()["mujoco"])
+
+
+def two_digits(value: float) -> float:
+    """Round to two digits, so that what is nearly alike shares one measurement."""
+    return float(f"{value:.1e}")
+
+
 def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
@@ -522,18 +550,7 @@ def require_faithful(
 def measured_gate(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
-    """Check the simulator on known cases, once per process for the same settings."""
+    """Check the simulator on the known cases of closure trials."""
     fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
     setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
-    # Two digits of the radius let objects of nearly the same size share one measurement.
-    return _measured(Case(setup, friction, float(f"{radius_m:.1e}")))
-
-
-@lru_cache(maxsize=256)
-def _measured(case: Case) -> Gate:
-    pads = replace(case, setup=replace(case.setup, surface="pads"))  # controls are always on pads
-    checks = known_answers(pads)
-    if case.setup.surface == "mesh":
-        meshes = (*mesh_touches(case), *known_answers(case))
-        checks += tuple(replace(check, name=f"on a mesh: {check.name}") for check in meshes)
-    return Gate(checks, versions()["mujoco"])
+    return measured(Case(setup, friction, two_digits(radius_m)))

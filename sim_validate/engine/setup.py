@@ -10,14 +10,13 @@ from typing import Annotated, Any
 import numpy as np
 
 from grasp_core.arrays import Wrench, frozen_copy, to_digits
-from grasp_core.checked import LARGEST, SMALLEST
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import Range, Seed
+from grasp_core.kinds import LARGEST, SMALLEST, Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.settings import CHOSEN, named

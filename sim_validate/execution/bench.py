@@ -1,8 +1,28 @@
-"""Simulates held objects under drives, and returns their motions and contact forces.
+"""Simulates held objects under drives, and says what their motions and contact forces mean.
 
 All trials of a scene run together. The palm is moved by forces: armature times the acceleration
 that its path asks for. MuJoCo's bodies of motion capture would have no velocity, so the bases of
 the fingers would not carry what they hold along.
+
+A motion says how far contacts slipped, how far the object moved, and when that began. Everything
+is seen from the palm. In the object's frame the centre of tip i is u_i. A fingertip that turns
+against the object by dt since the last sample, as one on springs does when the object turns by -dt,
+rolls on it, so with the inward normal n_i the point of contact slides on the object by the
+tangential part of
+
+    du_i + rho_i dt x n_i.                                                                (1)
+
+The load of first slip is taken from the contact forces. They are (n, t) at rest and change by
+(a, b), in the frames of the contacts, so a load that is larger by the factor s would change them by
+s (a, b) as long as motions are small. The least s that brings a contact to its cone, times the
+share of the load that is applied, is the multiple of the load at which the first contact slips. It
+is taken in the sample before the first contact is on its cone. If none ever is, the least of all
+samples under the full load says how far away slip stayed.
+
+An object that leaves a table rocks on its last edge and rings, so that a contact may touch its cone
+for some milliseconds, slide by micrometres, and hold. Such a touch is no slip: a row of samples on
+the cone counts only if the contact slides by more than `TOUCHED` in it, or if the row reaches the
+full load.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -10,18 +30,19 @@ the fingers would not carry what they hold along.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices, cross
 from grasp_core.errors import InputError
-from scenes.mujoco.held import hinged, rotations
+from grasp_core.execution.first_slip import slip_steps
+from scenes.mujoco.held import HeldLayout, hinged, rotations
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, palm_armature
 from scenes.mujoco.mjcf_text import quaternion
-from scenes.mujoco.silent_mujoco import unlogged
-from sim_validate.engine.bench import batch, compiled, faults, mujoco, step, touched
+from sim_validate.engine.bench import Health, batch, compiled, mujoco, stepped, touched
 from sim_validate.execution.paths import WHOLE, Drive, Table
 
 FREE, PALM = 6, 12
@@ -56,7 +77,7 @@ class HeldMotion:
     """Force of the table on the object, (n, 3) [N]; other loads are taken away."""
     states: Array
     """Complete state of the simulator, from which a trial can go on, (n, size)."""
-    faults: tuple[str, ...]
+    health: Health
     tip_turns: Array | None
     """Orientations of the fingertips as the palm sees them, (n, k, 3, 3); None where they do not
     turn."""
@@ -67,7 +88,7 @@ class HeldMotion:
         return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
 
 
-SERIES = tuple(each.name for each in fields(HeldMotion) if each.name != "faults")
+SERIES = tuple(each.name for each in fields(HeldMotion) if each.name != "health")
 """Fields of a motion that have a row for each sample, where they are known."""
 
 
@@ -77,14 +98,14 @@ def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
     for name in SERIES:
         parts = getattr(first, name), getattr(second, name)
         both[name] = None if parts[0] is None else np.concatenate(parts)
-    return HeldMotion(**both, faults=first.faults + second.faults)
+    return HeldMotion(**both, health=second.health.after(first.health))
 
 
 def begun_motion(motion: HeldMotion, count: int) -> HeldMotion:
     """Return the first samples of a motion, as if nothing had gone wrong after them."""
     rows = ((name, getattr(motion, name)) for name in SERIES)
     first: dict[str, Any] = {name: None if own is None else own[:count] for name, own in rows}
-    return HeldMotion(**first, faults=())
+    return HeldMotion(**first, health=Health())
 
 
 class HeldBench:
@@ -158,67 +179,57 @@ class HeldBench:
     def _stepped(
         self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence[tuple[float, float]]
     ) -> tuple[HeldMotion, ...]:
-        lengths = np.array([len(drive) for drive in drives])
-        most = int(lengths.max())
-        loads, motors, commands = self._applied(drives, most)
-        applied, palm = trials.bind("xfrc_applied"), trials.bind("qfrc_applied")
-        servos, pushed = trials.bind("ctrl"), trials.bind("qfrc_constraint")
-        joints, rates = trials.bind("qpos"), trials.bind("qvel")
-        moved, speeds, forces, states = (
-            np.zeros((len(drives), most, each.shape[1]))
-            for each in (joints, rates, pushed, trials.state)
-        )
-        errors: dict[int, str] = {}
-        lost = np.zeros(len(drives), dtype=bool)
+        lengths = [len(drive) for drive in drives]
+        loads, motors, commands = self._applied(drives, max(lengths))
+        joints, lost = trials.bind("qpos"), np.zeros(len(drives), dtype=bool)
         most_m, most_rad = np.transpose(limits)
         least_cosine = np.cos(np.minimum(most_rad, math.pi))
         turns_count = bool((least_cosine > -1.0).any())
-        with unlogged():
-            for sample in range(most):
-                going = np.flatnonzero((lengths > sample) & ~lost)
-                if not len(going):
-                    break
-                applied[:, self.body] = loads[sample]
-                palm[:, FREE:PALM] = motors[sample]
-                servos[:] = commands[sample]
-                step(trials, errors, self.chunk, going)
-                moved[going, sample] = joints[going]
-                speeds[going, sample] = rates[going]
-                forces[going, sample] = pushed[going]
-                states[going, sample] = trials.state[going]
-                with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
-                    away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
-                    gone = away > most_m[going]
-                    if turns_count:
-                        gone |= _cosines(joints[going]) < least_cosine[going]
-                for trial in going[gone]:
-                    lost[trial] = True
-                    moved[trial, sample:] = joints[trial]
-                    forces[trial, sample:] = 0.0
+
+        def following(going: Indices, samples: Indices) -> Indices:
+            with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
+                away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
+                gone = away > most_m[going]
+                if turns_count:
+                    palm = hinged(joints[going, 10 : PALM + 1]).transpose(0, 2, 1)
+                    gone |= cosines(palm @ rotations(joints[going, 3:7])) < least_cosine[going]
+            lost[going] = gone
+            return np.where(gone, max(lengths), samples + 1)
+
+        told = [
+            (trials.bind("xfrc_applied")[:, self.body], loads),
+            (trials.bind("qfrc_applied")[:, FREE:PALM], motors), (trials.bind("ctrl"), commands),
+        ]  # fmt: skip
+        kept = [joints, trials.bind("qvel"), trials.bind("qfrc_constraint"), trials.state]
+        done = stepped(self.model, trials, self.chunk, told, kept, lengths, following)
+        moved, speeds, forces, states = done.series
+        for trial in np.flatnonzero(lost):  # it stays where it was lost
+            last = done.counts[trial] - 1
+            moved[trial, last:], forces[trial, last:] = moved[trial, last], 0.0
         return tuple(
             self._motion(
                 moved[trial, :length], speeds[trial, :length], forces[trial, :length],
-                states[trial, :length], faults(trials, trial, errors.get(trial, "")),
+                states[trial, :length], done.health[trial],
             )
             for trial, length in enumerate(lengths)
         )  # fmt: skip
 
     def _applied(self, drives: Sequence[Drive], most: int) -> tuple[Array, Array, Array]:
-        """Return loads, forces of the palm and commands, by sample and trial; zero after an end."""
+        """Return loads, forces of the palm and commands, (trials, n, ...); zero after an end."""
         layout = self.scene.layout
-        loads = np.zeros((most, len(drives), 6))
-        motors = np.zeros((most, len(drives), PALM - FREE))
-        commands = np.zeros((most, len(drives), self.model.nu))
+        loads = np.zeros((len(drives), most, 6))
+        motors = np.zeros((len(drives), most, PALM - FREE))
+        commands = np.zeros((len(drives), most, self.model.nu))
         for place, drive in enumerate(drives):
             n = len(drive)
-            loads[:n, place] = drive.wrenches
-            loads[:n, place, :3] += layout.object_kg * (drive.gravity - layout.gravity)
-            motors[:n, place] = drive.accelerations * palm_armature(layout)
-            commands[:n, place] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
+            loads[place, :n] = drive.wrenches
+            loads[place, :n, :3] += layout.object_kg * (drive.gravity - layout.gravity)
+            motors[place, :n] = drive.accelerations * palm_armature(layout)
+            commands[place, :n] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
         return loads, motors, commands
 
     def _motion(
-        self, joints: Array, speeds: Array, forces: Array, states: Array, faults: tuple[str, ...]
+        self, joints: Array, speeds: Array, forces: Array, states: Array, health: Health
     ) -> HeldMotion:
         # where the simulator diverges: what is beyond all bounds has no cosine and no square
         joints, speeds, forces = (
@@ -239,13 +250,12 @@ class HeldBench:
         finger_forces = np.einsum("kij,nkj->ni", layout.axes, contact)
         return HeldMotion(
             joints[:, :3], joints[:, 3:7], palm, fingers, tips, contact, pressed,
-            forces[:, :3] - finger_forces, states, faults, turns,
+            forces[:, :3] - finger_forces, states, health, turns,
         )  # fmt: skip
 
 
-def _cosines(joints: Array) -> Array:
-    """Return the cosines of the object's turns against the palm, (n,)."""
-    turned = hinged(joints[:, 10 : PALM + 1]).transpose(0, 2, 1) @ rotations(joints[:, 3:7])
+def cosines(turned: Array) -> Array:
+    """Return the cosines of the angles of rotations, (n,)."""
     return 0.5 * (np.einsum("nii->n", turned) - 1.0)
 
 
@@ -256,3 +266,172 @@ def facing(table: Table) -> Array:
     first = np.cross(aside, normal)
     first /= np.linalg.norm(first)
     return np.column_stack([first, np.cross(normal, first), normal])
+
+
+ON_CONE = 0.9995
+"""Tangential force, relative to friction times normal force, at which a contact counts as on its
+cone: the simulator's contacts approach it within as much."""
+SLID = 2e-3
+"""Distance that counts as slipped, in object radii: between two samples a contact may slip and
+hold again, and rolling over large turns is known to about a tenth of it."""
+TOUCHED = 1e-4
+"""Distance that a contact on its cone may slide while an object leaves a table and still count as
+held, in object radii: contacts that stick creep by a twentieth of it in a lift."""
+IDLE = 1e-3
+"""Normal force at rest, relative to the largest, below which a fingertip does not push."""
+FULL = 0.999
+"""Share of the load above which it is all there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """A motion as the palm sees it, in each of n samples."""
+
+    moved: Array
+    """Displacement of the object's centre of mass, (n, 3) [m]."""
+    turned: Array
+    spun: Array
+    """Orientations of the fingertips in the object's frame, (n, k, 3, 3), or (n, 1, 3, 3) where
+    they turn alike."""
+    tips: Array
+    """Centres of the fingertips in the object's frame, (n, k, 3) [m]."""
+    forces: Array
+    """Contact forces on the object in the frames of the contacts, which turn with it, (n, k, 3)
+    [N]: normal, tangent, tangent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of an object in one trial, against its place when the trial began.
+
+    The figures are those of `ExecutionTrial`.
+    """
+
+    slip_m: float
+    displacement_m: float
+    turn_rad: float
+    dropped: bool
+    slipped: bool
+    """Whether a contact slipped: one was on its cone, or slid by more than `SLID`."""
+    first_slip: float
+    """Multiple of the trial's load at which the first contact slips; at most one if one did."""
+
+
+def seen(motion: HeldMotion, layout: HeldLayout) -> Seen:
+    """Look at a motion from the palm and from the object."""
+    palm = hinged(motion.palm[:, 3:])
+    turned = palm.transpose(0, 2, 1) @ rotations(motion.turned)
+    moved = np.einsum("nji,nj->ni", palm, motion.moved - motion.palm[:, :3])
+    centers = layout.tip_centers + np.einsum("kij,nkj->nki", layout.axes, motion.tips)
+    tips = np.einsum("nji,nkj->nki", turned, centers - moved[:, None])
+    along = np.einsum("kij,nkj->nki", layout.axes, motion.forces)
+    own = np.einsum("nji,nkj->nki", motion.pressed, along)
+    back: Array = turned.transpose(0, 2, 1)[:, None]
+    spun = back if motion.tip_turns is None else back @ motion.tip_turns
+    return Seen(moved, turned, spun, tips, np.einsum("kij,nki->nkj", layout.frames, own))
+
+
+def outcome(
+    motion: HeldMotion, layout: HeldLayout, drive: Drive, friction: Array, begun: int = 0
+) -> Outcome:
+    """Say what became of the object since a sample of a trial."""
+    found = seen(motion, layout)
+    turned = cosines(found.turned[begun:] @ found.turned[begun].T)
+    touching = found.forces[-1, :, 0] > 0.0
+    slid = float(slides(found, layout, begun).max(initial=0.0))
+    leaving = None if drive.table is None else _slid(found, layout, begun) / layout.radius_m
+    multiple = _first_slip(found, drive.shares, friction, begun, leaving)
+    slipped = multiple <= 1.0 or slid > SLID * layout.radius_m
+    return Outcome(
+        slip_m=slid,
+        displacement_m=float(
+            np.linalg.norm(found.moved[begun:] - found.moved[begun], axis=1).max()
+        ),
+        turn_rad=float(np.arccos(np.clip(turned, -1.0, 1.0)).max()),
+        dropped=not touching.any(),
+        slipped=slipped,
+        first_slip=min(multiple, 1.0) if slipped else multiple,
+    )
+
+
+def slides(found: Seen, layout: HeldLayout, begun: int = 0) -> Array:
+    """Return how far each point of contact has slid by (1) since a sample, (n, k) [m]."""
+    return np.linalg.norm(_slid(found, layout, begun), axis=2)
+
+
+def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
+    """Return the displacement of each point of contact by (1) since a sample, (n, k, 3) [m]."""
+    normals = layout.frames[:, :, 0]
+    steps = np.diff(found.tips[begun:], axis=0)
+    spun = found.spun[begun:]
+    change: Array = spun[:-1] @ spun[1:].transpose(0, 1, 3, 2)  # its axis is that of minus dt
+    turns = 0.5 * np.stack(
+        [change[..., 2, 1] - change[..., 1, 2], change[..., 0, 2] - change[..., 2, 0],
+         change[..., 1, 0] - change[..., 0, 1]], axis=-1,
+    )  # fmt: skip
+    rolled = layout.tip_radius_m[:, None] * cross(turns, normals)
+    slid = steps - rolled
+    slid -= np.einsum("nki,ki->nk", slid, normals)[..., None] * normals
+    return np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
+
+
+def first_trouble(motion: HeldMotion, layout: HeldLayout, friction: Array, begun: int) -> int:
+    """Return the first sample in which a contact slips or opens, or the simulator fails; else n."""
+    found = seen(motion, layout)
+    on_cone = _on_cone(found, friction, begun)[1].any(axis=1)
+    troubled = np.flatnonzero(on_cone | ~np.isfinite(motion.joints).all(axis=1))
+    return int(troubled[0]) if len(troubled) else len(motion.moved)
+
+
+def _on_cone(
+    found: Seen, friction: Array, begun: int
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which contacts push at rest, (k,), and when those slip or are open, (n, pushing)."""
+    rest_n = found.forces[begun, :, 0]
+    pushing = rest_n > IDLE * rest_n.max()  # a fingertip that pushes at nothing cannot slip
+    forces = found.forces[:, pushing]
+    across = np.linalg.norm(forces[..., 1:], axis=2)
+    on_cone = across >= ON_CONE * friction[pushing] * forces[..., 0]
+    on_cone[: begun + 1] = False
+    return pushing, on_cone
+
+
+def _first_slip(
+    found: Seen, shares: Array, friction: Array, begun: int, leaving: Array | None = None
+) -> float:
+    pushing, on_cone = _on_cone(found, friction, begun)
+    if not pushing.any():
+        return 0.0
+    found, friction = replace(found, forces=found.forces[:, pushing]), friction[pushing]
+    if leaving is not None:
+        on_cone[begun:] &= ~_touches(on_cone[begun:], shares[begun:], leaving[:, pushing])
+    slipping = on_cone.any(axis=1)
+    if not slipping.any():
+        loaded = np.flatnonzero(shares >= FULL)
+        return float(_extrapolated(found, shares, friction, begun, loaded).min(initial=np.inf))
+    at = int(np.argmax(slipping))
+    before, after = sorted((float(shares[at - 1]), float(shares[at])))
+    (multiple,) = _extrapolated(found, shares, friction, begun, np.array([at - 1]))
+    return min(max(float(multiple), before), after)
+
+
+def _touches(on_cone: NDArray[np.bool_], shares: Array, slid: Array) -> NDArray[np.bool_]:
+    """Return which samples on the cone only touch it before the full load comes, (n, k)."""
+    found = np.zeros_like(on_cone)
+    last = len(on_cone) - 1
+    for contact, own in enumerate(on_cone.T):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], own, [0]])))
+        for first, end in edges.reshape(-1, 2):
+            by = slid[min(end, last), contact] - slid[first - 1, contact]
+            little = np.linalg.norm(by) <= TOUCHED
+            found[first:end, contact] = little and shares[end - 1] < FULL
+    return found
+
+
+def _extrapolated(found: Seen, shares: Array, friction: Array, begun: int, at: Indices) -> Array:
+    """Return the multiple of the load at first slip as it is seen in samples `at`, (m,)."""
+    rest = found.forces[begun]
+    changes = (found.forces[at] - rest).reshape(-1, 3)
+    steps = slip_steps(np.tile(rest, (len(at), 1)), changes, np.tile(friction, len(at)))
+    least = steps.reshape(len(at), -1).min(axis=1)
+    return np.multiply(shares[at], least, out=np.full(len(at), np.inf), where=np.isfinite(least))

@@ -23,7 +23,7 @@ from grasp_core.values import Grasp
 from scenes import exports
 from scenes.settings import ScaledScene
 from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
-from sim_validate.execution.execute import ExecutionJob, chosen_squeeze, executed, held_scene
+from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
@@ -35,10 +35,9 @@ from sim_validate.execution.verdict import (
 )
 from sim_validate.kit import command_flags
 from sim_validate.kit.command_flags import Run
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, warn_of
+from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import asked_finger, asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
@@ -83,15 +82,15 @@ def execute_grasps(
         remove_results(folder, "executions")
     changed, count = physics or {}, len(saved.grasps)
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
-    results = reporter.counted(
-        "executing", executed(tasks, jobs), count, "survived", lambda each: each.survived
-    )
     about = AboutObject.of(saved.body)
 
     def collected(grasps: tuple[ExecutedGrasp, ...], *, complete: bool) -> Executions:
         return Executions(about, saved.friction, complete, settings, grasps)
 
-    found = finished(results, count, collected, folder and folder / Executions.FILE, reporter)
+    found = reporter.collected(
+        "executing", executed(tasks, jobs), count, ("survived", lambda each: each.survived),
+        collected, folder,
+    )  # fmt: skip
     _show(found, reporter)
     if not all(each.controls_let_go for each in found):
         return Exit.INTERNAL, found
@@ -264,13 +263,14 @@ def _held(command: command_flags.Scene, saved: Plan, friction: float, reporter: 
     settings = extended(ExecutionSettings, own)
 
     def text_of(grasp: Grasp) -> str:
-        best = chosen_squeeze(saved.body, grasp, friction, settings)
+        fingers = Fingertips(saved.body, grasp.contacts, friction)
+        best = fingers.squeeze(settings)
         if best.scale < 1.0:
             reporter.warn(
                 f"{grasp.id}: the squeeze is certified for {best.scale:.3g} of the weight only, so "
                 "the object may slip; use a smaller mass, or a larger --push-n"
             )
-        return held_scene(saved.body, best.grip, settings).xml
+        return fingers.scene(settings, best).xml
 
     return text_of
 

@@ -17,19 +17,20 @@ Several grasps of an object are executed in one process or in several, and their
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.checked import instance, one_of, switch, whole
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
-from grasp_core.errors import InputError, NoForcesError
+from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
+from grasp_core.kinds import Range, instance, one_of, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
@@ -42,25 +43,27 @@ from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
 from sim_validate.execution.bench import (
+    IDLE,
     HeldBench,
     HeldMotion,
+    Outcome,
     begun_motion,
+    cosines,
     facing,
+    first_trouble,
     motions_joined,
+    outcome,
 )
-from sim_validate.execution.controls import run_controls
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive, parted
 from sim_validate.execution.predictions import (
-    Choose,
+    Holder,
     NoSqueezeError,
-    SceneOf,
     found_enough,
-    held_dynamics,
+    planned,
     predicted_losses,
 )
-from sim_validate.execution.slips import IDLE, Outcome, first_trouble, outcome
-from sim_validate.execution.trials import Trial, trials_of
+from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
 from sim_validate.settings import ExecutionSettings
@@ -132,9 +135,9 @@ def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[
 
     Gives a distance [m] and an angle [rad].
     """
-    palm = hinged(motion.palm[begun : begun + 1, 3:])[0]
-    turned = palm.T @ rotations(motion.turned[begun : begun + 1])[0]
-    angle = math.acos(min(max(0.5 * (float(np.trace(turned)) - 1.0), -1.0), 1.0))
+    palm = hinged(motion.palm[begun : begun + 1, 3:]).transpose(0, 2, 1)
+    (cosine,) = cosines(palm @ rotations(motion.turned[begun : begun + 1]))
+    angle = math.acos(min(max(float(cosine), -1.0), 1.0))
     away = float(np.linalg.norm(motion.moved[begun] - motion.palm[begun, :3]))
     return settings.most_m + away, settings.most_rad + angle
 
@@ -180,22 +183,50 @@ def execute(
     settings = asked_settings("execute", settings, mass_kg, ExecutionSettings)
     if physics is not None:
         instance(physics, PhysicsSettings, "physics")
-    return execute_with(body, grasp, friction, settings, physics, threads=threads, enough=enough)
+    fingers = Fingertips(body, given_contacts(body, grasp), friction, physics)
+    return execution_of(fingers, settings.for_body(body), threads=threads, enough=enough)
 
 
-def execute_with(
-    body: Polyhedron, grasp: Grasp | Iterable[Contact], friction: ArrayLike,
-    settings: ExecutionSettings, physics: PhysicsSettings | Mapping[str, Any] | None, *,
-    threads: int, enough: bool,
-) -> Execution:  # fmt: skip
-    """Execute a grasp, with physics as they are or as some settings change them."""
-    settings, contacts = settings.for_body(body), given_contacts(body, grasp)
-    return execution_of(
-        body, settings,
-        lambda own, loads: chosen_squeeze(body, contacts, friction, own, loads),
-        lambda own, best: held_scene(body, best.grip, own, physics),
-        threads=threads, enough=enough,
-    )  # fmt: skip
+@dataclass(frozen=True, slots=True, eq=False)
+class Fingertips:
+    """Fingertips on springs, which hold an object by contacts (see `Holder`)."""
+
+    body: Polyhedron
+    contacts: Sequence[Contact]
+    friction: ArrayLike
+    physics: PhysicsSettings | Mapping[str, Any] | None = None
+    """Settings of the simulator, or those of the usual ones that differ, by name; None for the
+    usual ones."""
+
+    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
+        """Choose the squeeze that carries the most of the weight in any direction.
+
+        With loads it is the one of the least push that survives them, however hard fingers may
+        push.
+        """
+        best = best_squeeze(
+            self.body, self.contacts, self.friction, loads or any_direction(settings.object_kg),
+            max_push_n=settings.push_n if loads is None else None,
+            stiffness=settings.tip_stiffness_n_per_m,
+            tip_radius_m=tip_radius(self.body, self.contacts, settings),
+        )  # fmt: skip
+        if best.scale == 0.0:
+            raise NoForcesError(
+                "no squeeze carries any part of the weight in every direction; use other contacts "
+                "or more friction"
+            )
+        return best
+
+    def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
+        """Build the scene in which a squeeze is executed."""
+        build = partial(
+            build_held_scene, self.body, best.grip, settings,
+            reach_m=surface_reach(self.body, best.grip, settings),
+        )  # fmt: skip
+        if not isinstance(self.physics, Mapping):
+            return build(physics=self.physics)
+        usual = build()
+        return build(physics=replace(usual.physics, **self.physics)) if self.physics else usual
 
 
 def asked_settings(
@@ -214,34 +245,31 @@ def asked_settings(
 
 
 def execution_of(
-    body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf, *,
-    threads: int, enough: bool,
-) -> Execution:  # fmt: skip
+    holder: Holder, settings: ExecutionSettings, *, threads: int, enough: bool
+) -> Execution:
     """Choose the squeeze, simulate its trials, and find what would be enough if they are lost."""
-    whole(threads, "threads", least=1, most=MOST_THREADS)
-    switch(enough, "enough")
+    value_of(Annotated[int, Range(least=1, most=MOST_THREADS)], threads, "threads")
+    value_of(bool, enough, "enough")
     try:
-        best = choose(settings, None)
+        best = holder.squeeze(settings)
     except NoForcesError as error:
         if not enough:
             raise
-        answer = found_enough(body, settings, choose, scene_of)
-        raise NoSqueezeError(str(error), answer) from error
-    found = simulated(body, best, scene_of(settings, best), settings, threads)
+        raise NoSqueezeError(str(error), found_enough(holder, settings)) from error
+    found = simulated(holder, settings, best, threads)
     if found.survived or not found.trials or not enough:
         return found
-    return replace(found, enough=found_enough(body, settings, choose, scene_of))
+    return replace(found, enough=found_enough(holder, settings))
 
 
 def simulated(
-    body: Polyhedron, best: BestSqueeze, scene: HeldScene, settings: ExecutionSettings, threads: int
+    holder: Holder, settings: ExecutionSettings, best: BestSqueeze, threads: int
 ) -> Execution:
-    """Simulate the trials of a scene with the squeeze that was chosen for it, and judge each."""
+    """Simulate the trials of an execution with the squeeze that was chosen, and judge each."""
+    scene, dynamics, trials, skipped = planned(holder, settings, best)
     require_faithful_execution(scene.layout, scene.physics, settings, settings.push_n)
-    lost_m = max(LOST * body.radius, 2.0 * settings.most_m)
+    lost_m = max(LOST * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
-    dynamics = held_dynamics(best.grip, scene.layout)
-    trials, skipped = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
     predicted = predicted_losses(dynamics, trials, settings)
     return Execution(
         mass_kg=settings.object_kg,
@@ -253,28 +281,6 @@ def simulated(
         physics=scene.physics,
         tip_radius_m=best.grip.tip_radius_m,
     )
-
-
-def chosen_squeeze(
-    body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: ArrayLike,
-    settings: ExecutionSettings, loads: LoadSet | None = None,
-) -> BestSqueeze:  # fmt: skip
-    """Choose the squeeze that carries the most of the weight in any direction.
-
-    With loads it is the one of the least push that survives them, however hard fingers may push.
-    """
-    contacts = grasp.contacts if isinstance(grasp, Grasp) else grasp
-    best = best_squeeze(
-        body, contacts, friction, loads or any_direction(settings.object_kg),
-        max_push_n=settings.push_n if loads is None else None,
-        stiffness=settings.tip_stiffness_n_per_m, tip_radius_m=tip_radius(body, contacts, settings),
-    )  # fmt: skip
-    if best.scale == 0.0:
-        raise NoForcesError(
-            "no squeeze carries any part of the weight in every direction; use other contacts or "
-            "more friction"
-        )
-    return best
 
 
 def given_contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
@@ -291,20 +297,6 @@ def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: Executio
     if settings.tip_radius_m is not None:
         return settings.tip_radius_m
     return fitting_radius(body, *contact_arrays(*stacked(contacts)))
-
-
-def held_scene(
-    body: Polyhedron, grip: Grip, settings: ExecutionSettings,
-    physics: PhysicsSettings | Mapping[str, Any] | None = None,
-) -> HeldScene:  # fmt: skip
-    """Build the scene in which a grip is executed."""
-    if isinstance(physics, Mapping):
-        usual = held_scene(body, grip, settings)
-        if not physics:
-            return usual
-        physics = replace(usual.physics, **physics)
-    reach_m = surface_reach(body, grip, settings)
-    return build_held_scene(body, grip, settings, physics=physics, reach_m=reach_m)
 
 
 def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
@@ -368,14 +360,14 @@ def _judged(
     trial: Trial, motion: HeldMotion, predicted: tuple[float, float], bench: HeldBench,
     settings: ExecutionSettings,
 ) -> ExecutionTrial:  # fmt: skip
-    if motion.faults:
+    if motion.health.fault:
         found = DIVERGED
     else:
         layout = bench.scene.layout
         found = outcome(motion, layout, trial.drive, layout.friction, trial.begun)
     kept = found.displacement_m <= settings.most_m and found.turn_rad <= settings.most_rad
     held = "slipped" if found.slipped else "stuck"
-    lost = "diverged" if motion.faults else "dropped"
+    lost = "diverged" if motion.health.fault else "dropped"
     return ExecutionTrial(
         kind=trial.kind,
         name=trial.name,
@@ -404,6 +396,11 @@ class ExecutionJob:
     threads: int = 1
     enough: bool = True
 
+    @property
+    def holder(self) -> Fingertips:
+        """The fingertips that execute it."""
+        return Fingertips(self.body, self.grasp.contacts, self.friction, self.physics)
+
 
 def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[ExecutedGrasp]:
     """Yield one result per job, in order; the number of processors does not change the results."""
@@ -415,15 +412,24 @@ def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[Executed
 def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
     """Execute one grasp; a grasp without a squeeze is a result with a reason."""
     grasp = job.grasp
-    about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)
+
+    def found() -> Execution:
+        check_on_faces(job.body, grasp)
+        return execution_of(job.holder, job.settings, threads=job.threads, enough=job.enough)
+
+    return result_of(grasp.id, grasp.family, grasp.contacts, found)
+
+
+def result_of(
+    name: str, family: str, contacts: Sequence[Contact], execution: Callable[[], Execution],
+    refused: tuple[type[GraspError], ...] = (NoForcesError,),
+) -> ExecutedGrasp:  # fmt: skip
+    """Execute contacts; what is refused is a result with a reason."""
+    about = name, family, contacts_sha256(contacts)
     try:
-        found = execute_with(
-            job.body, grasp, job.friction, job.settings, job.physics,
-            threads=job.threads, enough=job.enough,
-        )  # fmt: skip
-    except NoForcesError as error:
+        return ExecutedGrasp(*about, execution())
+    except refused as error:
         return ExecutedGrasp(*about, None, str(error), getattr(error, "enough", None))
-    return ExecutedGrasp(*about, found)
 
 
 FRAMES = 60
@@ -452,11 +458,8 @@ def worth_seeing(found: Execution) -> tuple[ExecutionTrial, ...]:
 
 def film(job: ExecutionJob, name: str, path: Path) -> Path:
     """Simulate one trial of an execution again and draw it."""
-    body, settings = job.body, job.settings
-    best = chosen_squeeze(body, job.grasp, job.friction, settings)
-    scene = held_scene(body, best.grip, settings, job.physics)
-    dynamics = held_dynamics(best.grip, scene.layout)
-    trials, _ = trials_of(body, scene.layout, settings, dynamics.lowest_frequency)
+    best = job.holder.squeeze(job.settings)
+    scene, _, trials, _ = planned(job.holder, job.settings, best)
     named = {trial.name: trial for trial in trials}
     one_of(name, tuple(named), "name")
     (motion,) = run_trials(HeldBench(scene), [named[name]])

@@ -37,18 +37,16 @@ surface, so each contact must carry its own.
 import importlib
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import SMALLEST
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.kinds import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.fingertips import fitting_radius
@@ -56,11 +54,19 @@ from scenes.mujoco.held import HeldLayout
 from scenes.mujoco.held_mjcf import AWAY, SAMPLE_S, HeldScene, build_held_scene, held_physics
 from scenes.mujoco.scene_parts import TOUCH
 from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
-from sim_validate.engine.gate import DEPTH, Check, Gate, angles, near, sized, touch_checks
+from sim_validate.engine.gate import (
+    DEPTH,
+    Check,
+    angles,
+    measured,
+    near,
+    sized,
+    touch_checks,
+    two_digits,
+)
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench, HeldMotion
+from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome, seen, slides
 from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
-from sim_validate.execution.slips import SLID, outcome, seen, slides
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN
@@ -154,6 +160,11 @@ class HeldCase:
         squeeze = self.push * np.array([contact.normal for contact in contacts])
         return self.scene(sized("box", self.radius_m), contacts, squeeze, self.tip_radius_m)
 
+    def checks(self) -> tuple[Check, ...]:
+        """Measure all figures (see `Cases`)."""
+        faces = (*on_faces(self, "box"), *on_faces(self, "l-bracket"))
+        return (*held_box(self), *free_box(self), struck_box(self), *faces)
+
     def scene(
         self, body: Polyhedron, contacts: list[Contact], squeeze: Array, tip_radius_m: float
     ) -> HeldScene:
@@ -170,12 +181,12 @@ class HeldCase:
 
 def met(name: str, motion: HeldMotion, ratio: float) -> Check:
     """Check that a figure of a motion, over what is known in closed form, is one."""
-    return near(name, None if motion.faults else ratio, TOLERANCE)
+    return near(name, None if motion.health.fault else ratio, TOLERANCE)
 
 
 def little(name: str, motion: HeldMotion, value: float, most: float = TOLERANCE) -> Check:
     """Check that a figure of a motion is at most as large as it may be."""
-    return Check(name, math.nan if motion.faults else value, 0.0, most)
+    return Check(name, math.nan if motion.health.fault else value, 0.0, most)
 
 
 def require_faithful_execution(
@@ -183,7 +194,7 @@ def require_faithful_execution(
 ) -> None:
     """Check the simulator on known cases, and refuse settings under which a check fails."""
     for case in cases_of(layout, physics, hand, push_n):
-        measured_case(case).require("no grasp is executed")
+        measured(case).require("no grasp is executed")
 
 
 def cases_of(
@@ -197,22 +208,9 @@ def cases_of(
         "radius_m": layout.radius_m, "tip_radius_m": float(layout.tip_radius_m.max()),
         "tip_mass_kg": hand.tip_mass_kg, "damping_ratio": hand.damping_ratio,
     }  # fmt: skip
-    rounded = {name: _rounded(value) for name, value in numbers.items()}
-    frictions = sorted({_rounded(each) for each in layout.friction.tolist()})
+    rounded = {name: two_digits(value) for name, value in numbers.items()}
+    frictions = sorted({two_digits(each) for each in layout.friction.tolist()})
     return tuple(HeldCase(**rounded, friction=each, physics=upright) for each in frictions)
-
-
-@lru_cache(maxsize=256)
-def measured_case(case: HeldCase) -> Gate:
-    """Check the simulator on all known cases, once per process for the same settings."""
-    faces = (*on_faces(case, "box"), *on_faces(case, "l-bracket"))
-    checks = (*held_box(case), *free_box(case), struck_box(case), *faces)
-    return Gate(checks, versions()["mujoco"])
-
-
-def _rounded(value: float) -> float:
-    """Round to two digits, so that objects that are nearly alike share one measurement."""
-    return float(f"{value:.1e}")
 
 
 WINDOW = 0.03
@@ -495,7 +493,7 @@ def struck_box(case: HeldCase) -> Check:
     here, there = (seen(motion, scene.layout).moved for motion in motions)
     changed = float(np.abs(here - there).max()) / max(float(np.abs(there).max()), SMALLEST)
     name = "motion of a box struck off its fingers that short steps change, over the largest"
-    faulty = any(motion.faults for motion in motions)
+    faulty = any(motion.health.fault for motion in motions)
     return Check(name, math.nan if faulty else changed, 0.0, CHANGED)
 
 

@@ -24,8 +24,8 @@ from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.held_mjcf import SAMPLE_S
-from sim_validate.engine import schedules
-from sim_validate.engine.schedules import smooth
+from sim_validate.engine import bench
+from sim_validate.engine.bench import smooth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +127,7 @@ STOP_RISE_S = 0.02
 
 def samples(duration_s: float) -> int:
     """Return the whole number of samples nearest to a duration, at least one."""
-    return schedules.samples(duration_s, SAMPLE_S)
+    return bench.samples(duration_s, SAMPLE_S)
 
 
 def smoother(count: int) -> Array:

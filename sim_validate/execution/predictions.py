@@ -42,9 +42,9 @@ moves too far.
 
 import importlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -63,7 +63,7 @@ from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive
 from sim_validate.execution.trials import Trial, trials_of
-from sim_validate.execution.verdict import Enough
+from sim_validate.execution.verdict import Enough, Skipped
 from sim_validate.settings import ExecutionSettings
 
 POSE = 6
@@ -254,33 +254,53 @@ class NoSqueezeError(NoForcesError):
         self.enough = enough
 
 
-Choose = Callable[[ExecutionSettings, LoadSet | None], BestSqueeze]
-"""Chooses the squeeze of an execution with settings, or the least one that survives some loads."""
-SceneOf = Callable[[ExecutionSettings, BestSqueeze], HeldScene]
-"""Builds the scene in which a squeeze is executed."""
+class Holder(Protocol):
+    """What holds the object in an execution: fingertips on springs, or a hand."""
+
+    @property
+    def body(self) -> Polyhedron:
+        """Return the object."""
+        ...
+
+    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
+        """Choose the squeeze that carries most weight, or the least one that survives loads."""
+        ...
+
+    def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
+        """Build the scene in which a squeeze is executed."""
+        ...
 
 
-def found_enough(
-    body: Polyhedron, settings: ExecutionSettings, choose: Choose, scene_of: SceneOf
-) -> Enough:
+def planned(
+    holder: Holder, settings: ExecutionSettings, best: BestSqueeze
+) -> tuple[HeldScene, HeldDynamics, tuple[Trial, ...], tuple[Skipped, ...]]:
+    """Plan an execution: its scene and dynamics, its trials, and those that are left out."""
+    scene = holder.scene(settings, best)
+    dynamics = held_dynamics(best.grip, scene.layout)
+    trials = trials_of(holder.body, scene.layout, settings, dynamics.lowest_frequency)
+    return scene, dynamics, *trials
+
+
+def found_enough(holder: Holder, settings: ExecutionSettings) -> Enough:
     """Find the least push, and stiffness, that is enough for the trials of an execution."""
     kinds = ("shake along" if kind == "shake" else kind for kind in settings.trials)
     multiple = 1.0 + max(accelerations_g(settings)[kind] for kind in kinds)
     stiffness = settings.tip_stiffness_n_per_m
-    firm = FIRM * multiple * settings.object_kg * GRAVITY_M_PER_S2 / body.radius + stiffness
+    weight_n = settings.object_kg * GRAVITY_M_PER_S2
+    firm = FIRM * multiple * weight_n / holder.body.radius + stiffness
     try:  # what no push on firm fingertips survives, no push survives
-        _least(settings, firm, multiple, choose)
+        _least(holder, settings, firm, multiple)
     except NoForcesError as error:
         return Enough(multiple, reason=f"it is proved that {error}")
     except (InputError, SolverError) as error:
         return Enough(multiple, reason=str(error))
     found = None
     for _ in range(ROUNDS):
-        own = _stiff_enough(settings, (stiffness, firm), multiple, choose)
+        own = _stiff_enough(holder, settings, (stiffness, firm), multiple)
         if own is None:
             break
-        best = choose(own, None)
-        slip, loss = _predicted(body, own, best, scene_of(own, best).layout)
+        best = holder.squeeze(own)
+        slip, loss = _predicted(holder, own, best)
         found = Enough(best.scale, own.push_n, own.tip_stiffness_n_per_m, loss)
         if loss >= CLEAR:
             break
@@ -317,24 +337,25 @@ def _largest(values: Array) -> float:
 
 
 def _least(
-    settings: ExecutionSettings, stiffness: float, multiple: float, choose: Choose
+    holder: Holder, settings: ExecutionSettings, stiffness: float, multiple: float
 ) -> tuple[ExecutionSettings, BestSqueeze]:
     """Find the squeeze of least push for a multiple of the weight, and settings with that push."""
     given = stiffness == settings.tip_stiffness_n_per_m
     own = replace(settings, tip_stiffness_n_per_m=stiffness if given else _rounded_up(stiffness))
-    best = choose(own, any_direction(own.object_kg, (multiple - 1.0) * GRAVITY_M_PER_S2))
+    loads = any_direction(own.object_kg, (multiple - 1.0) * GRAVITY_M_PER_S2)
+    best = holder.squeeze(own, loads)
     return replace(own, push_n=_rounded_up(best.max_push_n)), best
 
 
 def _stiff_enough(
-    settings: ExecutionSettings, ends: tuple[float, float], multiple: float, choose: Choose
+    holder: Holder, settings: ExecutionSettings, ends: tuple[float, float], multiple: float
 ) -> ExecutionSettings | None:
     """Return the settings with the least stiffness between two that is enough, and its push."""
 
     def tried(stiffness: float) -> ExecutionSettings | None:
         try:
-            own, best = _least(settings, stiffness, multiple, choose)
-            choose(own, None)  # refused where rounding makes the grip unstable
+            own, best = _least(holder, settings, stiffness, multiple)
+            holder.squeeze(own)  # refused where rounding makes the grip unstable
         except (InputError, NoForcesError, SolverError):
             return None
         # the farthest that the loads move and turn the object
@@ -356,12 +377,11 @@ def _stiff_enough(
 
 
 def _predicted(
-    body: Polyhedron, settings: ExecutionSettings, best: BestSqueeze, layout: HeldLayout
+    holder: Holder, settings: ExecutionSettings, best: BestSqueeze
 ) -> tuple[float, float]:
     """Predict the multiples of first slip and of loss, of the trial that is lost first."""
-    dynamics = held_dynamics(best.grip, layout)
-    alike = replace(settings, misplacements=1)  # they all have the prediction of the weight
-    trials, _ = trials_of(body, layout, alike, dynamics.lowest_frequency)
+    # all misplacements have the prediction of the weight
+    _, dynamics, trials, _ = planned(holder, replace(settings, misplacements=1), best)
     found = predicted_losses(dynamics, trials, settings)
     if not found:
         return math.inf, math.inf

@@ -10,6 +10,20 @@ In `lift` the object rests on a table, on a face of its convex hull that carries
 the centre, dropped onto the face, lies inside. An object that is thrown and settles without sliding
 comes to rest on a face about as often as the solid angle says under which the centre of mass sees
 the face, so faces are tried in this order.
+
+Negative controls are grips that are weaker than chosen, under loads that must slip. The load w is
+the least of the certified set that makes a contact slip under the chosen squeeze. Weaker grips have
+less friction, less squeeze, or a finger that does not push. Most of them slip before all of w has
+come, but an object that turns far may be held longer than small motions say. `gc.first_slip`
+follows the large motions of the weaker grip, to a multiple s of w, and the load is the larger of w
+and a quarter more than s w.
+
+Where finger j leaves out its push p_j, the springs of all fingers share it. By (3) of `grips`, in
+small motions and with the elastic stiffness K alone,
+
+    f'_i = f_i - K_i W_i' x - [i = j] p_j,   K x = -W_j p_j.                              (1)
+
+Where (1) leaves a cone, a contact slides while the fingers close, and that counts as a slip.
 """
 
 import importlib
@@ -21,16 +35,24 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
-from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from grasp_core.closure.contacts import grasp_map
+from grasp_core.errors import InputError, SolverError
+from grasp_core.execution.first_slip import first_slip
+from grasp_core.execution.grips import Grip
+from grasp_core.execution.loads import GRAVITY_M_PER_S2, Reactions
+from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.solvers.ties import largest_first
-from scenes.mujoco.held import HeldLayout, rotations
+from grasp_core.solvers.ties import (largest_first)
+from scenes.mujoco.held import (HeldLayout, rotations)
+from grasp_core.objects.sheets import (solid_angles)
+from grasp_core.solvers.ties import (first_best, largest_first)
 from scenes.mujoco.mjcf_text import quaternion
 from scenes.mujoco.scene_parts import TOUCH
 from sim_validate.execution import paths
+from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome, seen, slides
 from sim_validate.execution.paths import Drive, Pose, Table, joined
-from sim_validate.execution.verdict import Skipped
+from sim_validate.execution.verdict import ExecutionControl, Skipped
 from sim_validate.settings import ExecutionSettings, TrialKind
 
 MET = 1e-7
@@ -138,7 +160,8 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
         triangles = points[hull.simplices[own]]
         # the origin, dropped along the normal, falls into one of the triangles
         if any(_is_inside(corners, normals[first]) for corners in triangles):
-            share = float(sum(_solid_angle(corners) for corners in triangles) / (4.0 * np.pi))
+            angles = solid_angles(triangles.transpose(2, 1, 0), np.zeros((1, 3)))
+            share = float(np.abs(angles).sum() / (4.0 * np.pi))
             found.append(Rest(normals[first], float(offsets[first]) * body.radius, share))
     order = largest_first([rest.likelihood for rest in found])
     return tuple(found[place] for place in order)
@@ -155,14 +178,6 @@ def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
 def _is_inside(corners: Array, normal: Array) -> bool:
     sides = np.cross(np.roll(corners, -1, axis=0) - corners, -corners) @ normal
     return bool((sides >= 0.0).all() or (sides <= 0.0).all())
-
-
-def _solid_angle(corners: Array) -> float:
-    """Return the solid angle of a triangle seen from the origin (Van Oosterom & Strackee 1983)."""
-    a, b, c = corners
-    x, y, z = np.linalg.norm(corners, axis=1)
-    along = x * y * z + (a @ b) * z + (b @ c) * x + (c @ a) * y
-    return float(abs(2.0 * np.arctan2(a @ np.cross(b, c), along)))
 
 
 AXES = ("x", "y", "z")
@@ -261,3 +276,110 @@ def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Tria
 
 def _side(sign: float, axis: int) -> str:
     return f"{'+' if sign > 0.0 else '-'}{AXES[axis]}"
+
+
+FRICTION = 0.9
+SQUEEZE = 0.9
+"""Friction and squeeze of the controls, relative to the trials'."""
+SURE = 1.25
+"""Load of a control, relative to that at which the analysis says that it slips: fingertips that
+roll to an edge of their face hold up to a tenth more."""
+FOLLOWED = 12.0
+"""Duration of a rise that the held object follows, in reciprocals of its lowest frequency."""
+LONGEST_RISE_S = 10.0
+"""Longest rise that is simulated: objects of tonnes on soft springs would take minutes [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weaker:
+    """A grip that is weaker than chosen, and the load under which it must slip."""
+
+    name: str
+    friction: Array
+    pushing: Array
+    """Share of its command that each finger pushes with, (k,)."""
+    load: Array
+    idle: bool = False
+    """Whether a finger does not push, so that a slide while the others close counts as well."""
+
+
+def run_controls(
+    bench: HeldBench, best: BestSqueeze, lowest_frequency: float
+) -> tuple[ExecutionControl, ...]:
+    """Simulate the weaker grips under loads that grow slowly and must make a contact slip."""
+    layout = bench.scene.layout
+    rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
+    share = paths.smooth(paths.samples(rise_s))
+    closing, loading = paths.closing(), paths.loaded(share, np.zeros(3))
+    weaker, drives = tuple(weaker_grips(best, layout)), list[Drive]()
+    for each in weaker:
+        drive = joined(closing, replace(loading, wrenches=share[:, None] * each.load))
+        drives.append(replace(drive, grasping=np.outer(drive.grasping, each.pushing)))
+    motions = bench.run(drives, friction=np.array([each.friction for each in weaker]))
+    return tuple(
+        _judged(each, motion, layout, drive, len(closing) - 1)
+        for each, motion, drive in zip(weaker, motions, drives, strict=True)
+    )
+
+
+def _judged(
+    weaker: Weaker, motion: HeldMotion, layout: HeldLayout, drive: Drive, begun: int
+) -> ExecutionControl:
+    """Say whether a contact slipped under the load, or while fingers closed and one was idle."""
+    found = outcome(motion, layout, drive, weaker.friction, begun)
+    if weaker.idle:
+        closing = slides(seen(motion, layout), layout)[: begun + 1]
+        if float(closing.max()) > SLID * layout.radius_m:
+            return ExecutionControl(weaker.name, let_go=True, first_slip=0.0)
+    return ExecutionControl(weaker.name, found.slipped, found.first_slip)
+
+
+def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
+    """Yield the weaker grips of a chosen squeeze, with their loads."""
+    grip, load = best.grip, slipping_load(best)
+    all_push = np.ones(len(grip.friction))
+    little = replace(grip, friction=FRICTION * grip.friction)
+    yield Weaker(f"friction {FRICTION:g}", little.friction, all_push, _sure(little, load) * load)
+    loose, pushing = grip.squeezed(SQUEEZE * grip.squeeze), SQUEEZE * all_push
+    yield Weaker(f"squeeze {SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
+    strongest = first_best(layout.pushes.max(axis=1))
+    others_push = all_push.copy()
+    others_push[strongest] = 0.0
+    left = idle(grip, strongest, layout.axes[strongest] @ layout.pushes[strongest])
+    name = "a finger that does not push"
+    yield Weaker(name, grip.friction, others_push, _sure(left, load) * load, True)
+
+
+def _sure(weaker: Grip, load: Array) -> float:
+    """Return the multiple of a load, at least one, that makes a weaker grip slip by analysis.
+
+    It is one where the grip slips at rest already, is unstable, never slips by analysis, or cannot
+    be followed; then nothing shows that the load suffices.
+    """
+    try:
+        found = first_slip(weaker, load)
+    except (InputError, SolverError):
+        return 1.0
+    return max(1.0, SURE * found.multiple) if np.isfinite(found.multiple) else 1.0
+
+
+def idle(grip: Grip, finger: int, push: Array) -> Grip:
+    """Return the squeeze that is left by (1) where a finger does not push."""
+    maps = grasp_map(grip.arms).reshape(len(grip.elastic_stiffness), -1, 3).transpose(1, 0, 2)
+    motion = np.asarray(np.linalg.solve(grip.elastic_stiffness, -maps[finger] @ push), dtype=float)
+    squeeze = grip.squeeze - np.einsum("kij,kmj,m->ki", grip.stiffness, maps, motion)
+    squeeze[finger] -= push
+    return grip.squeezed(squeeze)
+
+
+def slipping_load(best: BestSqueeze) -> Array:
+    """Return the least load of a set that makes a contact slip, (6,) [N, N m].
+
+    It is larger than the worst certified load where a finger reaches its largest push before any
+    contact slips: the simulated fingers push as hard as their springs do.
+    """
+    reactions = Reactions.of(best.grip, best.loads)
+    angles, scales = reactions.worst_angles()
+    contact = first_best(-scales)
+    direction = reactions.worst_of(contact, float(angles[contact]))
+    return best.loads.offset + float(scales[contact]) * best.loads.axes @ direction

@@ -7,20 +7,19 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from grasp_core.arrays import Array, Shape
-from grasp_core.checked import path_of
-from grasp_core.declared import Declared, FieldError
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.figures import Compared, Shown, cell, figure, less, more, scalars
-from grasp_core.files.records import FLAT, UNRECORDED, Key, RecordFile, recorded
-from grasp_core.grasp_tables import ById, frame_of
-from grasp_core.kinds import Friction, OrInfinity, Quantity
+from grasp_core.figures import Compared, Shown, cell, figure, less, more
+from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
+from grasp_core.kinds import FieldError, OrInfinity, Quantity, path_of
 from grasp_core.provenance import versions
 from grasp_core.solvers.ties import first_best
-from scenes.settings import PhysicsSettings
-from sim_validate.kit.files import AboutObject
+from scenes.settings import (PhysicsSettings)
+
+from sim_validate.kit.files import (AboutGrasps)
 from sim_validate.settings import ExecutionSettings, TrialKind
 
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]
@@ -323,20 +322,12 @@ class ExecutedGrasp(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Executions(RecordFile, ById[ExecutedGrasp]):
-    """The executions of an object's grasps, as `executions.json` holds them.
-
-    They are a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
-    """
+class Executions(AboutGrasps[ExecutedGrasp]):
+    """The executions of an object's grasps, as `executions.json` holds them."""
 
     FILE = "executions.json"
     SCHEMA = 2
 
-    object: AboutObject
-    friction: Friction
-    """Coulomb coefficient that was simulated."""
-    complete: bool
-    """Whether every grasp that was asked for was executed."""
     settings: ExecutionSettings
     """How they were executed, with the impulse of a knock that was used."""
     grasps: Annotated[tuple[ExecutedGrasp, ...], Key("executions")]
@@ -345,11 +336,6 @@ class Executions(RecordFile, ById[ExecutedGrasp]):
 
     def _check_together(self) -> None:
         object.__setattr__(self, "settings", self.settings.used)
-
-    @property
-    def object_sha256(self) -> str:
-        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
-        return self.object.content_sha256
 
     @recorded
     def summary(self) -> Mapping[str, int]:
@@ -366,17 +352,6 @@ class Executions(RecordFile, ById[ExecutedGrasp]):
             "controls": controls,
             "controls_let_go": controls - sum(len(each.controls_held) for each in found),
         }
-
-    def to_dataframe(self) -> Any:
-        """Return a `pandas.DataFrame` with a row for each grasp, indexed by its id.
-
-        It has a column for each figure of an execution that is a number or a word; of trials and
-        controls, how many there are. Figures are NaN where no squeeze holds the object.
-
-        Raises:
-            InputError: The library pandas is not installed.
-        """
-        return frame_of([scalars(each) for each in self.grasps], [each.id for each in self.grasps])
 
 
 def load_executions(path: str | Path) -> Executions:

@@ -31,7 +31,6 @@ from typing import Annotated, Any, TypeAlias, cast
 import numpy as np
 
 from grasp_core.arrays import Array, Shape, to_digits
-from grasp_core.checked import coefficient, instance, number, path_of, positive, text
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError, about
@@ -43,7 +42,7 @@ from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
-from grasp_core.kinds import Many, Quantity
+from grasp_core.kinds import Friction, Many, Quantity, instance, number, path_of, value_of
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
@@ -367,10 +366,10 @@ def dex_record(
         InputError: The pose is another hand's, or none was found.
     """
     stance = stance_of(uncoupled(hand, "a record of DexGraspBench"), reach)
-    positive(push_n, "push_n")
+    value_of(Quantity, push_n, "push_n")
     servo = hand_file(hand).servo_n_m_per_rad if servo_n_m_per_rad is None else servo_n_m_per_rad
-    positive(servo, "servo_n_m_per_rad")
-    text(object_path, "object_path")
+    value_of(Quantity, servo, "servo_n_m_per_rad")
+    value_of(str, object_path, "object_path")
     strong = hand.with_torque_limits(STRONG_N_M, "none: only levers are asked for")
     levers = hand_motors(strong, reach).levers
     normals = np.array([contact.normal for contact in stance.contacts])
@@ -381,7 +380,7 @@ def dex_record(
     root = np.concatenate([pose[:3, 3], quaternion(pose[:3, :3])])
     opened = stance.joints if reach.pregrasp is None else reach.pregrasp
     if gap_m is not None:
-        opened = _opened_by(stance, opened, positive(gap_m, "gap_m"))
+        opened = _opened_by(stance, opened, value_of(Quantity, gap_m, "gap_m"))
     return DexRecord(
         object_path, 1.0, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
         *(np.concatenate([root, joints]) for joints in (opened, stance.joints,
@@ -434,9 +433,9 @@ def reach_of_record(
     instance(record, DexRecord, "record", "load_dex_record reads one")
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     number(touch_m, "touch_m", least=0.0, most=1.0)
-    text(name, "name")
+    value_of(str, name, "name")
     joints = record.grasp[FREE:]
     if len(joints) != len(hand.joints):
         raise InputError(

@@ -10,16 +10,22 @@ from typing import Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from grasp_core.kinds import (
-    Count,
     Direction,
-    Friction,
     HandClearance,
     Quantity,
     Seed,
     Starts,
     TorqueLimit,
 )
-from sim_validate.kit.command_flags import Jobs, ProtocolName, Spoken
+from sim_validate.kit.command_flags import (
+    AtFriction,
+    FirstOnly,
+    GraspId,
+    GraspsFile,
+    Jobs,
+    ProtocolName,
+    Spoken,
+)
 from sim_validate.kit.processes import available_cores
 
 HandName = Annotated[
@@ -43,12 +49,10 @@ class Hand(Spoken):
 class Reach(Spoken):
     """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
 
-    grasps: Positional[Path]
-    """A grasps.json."""
+    grasps: Positional[GraspsFile]
     hand: HandName = "allegro"
     fingertips: Fingertips = ""
-    grasp: str | None = None
-    """Id of the only grasp to look at."""
+    grasp: GraspId = None
     table: Annotated[Direction | None, arg(metavar="X Y Z")] = None
     """Downward direction in the object's frame: the object lies on a table across it, and the hand
     stays above the table."""
@@ -72,12 +76,10 @@ class Reach(Spoken):
     dexgraspbench: Path | None = None
     """Folder for records of DexGraspBench, one for each grasp that is reached, and for the object
     as it wants it, if that is convex."""
-    friction: Friction | None = None
-    """Coulomb coefficient to prove force closure with; if not given, the one planned for."""
+    friction: AtFriction = None
     seed: Seed = 0
     """Seed of the postures from which the search starts."""
-    limit: Count | None = None
-    """Look at the first so many grasps only."""
+    limit: FirstOnly = None
     jobs: Jobs = field(default_factory=available_cores)
     out: Path | None = None
     """Folder for reaches.json; if not given, no file is written."""

@@ -16,17 +16,16 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.figures import Shown
-from grasp_core.files.records import FLAT, RecordFile, recorded
-from grasp_core.grasp_tables import ById
+from grasp_core.files.records import FLAT, recorded
 from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import Direction, Friction, HandClearance, NotNegative, Seed, Starts
+from grasp_core.kinds import Direction, HandClearance, NotNegative, Seed, Starts
 from grasp_core.provenance import versions
 from grasp_core.settings import Settings
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.hands.validate_hand import HandVerdict
-from sim_validate.kit.files import AboutObject
+from sim_validate.hands.trials import HandVerdict
+from sim_validate.kit.files import AboutGrasps
 from sim_validate.settings import ExecutionSettings
 
 TOUCHING_M = 1e-4
@@ -103,20 +102,13 @@ class ReachedGrasp(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Reaches(RecordFile, ById[ReachedGrasp]):
-    """A hand in the grasps of an object, as `reaches.json` holds it.
-
-    It is a sequence, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
-    """
+class Reaches(AboutGrasps[ReachedGrasp]):
+    """A hand in the grasps of an object, as `reaches.json` holds it."""
 
     ITEMS = "reaches"
     FILE = "reaches.json"
     SCHEMA = 2
 
-    object: AboutObject
-    friction: Friction
-    complete: bool
-    """Whether every grasp that was asked for was looked at."""
     hand: Hand
     asked: ReachSettings
     execution: ExecutionSettings | None

@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from grasp_core.checked import MOST_COUNT
 from grasp_core.kinds import (
+    MOST_COUNT,
     Cases,
     Count,
     Direction,
@@ -40,6 +40,14 @@ Jobs = Annotated[Count, arg(help="Largest number of processes; results do not de
 ObjectName = Annotated[
     str, arg(help="A mesh file (obj, stl, ply, off, glb) or the name of a built-in object.")
 ]
+GraspsFile = Annotated[Path, arg(help="A grasps.json, as `plan` writes it.")]
+GraspId = Annotated[
+    str | None, arg(help="Id of the only grasp to take; if not given, all grasps are taken.")
+]
+AtFriction = Annotated[
+    Friction | None, arg(help="Coulomb coefficient; if not given, the one planned for.")
+]
+FirstOnly = Annotated[Count | None, arg(help="Take only this many grasps, from the first.")]
 Wrench = Annotated[tuple[float, float, float, float, float, float], Size()]
 ProtocolName = Literal[
     "dexgraspbench",
@@ -183,12 +191,9 @@ class Plan(Spoken):
 class Validate(Spoken):
     """Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must fail."""
 
-    grasps: Positional[Path]
-    """The grasps.json with the grasps to simulate."""
-    friction: Friction | None = None
-    """Coulomb coefficient to simulate with; if not given, the one planned for."""
-    limit: Count | None = None
-    """Simulate only this many grasps, from the first."""
+    grasps: Positional[GraspsFile]
+    friction: AtFriction = None
+    limit: FirstOnly = None
     seed: Seed | None = None
     """Seed of random wrenches and of moved contacts; if not given, the seed of the plan."""
     protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
@@ -204,14 +209,10 @@ class Validate(Spoken):
 class Execute(Spoken):
     """Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze."""
 
-    grasps: Positional[Path]
-    """The grasps.json with the grasps to execute."""
-    grasp: str | None = None
-    """Id of the grasp to execute; if not given, all grasps are executed."""
-    friction: Friction | None = None
-    """Coulomb coefficient to simulate with; if not given, the one planned for."""
-    limit: Count | None = None
-    """Execute only this many grasps, from the first."""
+    grasps: Positional[GraspsFile]
+    grasp: GraspId = None
+    friction: AtFriction = None
+    limit: FirstOnly = None
     seed: Seed | None = None
     """Seed of the directions of misplaced objects; if not given, the seed of the plan."""
     executing: Annotated[ChosenExecution, PLAIN] = field(default_factory=ChosenExecution)
@@ -231,12 +232,9 @@ class Scene(Spoken):
     gravity, as in the command `execute`.
     """
 
-    grasps: Positional[Path]
-    """The grasps.json with the grasps to write as scenes."""
-    grasp: str | None = None
-    """Id of the grasp to write; if not given, all grasps are written."""
-    friction: Friction | None = None
-    """Coulomb coefficient in the scene; if not given, the one planned for."""
+    grasps: Positional[GraspsFile]
+    grasp: GraspId = None
+    friction: AtFriction = None
     scaled: OmitArgPrefixes[ScaledScene] = field(default_factory=ScaledScene)
     holding: Annotated[Holding, PLAIN] = field(default_factory=Holding)
     out: Path | None = None
@@ -247,17 +245,14 @@ class Scene(Spoken):
 class Export(Spoken):
     """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
 
-    grasps: Positional[Path]
-    """The grasps.json with the grasps to write."""
+    grasps: Positional[GraspsFile]
     to: Literal["moveit", "gltf"]
     """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
     see docs/exports.md."""
     out: Annotated[Path, arg(aliases=("-o",))]
     """File to write, which ends in .yaml for moveit and .glb for gltf."""
-    grasp: str | None = None
-    """Id of the grasp to write; if not given, all grasps are written."""
-    limit: Count | None = None
-    """Write only this many grasps, from the first."""
+    grasp: GraspId = None
+    limit: FirstOnly = None
     fingertip_radius_m: Quantity | None = None
     """Radius of the fingertips [m]; if not given, the one planned for, or a tenth of the object's
     radius, or less if that does not fit."""
@@ -271,8 +266,7 @@ class View(Spoken):
     """The grasps.json with the grasp to show, or the folder of a run."""
     grasp: str | None = None
     """Id of the grasp to show; if not given, the first one."""
-    friction: Friction | None = None
-    """Coulomb coefficient; if not given, the one planned for."""
+    friction: AtFriction = None
     picture: Annotated[Path, Ending(PICTURES)] | None = None
     """Write the grasp as a picture like the paper's (svg, png)."""
     page: Annotated[Path, Ending(PAGES)] | None = None
@@ -306,14 +300,10 @@ class Report(Spoken):
 class Regions(Spoken):
     """Prove regions in which each finger may stand anywhere, whatever the others do."""
 
-    grasps: Positional[Path]
-    """The grasps.json whose contacts get regions."""
-    grasp: str | None = None
-    """Id of the grasp that gets regions; if not given, all grasps do."""
-    limit: Count | None = None
-    """Compute regions for only this many grasps, from the first."""
-    friction: Friction | None = None
-    """Coulomb coefficient of the proof; if not given, the one planned for."""
+    grasps: Positional[GraspsFile]
+    grasp: GraspId = None
+    limit: FirstOnly = None
+    friction: AtFriction = None
     certifying: Annotated[Certifying, PLAIN] = field(default_factory=Certifying)
     jobs: Jobs = field(default_factory=available_cores)
     out: Path | None = None
@@ -370,14 +360,12 @@ class Analyze(Spoken):
 class Transfer(Spoken):
     """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
 
-    grasps: Positional[Path]
-    """The grasps.json that was planned on the old part."""
+    grasps: Positional[GraspsFile]
     part: Positional[str]
     """The changed part, in the same frame: a mesh file (obj, stl, ply, off, glb) or the name of a
     built-in object."""
     carrying: Annotated[Carrying, PLAIN] = field(default_factory=Carrying)
-    friction: Friction | None = None
-    """Coulomb coefficient to judge with, before and after; if not given, the one planned for."""
+    friction: AtFriction = None
     lengths: Annotated[Lengths, PLAIN] = field(default_factory=Lengths)
     center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass of the changed part in the file's frame, in metres; if not given, that of

@@ -41,19 +41,6 @@ class Loops:
     """Calls for another process."""
 
 
-def _nearest() -> None:
-    least_distance(CONTACTS[0][:3], -np.ones((1, 3)))
-
-
-def _closure() -> None:
-    force_closure(*CONTACTS, FRICTION)
-    critical_friction(*CONTACTS)
-
-
-def _quality() -> None:
-    ferrari_canny(*CONTACTS, FRICTION, torque_scale=1.0)
-
-
 def _planned(*families: Family) -> None:
     plan(example_object("tetrahedron"), FRICTION, families=families)
 
@@ -109,7 +96,11 @@ PLANNING = Loops(
      "quality.ferrari_canny"),
     (partial(_planned, "concurrent", "pencil"),),
     # first what the other half needs late
-    (_nearest, _closure, partial(_planned, "regulus"), _quality),
+    (
+        partial(least_distance, CONTACTS[0][:3], -np.ones((1, 3))),
+        partial(force_closure, *CONTACTS, FRICTION), partial(critical_friction, *CONTACTS),
+        partial(_planned, "regulus"), partial(ferrari_canny, *CONTACTS, FRICTION, torque_scale=1.0),
+    ),
 )  # fmt: skip
 """What compiles the loops that plans need."""
 REACHING = Loops(

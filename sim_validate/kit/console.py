@@ -117,6 +117,28 @@ class Reporter:
                 yield result
                 steps.update(done, total, f"({good} {word})")
 
+    def collected(
+        self, title: str, results: Iterable[Result], total: int,
+        good: tuple[str, Callable[[Result], bool]], collect: Callable[..., File],
+        folder: Path | None = None,
+    ) -> File:  # fmt: skip
+        """Collect results in the record of a file, and write it even if the work is interrupted.
+
+        Shows how many of all have come, and how many of them are good, with the word for that.
+        Without a result nothing is written.
+        """
+        done = list[Result]()
+        try:
+            for result in self.counted(title, results, total, *good):
+                done.append(result)
+        finally:
+            complete = len(done) == total
+            found = collect(tuple(done), complete=complete)
+            if folder and done:
+                path = write_text(folder / found.FILE, found.text())
+                self.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
+        return found
+
     def progress(self, title: str) -> "Steps":
         """Show progress of long work: a bar on a terminal, plain lines elsewhere."""
         return Steps(title, self.err, shown=not self.quiet)
@@ -183,27 +205,6 @@ class Steps:
             if done > EARLIEST * total:
                 line += f", {(total - done) / rate:.0f} s left"
             self.console.print(Text(line), soft_wrap=True)
-
-
-def finished(
-    results: Iterable[Result], total: int, collect: Callable[..., File], path: Path | None,
-    reporter: Reporter,
-) -> File:  # fmt: skip
-    """Collect results in the record of a file, and write it even if the work is interrupted.
-
-    Without a result nothing is written.
-    """
-    done = list[Result]()
-    try:
-        for result in results:
-            done.append(result)
-    finally:
-        complete = len(done) == total
-        found = collect(tuple(done), complete=complete)
-        if path and done:
-            write_text(path, found.text())
-            reporter.say(f"wrote {path}" if complete else f"wrote what is done to {path}")
-    return found
 
 
 def warn_of(lines: Sequence[str], file: str, reporter: Reporter) -> None:

@@ -1,14 +1,18 @@
 """Reads and writes files: tables of TOML, paths that files name, arrays, and whole folders.
 
-An npz archive may claim any size, hold a name twice, or have members with wrong headers. Only
-arrays of numbers and truth values are read, with exactly as many bytes as their shapes need, and
-each is checked before much memory is used. Files and folders that are written are complete or
-absent.
+An npz archive may claim any size, or hold a name twice: that is checked before anything is read.
+Only arrays of numbers and truth values are read, and nothing in a file is executed. Files and
+folders that are written are complete or absent.
+
+A folder of results is kept whole: one command at a time writes to it, and removes old results. The
+folder itself is locked, without a lock file: the lock ends with the process, however that ends.
+Results that would contradict new ones are removed first, so that old and new results never mix,
+whatever ends a command. Files of other names are left alone.
 """
 
+import errno
 import fcntl
 import io
-import math
 import os
 import re
 import shutil
@@ -18,16 +22,29 @@ import zipfile
 from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path, PurePosixPath
-from typing import Any, Self
+from typing import Any, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
+from grasp_core.figures import scalars
 from grasp_core.files.json_text import DEEPEST, check_values, shown
-from grasp_core.files.text_files import SHOWN, UNFINISHED, read_bytes, read_text, write_parts
+from grasp_core.files.records import RecordFile
+from grasp_core.files.text_files import (
+    SHOWN,
+    UNFINISHED,
+    read_bytes,
+    read_text,
+    remove_unfinished,
+    write_parts,
+    write_text,
+)
+from grasp_core.grasp_tables import ById, Named, frame_of
+from grasp_core.kinds import Friction
 from grasp_core.objects.polyhedron import Polyhedron
 
 
@@ -45,6 +62,39 @@ class AboutObject(Declared):
     def of(cls, body: Polyhedron) -> Self:
         """Say which object this is."""
         return cls(body.name, body.source_sha256, body.content_sha256)
+
+
+Item = TypeVar("Item", bound=Named)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AboutGrasps(RecordFile, ById[Item]):
+    """Base of files about the grasps of an object.
+
+    They are sequences, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
+    """
+
+    object: AboutObject
+    friction: Friction
+    """Coulomb coefficient at every contact."""
+    complete: bool
+    """Whether every grasp that was asked for was dealt with."""
+
+    @property
+    def object_sha256(self) -> str:
+        """Hash of the object's canonical mesh, as in `Polyhedron.content_sha256`."""
+        return self.object.content_sha256
+
+    def to_dataframe(self) -> Any:
+        """Return a `pandas.DataFrame` with a row for each grasp, indexed by its id.
+
+        It has a column for each figure of a result that is a number or a word; of lists, how many
+        items they have. Figures are NaN where there is no result.
+
+        Raises:
+            InputError: The library pandas is not installed.
+        """
+        return frame_of([scalars(each) for each in self], [each.id for each in self])
 
 
 LONGEST = 500
@@ -74,6 +124,8 @@ def path_inside(folder: Path, name: str) -> Path:
 
 MOST_LETTERS = 2**20
 """Largest number of characters of a settings file, which is usually short."""
+MOST_SAID = 200
+"""Largest number of characters of what the parser says of a text."""
 ASIDE = re.compile(
     r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
     r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
@@ -98,20 +150,14 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         raise InputError(f"a key of the TOML file has more than {DEEPEST} parts; use shorter keys")
     try:
         found = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
     except RecursionError as error:
         raise InputError(
             "values of the TOML file are nested too deeply; use fewer levels"
         ) from error
-    except ValueError as error:  # numbers of thousands of digits, days that do not exist
-        raise InputError(f"the text is not TOML: {_printable(str(error))}") from error
+    except ValueError as error:  # numbers of thousands of digits and days that do not exist, too
+        raise InputError(f"the text is not TOML: {str(error)[:MOST_SAID]}") from error
     check_values(found)
     return found
-
-
-def _printable(text: str) -> str:
-    return "".join(letter if letter.isprintable() else " " for letter in text[:200])
 
 
 MOST_BYTES = 256 * 2**20
@@ -174,33 +220,15 @@ def _checked(listed: list[zipfile.ZipInfo]) -> dict[str, zipfile.ZipInfo]:
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDArray[Any]:
     with archive.open(member) as stream:
-        version = np.lib.format.read_magic(stream)
-        readers = {(1, 0): np.lib.format.read_array_header_1_0,
-                   (2, 0): np.lib.format.read_array_header_2_0}  # fmt: skip
-        if version not in readers:
+        found: NDArray[Any] = np.lib.format.read_array(
+            stream, allow_pickle=False, max_header_size=MOST_HEADER
+        )
+        if found.dtype.kind not in KINDS or stream.read(1):
             raise InputError(
-                f"{name}: expected an array in npy format 1.0 or 2.0, got {version}; save it again"
+                f"{name}: expected an array of numbers with nothing behind them, got one of "
+                f"{shown(str(found.dtype))}; save it again"
             )
-        shape, by_columns, dtype = readers[version](stream, max_header_size=MOST_HEADER)
-        if dtype.kind not in KINDS or dtype.subdtype is not None:
-            raise InputError(f"{name}: expected an array of numbers, got {shown(str(dtype))}")
-        size = math.prod(shape) * dtype.itemsize
-        if min(shape, default=0) < 0 or size > member.file_size:
-            raise InputError(
-                f"{name}: the array's shape {shown(str(shape))} does not fit its data; save it "
-                "again"
-            )
-        held = stream.read(size)
-        if len(held) < size or stream.read(1):
-            raise InputError(
-                f"{name}: the array does not hold as many numbers as its shape {shape} needs"
-            )
-    return np.ndarray(shape, dtype, held, order="F" if by_columns else "C")
-
-
-def write_lines(path: Path, lines: Iterable[str]) -> Path:
-    """Write lines as `write_text` does, one at a time; each ends with its own line break."""
-    return write_parts(path, (line.encode() for line in lines))
+    return found
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
@@ -251,4 +279,186 @@ def _locked(folder: Path) -> Generator[bool]:
             locked = False
         yield locked
     finally:
+        os.close(handle)
+
+
+REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
+STYLE = "style.css"
+STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
+BEST = ("best.json", "best-proof.npz")
+REACHES = "reaches.json"
+JUDGEMENTS = "judgements.json"
+Kind: TypeAlias = Literal["verdicts", "regions", "executions", "reaches", "judgements", "grasps"]
+FILES: dict[Kind, tuple[str, ...]] = {
+    "verdicts": ("verdicts.json",), "regions": ("regions.json",),
+    "executions": ("executions.json",), "reaches": (REACHES,), "judgements": (JUDGEMENTS,),
+    "grasps": ("transfer.json", "grasps.json", *BEST),
+}  # fmt: skip
+OF_EACH_GRASP: dict[Kind, tuple[str, str, bytes]] = {
+    "verdicts": ("traces", ".npz", b".times_s.npy"),
+    "regions": ("proofs", ".npz", b"object_sha256.npy"),
+    "grasps": ("scenes", ".xml", b"`graspproof scene"),
+}
+"""Folder, ending and distinctive bytes of those files of which each grasp has one."""
+PICTURES, CLIPS = "pictures", "clips"
+MARK = ".graspproof-report"
+MARKED = "The pages here were written by graspproof, which may replace them.\n"
+ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
+"""Pattern of a grasp's id, as plans name grasps; people give other ids to contacts of their own."""
+PAGES = ("", GRASPS, PICTURES, CLIPS)
+PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in PAGES))
+"""Subfolders into which commands write."""
+
+
+def remove_results(folder: Path, kind: Kind = "grasps") -> None:
+    """Remove results of one kind, and pages that show them; grasps take all other kinds along."""
+    remove_report(folder / REPORT)
+    for each in FILES if kind == "grasps" else (kind,):
+        _remove(folder / name for name in FILES[each])
+        if each in OF_EACH_GRASP:
+            part, suffix, mark = OF_EACH_GRASP[each]
+            _remove([
+                path for path in (folder / part).glob(f"*{suffix}")
+                if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
+            ])  # fmt: skip
+
+
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
+        path.unlink(missing_ok=True)
+
+
+def require_report_folder(folder: Path) -> None:
+    """Refuse to write pages into a folder that is neither empty nor a report."""
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
+        raise InputError(
+            f"{folder}: this folder holds other files than a report; give another --out"
+        )
+
+
+@contextmanager
+def new_pages(folder: Path) -> Generator[Path]:
+    """Yield the folder to write the pages of a report to.
+
+    That is the report's own folder if it has no pages. Otherwise it is one inside it, whose files
+    replace the old pages at the end, so that these stay if the new ones are not finished.
+    """
+    earlier = (folder / INDEX).is_file()
+    if not earlier:
+        remove_pages(folder)
+    write_text(folder / MARK, MARKED)
+    if not earlier:
+        try:
+            yield folder
+        except BaseException:
+            remove_report(folder)
+            raise
+        return
+    aside = Path(tempfile.mkdtemp(dir=folder, prefix=f".{REPORT}{UNFINISHED}"))
+    try:
+        yield aside
+        remove_pages(folder)
+        files = [path for path in aside.rglob("*") if path.is_file()]
+        for path in sorted(files, key=lambda each: each.name == INDEX):
+            place = folder / path.relative_to(aside)
+            place.parent.mkdir(exist_ok=True)
+            path.replace(place)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def remove_report(folder: Path) -> None:
+    """Remove a report, if there is one, and nothing else; its mark is removed last."""
+    if not (folder / MARK).is_file():
+        return
+    remove_pages(folder)
+    if [path.name for path in folder.iterdir()] == [MARK]:
+        (folder / MARK).unlink()
+        folder.rmdir()
+
+
+def remove_pages(folder: Path) -> None:
+    """Remove the pages of a report, the first page first; its mark stays."""
+    _remove(
+        chain(
+            (folder / name for name in (INDEX, *STATIC)),
+            folder.glob("object-*.js"),
+            folder.glob(f"{GRASPS}/*.html"),
+            folder.glob(f"{PICTURES}/*.svg"),
+            folder.glob(f"{CLIPS}/*.webp"),
+        )
+    )
+    for kind in (GRASPS, PICTURES, CLIPS):
+        part = folder / kind
+        if part.is_dir() and not any(part.iterdir()):
+            part.rmdir()
+
+
+@contextmanager
+def alone_in(folder: Path | None) -> Generator[None]:
+    """Lock a folder, making it if needed, and remove unfinished files of interrupted commands.
+
+    Enter this context before work begins, so that a folder that takes no files is refused at once,
+    and not after the work. Without a folder it does nothing.
+    """
+    if folder is None:
+        yield
+        return
+    handle, made = _taken(folder)
+    try:
+        for part in PARTS:
+            remove_unfinished(folder / part)
+        try:
+            yield
+        finally:
+            with suppress(OSError):  # a folder that holds something stays
+                for path in made:
+                    path.rmdir()
+    finally:
+        os.close(handle)
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make the folder, check that files can be written there, and list the new folders."""
+    try:
+        missing = [path for path in (folder, *folder.parents) if not path.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as stream:
+            stream.write(b"0")
+    except (FileExistsError, NotADirectoryError) as error:
+        raise InputError(
+            f"{error.filename}: exists and is not a folder; give another --out"
+        ) from error
+    except OSError as error:
+        raise InputError(
+            f"{folder}: no file can be written there ({error.strerror}); give another --out"
+        ) from error
+    return missing
+
+
+def _taken(folder: Path) -> tuple[int, list[Path]]:
+    """Open and lock a folder, making it if needed, and list the folders that are new.
+
+    The loop repeats if another command removes the folder between the two steps.
+    """
+    made = list[Path]()
+    while True:
+        made += _make(folder)
+        try:
+            handle = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:  # the command that had made it has just removed it
+            continue
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:  # a file system may have no locks: then its users take care
+                if error.errno == errno.EWOULDBLOCK:
+                    raise InputError(
+                        f"{folder}: another command is writing to it; wait, or give another --out"
+                    ) from error
+            if folder.exists() and os.path.samestat(os.fstat(handle), folder.stat()):
+                return handle, made
+        except BaseException:
+            os.close(handle)
+            raise
         os.close(handle)

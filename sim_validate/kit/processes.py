@@ -1,23 +1,32 @@
-"""Runs units of work in processes of this machine.
+"""Runs units of work in processes of this machine, or on a Ray or Dask cluster.
 
 Results do not depend on the number of processes: a unit sees only its own arguments.
 
 Some compiled libraries clear errors that are not their own, keyboard interrupts too, and the
 program would run on: interrupts are noted, and raised again at the next step. A request to end
 (SIGTERM) counts as one.
+
+Neither cluster repeats a unit by itself, because one place decides for all engines when to give up
+on a unit. Without `address`, Ray and Dask start workers on this machine and stop them afterwards.
 """
 
+import importlib
 import os
 import pickle
 import signal
+import socket
 import sys
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
 from types import FrameType
 from typing import Any, Generic, TypeVar
+
+from grasp_core.errors import InputError
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
@@ -131,3 +140,130 @@ def check_interrupted() -> None:
     if _noted.is_set():
         _noted.clear()
         raise KeyboardInterrupt
+
+
+OBJECT_STORE_BYTES = 200 * 2**20
+"""Size of the object store of a Ray started here; units and their rows go through files."""
+
+RAY_SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
+"""Settings under which Ray sends no usage statistics, and hides no GPU from other programs here."""
+
+RAY_ENDED = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError")
+ANY_PORT = "127.0.0.1:0"
+"""Address at which a Dask scheduler started here shows its state: for this machine only, at any
+free port."""
+ANSWER_S = 10.0
+"""Time that a scheduler may take to answer [s]."""
+
+
+@dataclass(slots=True)
+class Cluster:
+    """The worker processes of a cluster."""
+
+    workers: int
+    ended: tuple[str, ...]
+    """Names of the errors which say that a worker process died while it computed."""
+    submit: Callable[[Callable[[Any], Any], Any], "Future[Any]"]
+    """Calls a function with a unit on a worker process; the future fails if that process dies."""
+
+
+@contextmanager
+def ray_workers(workers: int, address: str | None) -> Generator[Cluster]:
+    """Start or join a Ray cluster."""
+    with _environment(RAY_SETTINGS):  # read when Ray is imported, and by the programs it starts
+        ray = _imported("ray", "ray")
+        where: dict[str, Any] = {"address": address} if address else {
+            "num_cpus": workers, "num_gpus": 0, "include_dashboard": False,
+            "object_store_memory": OBJECT_STORE_BYTES,
+        }  # fmt: skip
+        if address is not None:
+            _require_listener(address)
+        try:
+            ray.init(log_to_driver=False, configure_logging=False, **where)
+        except (ConnectionError, ValueError, RuntimeError, TimeoutError) as error:
+            raise InputError(
+                f"--address {address}: no Ray cluster answers there ({error})"
+            ) from error
+
+        @cache
+        def remote(function: Callable[..., Any]) -> Any:
+            return ray.remote(max_retries=0, num_cpus=1)(function)
+
+        try:
+            yield Cluster(
+                int(ray.cluster_resources().get("CPU", workers)),
+                RAY_ENDED,
+                lambda function, unit: remote(function).remote(unit).future(),
+            )
+        finally:
+            ray.shutdown()
+
+
+@contextmanager
+def _environment(settings: Mapping[str, str]) -> Generator[None]:
+    """Set variables of the environment that are not set, until the end of the block."""
+    new = {name: value for name, value in settings.items() if name not in os.environ}
+    os.environ.update(new)
+    try:
+        yield
+    finally:
+        for name in new:
+            os.environ.pop(name, None)
+
+
+def _require_listener(address: str) -> None:
+    """Refuse a host and port where nothing listens, because Ray itself retries for minutes."""
+    host, colon, port = address.split("://")[-1].rpartition(":")
+    if not (colon and port.isdigit()):
+        return
+    try:
+        socket.create_connection((host, int(port)), timeout=ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        raise InputError(f"--address {address}: no Ray cluster answers there ({error})") from error
+
+
+@contextmanager
+def dask_workers(workers: int, address: str | None) -> Generator[Cluster]:
+    """Start or join a Dask cluster."""
+    distributed = _imported("distributed", "dask")
+    with _dask_client(distributed, workers, address) as client:
+        threads: dict[str, int] = client.nthreads()
+        if any(count > 1 for count in threads.values()):
+            raise InputError(
+                "a Dask worker has several threads, but work that takes too long must end its "
+                "whole process: start workers with --nthreads 1"
+            )
+        executor = client.get_executor(pure=False, retries=0)
+        yield Cluster(max(1, len(threads)), ("KilledWorker",), executor.submit)
+
+
+@contextmanager
+def _dask_client(distributed: Any, workers: int, address: str | None) -> Generator[Any]:
+    if address is None:
+        settings = {"distributed.scheduler.allowed-failures": 0}
+        with importlib.import_module("dask").config.set(settings):
+            cluster = distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, memory_limit=0,
+                dashboard_address=ANY_PORT, silence_logs=50,
+            )  # fmt: skip
+        with cluster, distributed.Client(cluster) as client:
+            yield client
+        return
+    where = {"scheduler_file" if Path(address).is_file() else "address": address}
+    try:
+        client = distributed.Client(timeout=ANSWER_S, **where)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--address {address}: no Dask scheduler answers ({error})") from error
+    with client:
+        client.wait_for_workers(1)
+        yield client
+
+
+def _imported(module: str, extra: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise InputError(
+            f"--engine {extra} needs {module}: pip install 'graspproof[{extra}]' ('.[{extra}]' in "
+            "a checkout)"
+        ) from error

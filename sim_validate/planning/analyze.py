@@ -33,7 +33,7 @@ from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
 from grasp_core.records.contacts_json import ContactSet, Overrides, contact_sets_from_json
 from grasp_core.solvers.ties import first_best
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished
+from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.processes import each
 
@@ -285,16 +285,15 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
     check_edges(sets, command.edges)
     question = Question(command.max_normal_force_n, command.wrench, command.edges)
     found = each(partial(analyze, question=question), sets, jobs=command.jobs)
-    results = reporter.counted(
-        "analysing", found, len(sets), "closed", lambda one: one.outcome is Outcome.CLOSED
-    )
 
     def told(done: tuple[Analysis, ...], *, complete: bool) -> Analyses:
         analyses = Analyses(str(command.contacts), question, done, complete)
         reporter.document(analyses.document())
         return analyses
 
-    analyses = finished(results, len(sets), told, None, reporter)
+    analyses = reporter.collected(
+        "analysing", found, len(sets), ("closed", lambda one: one.outcome is Outcome.CLOSED), told
+    )
     _show(analyses, reporter)
     good = all(found.outcome is Outcome.CLOSED for found in analyses.grasps)
     return Exit.GOOD if good else Exit.NEGATIVE

@@ -22,6 +22,12 @@ NAMED = 5
 """Largest number of names that a message lists."""
 
 
+def is_mesh_file(name: str) -> bool:
+    """Tell whether an object is a mesh file, by its ending or as it exists, or is built in."""
+    path = Path(name)
+    return path.suffix.lower().lstrip(".") in FORMATS or path.is_file()
+
+
 def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
     """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
@@ -31,7 +37,7 @@ def load_object(name: str, mesh: command_flags.Mesh) -> Polyhedron:
             "`graspproof view`, `validate` and `execute` read a grasps.json, and `graspproof "
             "report` shows the folder of a run"
         )
-    if path.suffix.lower().lstrip(".") in FORMATS or path.is_file():
+    if is_mesh_file(name):
         lengths, choices = mesh.lengths, mesh.choices
         return load_polyhedron(
             path, unit=lengths.unit, scale=lengths.scale, center_of_mass=mesh.center_of_mass_m,

@@ -1,18 +1,140 @@
-"""Searches for the best grasp of an object, shows it beside the planned ones, and writes both."""
+"""Searches for the best grasp of an object, shows it beside the planned ones, and writes both.
 
-from collections.abc import Sequence
+The best grasp, and the bound on all others, are held by `best.json`.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Self
 
-from grasp_core.arrays import Array
+import numpy as np
+
+from grasp_core.arrays import Array, Shape, Wrench
+from grasp_core.declared import Declared
+from grasp_core.errors import InputError
+from grasp_core.figures import Shown
+from grasp_core.files.records import RecordFile, recorded
 from grasp_core.files.text_files import write_text
+from grasp_core.kinds import Family, Friction, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best_grasp import BestGrasp, GapAt, best_grasp, measured
+from grasp_core.optimizing.best_grasp import BestGrasp, Ended, GapAt, best_grasp, measured
 from grasp_core.optimizing.support_cuts import write_proof
-from grasp_core.values import Grasp
+from grasp_core.provenance import versions
+from grasp_core.quality.measures import MeasureName
+from grasp_core.values import FINGERS, FaceQuadruple, Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.planning.best_json import MEASURES, PROOF, Best, Rated
+from sim_validate.kit.files import AboutObject
+
+PROOF = "best-proof.npz"
+MEASURES: Mapping[MeasureName, tuple[str, str]] = {
+    "ferrari-canny": ("Ferrari-Canny quality", " N"),
+    "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
+    "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
+}
+"""What each measure says of a grasp, and its unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rated(Declared):
+    """A grasp beside the bound that no grasp exceeds."""
+
+    id: Annotated[str, Shown("grasp")]
+    family: Annotated[Family, Shown("family")]
+    quality: Annotated[tuple[float, float], Shown("measure", ".4f")]
+    """Proved lower and upper bound of what the measure says of the grasp."""
+    share_of_bound: Annotated[float, Shown("of the bound %", ".1f", 100.0)]
+    """Share of the bound that the lower one reaches."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Placed(Declared):
+    """Where the fingers of the best grasp stand."""
+
+    id: str
+    family: Family
+    faces: FaceQuadruple
+    positions_m: Annotated[Array, Shape(FINGERS, 3)]
+    normals: Annotated[Array, Shape(FINGERS, 3, units=True)]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Best(RecordFile):
+    """The best grasp of an object by one measure, with the proved bound on all others."""
+
+    FILE = "best.json"
+    SCHEMA = 2
+
+    object: AboutObject
+    friction: Friction
+    measure: MeasureName
+    wrenches: tuple[Wrench, ...]
+    """The wrenches of a task, force before torque [N, N m]; none for another measure."""
+    clearance_m: Quantity
+    """Distance of contacts from the edges of faces [m]."""
+    grasp: Placed
+    quality: tuple[float, float]
+    """Proved lower and upper bound of what the measure says of the grasp."""
+    bound: Annotated[float, Range(above=0.0)]
+    """What no four contacts exceed that are as far from edges."""
+    ended: Ended
+    proof: str | None
+    """Name of the proof's file; None if it was not kept."""
+    proof_nodes: Number
+    """Number of cases of the proof."""
+    history: tuple[GapAt, ...]
+    planned: tuple[Rated, ...]
+    """The planned grasps, which may be nearer to edges."""
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @classmethod
+    def of(
+        cls, body: Polyhedron, best: BestGrasp, planned: Iterable[Rated], proof: str | None
+    ) -> Self:
+        """Record what a search has found."""
+        grasp, measure = best.grasp, best.proof.measure
+        loads = () if measure.is_usual else measure.loads * np.repeat([1.0, body.radius], 3)
+        return cls(
+            object=AboutObject.of(body),
+            friction=best.proof.friction,
+            measure=measure.name,
+            wrenches=tuple(loads),
+            clearance_m=best.clearance,
+            grasp=Placed(grasp.id, grasp.family, grasp.faces, grasp.positions, grasp.normals),
+            quality=(best.quality.lower, best.quality.upper),
+            bound=best.bound,
+            ended=best.ended,
+            proof=proof,
+            proof_nodes=len(best.proof.deeds),
+            history=best.history,
+            planned=tuple(planned),
+        )
+
+    def _check_together(self) -> None:
+        if self.quality[0] > self.bound:
+            raise InputError(
+                f"bound: expected at least the quality {self.quality[0]:g} of {self.grasp.id}, got "
+                f"{self.bound:g}"
+            )
+
+    @recorded
+    def gap(self) -> float:
+        """Share of the bound that the grasp does not reach."""
+        return 1.0 - self.quality[0] / self.bound
+
+    @property
+    def rated(self) -> tuple[Rated, ...]:
+        """The best grasp, then the planned ones, beside the bound."""
+        share = self.quality[0] / self.bound
+        return (Rated(self.grasp.id, self.grasp.family, self.quality, share), *self.planned)
+
+    @property
+    def shares(self) -> Mapping[str, float]:
+        """How much of the bound each of these grasps reaches, by id."""
+        return {each.id: each.share_of_bound for each in reversed(self.rated)}
+
 
 STEPS = 100
 WHY = {

@@ -1,30 +1,281 @@
-"""Runs the command `regions`, which proves where each finger of a grasp may stand."""
+"""Runs the command `regions`, which proves where each finger of a grasp may stand.
 
+Certified regions of an object's grasps are held by one proof file each, and one `regions.json`.
+"""
+
+import hashlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Shape, frozen, frozen_indices, frozen_units
+from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.errors import InputError, SolverError, UndecidedError
-from grasp_core.figures import figures
+from grasp_core.declared import Declared
+from grasp_core.errors import InputError, SolverError, UndecidedError, about
+from grasp_core.figures import Shown, figures
+from grasp_core.files.records import FLAT, RecordFile, recorded
+from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
+from grasp_core.grasp_tables import ById
+from grasp_core.kinds import Count, Family, Friction, NotNegative, path_of
+from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.regions.certify_regions import certify_regions
-from grasp_core.regions.proof import CertifiedRegions
-from grasp_core.values import Grasp
+from grasp_core.regions.proof import CertifiedRegions, TwistCover
+from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.kit import command_flags
-from sim_validate.kit.console import Reporter, finished
+from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject
+from sim_validate.kit.files import AboutObject, alone_in, read_arrays, remove_results, write_arrays
 from sim_validate.kit.processes import each
-from sim_validate.kit.result_folders import alone_in, remove_results
-from sim_validate.planning.regions_json import GraspRegions, Regions, write_proof
 from sim_validate.settings import Certifying
+
+PROOFS = "proofs"
+"""Folder of the proof files, beside `regions.json`."""
+MILLI = 1e3
+POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
+BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
+FIELDS: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
+    "normals": ("normals", (FINGERS, 3)), "friction": ("friction", (FINGERS,)),
+    "origin": ("origin_m", (3,)), "depths": ("depths_m", (FINGERS,)), "scale": ("scale_m", ()),
+    "centers": ("centers_m", (FINGERS, 3)), "radius": ("disc_radius_m", ()),
+    "limit": ("open_radius_m", ()), "open_choice": ("open_choice_m", (None, 3)),
+    "open_wrench": ("open_wrench", (None,)),
+}  # fmt: skip
+"""Name and shape of the array in a proof file for fields of `CertifiedRegions`."""
+SHAPES: Mapping[str, tuple[int | None, ...]] = {
+    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3),
+    **dict(FIELDS.values()), **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
+}  # fmt: skip
+"""Shape of each array in a proof file; None stands for any length."""
+MOST_CORNERS = 1000
+"""Largest number of corners of a region's polygon in a file."""
+SMALLEST_SCALE, LARGEST = 1e-6, 1e6
+"""Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProofFile(Declared):
+    """The file that proves a grasp's regions."""
+
+    file: str
+    """Its path, relative to the folder of `regions.json`."""
+    sha256: str
+
+
+FourRegions = tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
+Points = Annotated[Array, Shape(FINGERS, 3)]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class GraspRegions(Declared):
+    """The certified regions of one grasp, or the reason why it has none."""
+
+    id: Annotated[str, Shown("grasp")]
+    contacts_sha256: str
+    """Hash of the contacts, which tells grasps of one id apart."""
+    family: Annotated[Family, Shown("family")]
+    planned_radius_m: Annotated[NotNegative, Shown("planned mm", ".3g", MILLI)]
+    """Radius of the discs that the plan claims; 0.0 where it claims none [m]."""
+    reason: str = ""
+    """Why nothing was proved; empty if something was."""
+    regions: FourRegions | None = None
+    """Convex polygons in which each finger may stand; None if nothing was proved."""
+    disc_radius_m: Annotated[NotNegative | None, Shown("disc mm", ".3g", MILLI)] = None
+    """Radius of the discs that the regions hold, cut off at face borders [m]."""
+    open_radius_m: Annotated[NotNegative | None, Shown("open mm", ".3g", MILLI)] = None
+    """A larger radius, at which `open_choice_m` is not in force closure [m]; None if no such
+    contacts were found."""
+    open_choice_m: Points | None = None
+    centers_m: Points | None = None
+    """Centres of the discs."""
+    normals: Annotated[Array, Shape(FINGERS, 3, units=True)] | None = None
+    """Inward normals of the planes of the regions."""
+    friction: Annotated[Array, Shape(FINGERS, least=0.0)] | None = None
+    """Coulomb coefficient that the proof counts on, per finger."""
+    cones: Annotated[Count | None, Shown("cones")] = None
+    """Number of cones of the proof."""
+    proof: ProofFile | None = None
+    """The file with the proof; None if nothing was proved, or no folder was given."""
+
+    @classmethod
+    def of(
+        cls, grasp: Grasp, proved: CertifiedRegions | str, proof: ProofFile | None
+    ) -> "GraspRegions":
+        """Record what was proved of a grasp, or the reason why nothing was."""
+        named = (grasp.id, contacts_sha256(grasp.contacts), grasp.family, grasp.radius)
+        if isinstance(proved, str):
+            return cls(*named, reason=proved)
+        return cls(
+            *named,
+            regions=proved.regions,
+            disc_radius_m=proved.radius,
+            open_radius_m=None if proved.open_choice is None else proved.limit,
+            open_choice_m=proved.open_choice,
+            centers_m=proved.centers,
+            normals=proved.normals,
+            friction=proved.friction,
+            cones=len(proved.cover.forces),
+            proof=proof,
+        )
+
+    def _check_together(self) -> None:
+        shown = (self.disc_radius_m, self.centers_m, self.normals, self.friction, self.cones)
+        if {each is None for each in (*shown, self.regions)} != {bool(self.reason)}:
+            raise InputError(
+                f"{self.id}: expected either regions with all of their figures, or a reason why "
+                "there are none"
+            )
+        if any(len(each.polygon) < FEWEST_CORNERS for each in self.regions or ()):
+            raise InputError(
+                f"{self.id}: expected regions with at least {FEWEST_CORNERS} corners each"
+            )
+
+    @recorded
+    def inscribed_radius_m(self) -> Annotated[float | None, Shown("inner mm", ".3g", MILLI)]:
+        """Radius of the smallest of the discs inscribed in the regions [m]."""
+        return min((each.inscribed_radius for each in self.regions or ()), default=None)
+
+    @recorded
+    def area_m2(self) -> Annotated[float | None, Shown("mm2", ".4g", MILLI**2)]:
+        """Area of all four regions [m^2]."""
+        return None if self.regions is None else sum(map(area_of, self.regions))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Regions(RecordFile, ById[GraspRegions]):
+    """The certified regions of an object's grasps, as `regions.json` holds them."""
+
+    FILE = "regions.json"
+    SCHEMA = 2
+
+    object: AboutObject
+    friction: Friction
+    certifying: Annotated[Certifying, FLAT]
+    grasps: tuple[GraspRegions, ...]
+    complete: bool
+    """Whether every grasp that was asked for was looked at."""
+    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
+
+    @recorded
+    def summary(self) -> Mapping[str, int]:
+        """Numbers of grasps, and of grasps with regions."""
+        proved = sum(each.regions is not None for each in self.grasps)
+        return {"grasps": len(self.grasps), "proved": proved}
+
+
+def write_proof(
+    folder: Path | None, body: Polyhedron, grasp: Grasp, proved: CertifiedRegions | str
+) -> ProofFile | None:
+    """Write the proof of a grasp's regions to a folder, or remove an earlier one."""
+    if folder is None:
+        return None
+    name = f"{PROOFS}/{grasp.id}.npz"
+    if isinstance(proved, str):
+        (folder / name).unlink(missing_ok=True)
+        return None
+    path = write_arrays(folder / name, proof_arrays(proved, grasp, body))
+    return ProofFile(name, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+def area_of(region: ContactRegion) -> float:
+    """Compute the area of a convex region [m^2]."""
+    sides = region.polygon[1:] - region.polygon[0]
+    crossed = np.cross(sides[:-1], sides[1:])
+    return 0.5 * float(np.linalg.norm(crossed.sum(axis=0)))
+
+
+def proof_arrays(
+    proved: CertifiedRegions, grasp: Grasp, body: Polyhedron
+) -> dict[str, NDArray[Any]]:
+    """Return the regions of a grasp and their proof, as arrays by name."""
+    empty = {"open_choice": np.zeros((0, 3)), "open_wrench": np.zeros(0)}
+    known = {field: getattr(proved, field) for field in FIELDS}
+    polygons = [region.polygon for region in proved.regions]
+    return {
+        "grasp": np.array(grasp.id),
+        "object_sha256": np.array(body.content_sha256),
+        "axes": proved.cover.axes,
+        "codes": proved.cover.codes.astype(np.uint8),
+        "forces": proved.cover.forces,
+        **{
+            name: np.asarray(empty[field] if known[field] is None else known[field])
+            for field, (name, _) in FIELDS.items()
+        },
+        **dict(zip((*POLYGONS, *BORDERS), (*polygons, *proved.borders), strict=True)),
+    }
+
+
+def load_regions(path: str | Path) -> CertifiedRegions:
+    """Read regions and their proof, as `graspproof regions` writes them; nothing is verified yet.
+
+    Raises:
+        InputError: The file does not hold the proof of a grasp's regions.
+    """
+    path = path_of(path, "path")
+    with about(f"{path}: expected a proof file as `graspproof regions` writes it"):
+        return regions_of(read_arrays(path, SHAPES))
+
+
+def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
+    """Build regions and their proof from arrays by name; nothing is verified yet."""
+    if missing := [name for name in SHAPES if name not in kept]:
+        raise InputError(
+            f"the array {missing[0]} is missing; certify again with `graspproof regions`"
+        )
+    limit = np.asarray(kept["open_radius_m"])  # infinite where no open choice was found
+    known = np.where(np.isposinf(limit), 0.0, limit) if limit.dtype.kind == "f" else limit
+    finite = {**kept, "open_radius_m": known}
+    numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
+    scale = numbers["scale_m"].item()
+    if not SMALLEST_SCALE <= scale <= LARGEST:
+        raise InputError(
+            f"scale_m: expected a length from {SMALLEST_SCALE:g} to {LARGEST:g} m, got {scale:g}"
+        )
+    normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
+    fields: dict[str, Any] = {
+        field: numbers[name] if shape else numbers[name].item()
+        for field, (name, shape) in FIELDS.items()
+    }
+    opened = {field: fields[field] for field in ("open_choice", "open_wrench")}
+    fields |= {field: value if len(value) else None for field, value in opened.items()}
+    fields |= {"limit": limit.item(), "normals": normals}
+    return CertifiedRegions(
+        regions=four(
+            _region(name, numbers[name], normal, scale)
+            for name, normal in zip(POLYGONS, normals, strict=True)
+        ),
+        borders=four(numbers[name] for name in BORDERS),
+        cover=TwistCover(
+            numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"), numbers["forces"]
+        ),
+        **fields,
+    )
+
+
+def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:
+    if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
+        raise InputError(
+            f"{name}: expected a polygon of {FEWEST_CORNERS} to {MOST_CORNERS} corners within "
+            f"{LARGEST:g} m; certify the regions again"
+        )
+    try:
+        with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero
+            arms = polygon / scale - polygon[0] / scale
+            radius = scale * inscribed_radius(*edge_rows(arms @ plane_frame(normal)))
+            return ContactRegion("certified", polygon, radius)
+    except SolverError as error:
+        raise InputError(
+            f"{name}: expected the corners of a convex polygon in order; certify the regions again"
+        ) from error
 
 
 def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
@@ -62,11 +313,10 @@ def certified(
         for grasp, proved in zip(grasps, proofs, strict=True):
             yield GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved))
 
-    results = reporter.counted(
-        "certifying", recorded(), len(grasps), "proved", lambda one: one.regions is not None
-    )
-    collect = partial(Regions, AboutObject.of(body), friction, asked)
-    return finished(results, len(grasps), collect, folder and folder / Regions.FILE, reporter)
+    return reporter.collected(
+        "certifying", recorded(), len(grasps), ("proved", lambda one: one.regions is not None),
+        partial(Regions, AboutObject.of(body), friction, asked), folder,
+    )  # fmt: skip
 
 
 def _certify(

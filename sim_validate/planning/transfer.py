@@ -11,13 +11,12 @@ from grasp_core.errors import InputError
 from grasp_core.files.records import FLAT, RecordFile
 from grasp_core.files.text_files import write_text
 from grasp_core.mesh_files.limits import MeshChoices
+from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.shells import SMALL
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import extended
-from grasp_core.transferring.face_changes import check_planar
 from grasp_core.transferring.transfer import (
     CHANGES,
     SURE_GROWTH,
@@ -25,15 +24,14 @@ from grasp_core.transferring.transfer import (
     Change,
     GraspFigures,
     Transfer,
-    given_center,
+    as_read,
     growth,
     transfer,
 )
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import GRASPS, asked_grasps, load_object
 
 MM = 1e3
@@ -125,10 +123,10 @@ def _changed_part(command: command_flags.Transfer, old: Polyhedron) -> Polyhedro
     center, part = command.center_of_mass_m, Path(command.part)
     choices = extended(MeshChoices, command.limits)
     if part.suffix or part.is_file():  # a built-in object is as it is
-        if center is None and (kept := given_center(old)) is not None:
-            x, y, z = kept.tolist()
-            center = x, y, z
-        choices = replace(choices, faces="planar", largest_part=old.surface.dropped > SMALL)
+        same = as_read(old)
+        if center is None and (kept := same.pop("center_of_mass")) is not None:
+            center = tuple(kept.tolist())
+        choices = replace(choices, faces=same["faces"], largest_part=same["largest_part"])
     mesh = command_flags.Mesh(command.lengths, choices, center_of_mass_m=center)
     return load_object(command.part, mesh)
 

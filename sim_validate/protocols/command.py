@@ -10,12 +10,11 @@ from grasp_core.planning.result import Plan
 from sim_validate.closure.command import validate_file
 from sim_validate.engine.setup import Setup
 from sim_validate.hands import flags as hand_flags
-from sim_validate.hands.reach_command import reach_file
+from sim_validate.hands.command import reach_file
 from sim_validate.kit import command_flags, processes
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished
+from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import remove_results
+from sim_validate.kit.files import AboutObject, remove_results
 from sim_validate.protocols.judging import judge_by, judge_hand_by
 from sim_validate.protocols.published import protocol
 from sim_validate.protocols.verdict import Judgement, Judgements
@@ -57,11 +56,11 @@ def _judged(
     if folder:
         remove_results(folder, "judgements")
     found = processes.each(call, cases, jobs=jobs)
-    results = reporter.counted("judging", found, len(cases), "passed", lambda one: one.theirs)
     tests = {name: protocol(name) for name in command.protocol}
     collect = partial(Judgements, AboutObject.of(saved.body), saved.friction, tests)
-    path = folder and folder / Judgements.FILE
-    done = finished(results, len(cases), collect, path, reporter)
+    done = reporter.collected(
+        "judging", found, len(cases), ("passed", lambda one: one.theirs), collect, folder
+    )
     _show(done, reporter)
     good = all(one.good for one in done.judgements)
     return (Exit.GOOD if good else Exit.NEGATIVE), done

@@ -14,26 +14,29 @@ from functools import partial
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import coefficient, instance, one_of
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
+from grasp_core.kinds import Friction, instance, one_of, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scene import build_hand_scene
-from scenes.mujoco.tested import HandServos, fingertip_scene, hand_scene, planned_postures
-from sim_validate.engine.bench import Bench
+from scenes.mujoco.tested import (
+    HandServos,
+    TestedScene,
+    fingertip_scene,
+    hand_scene,
+    planned_postures,
+)
 from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.limits import loads_as_they_are
-from sim_validate.engine.rig import squeezed
+from sim_validate.engine.rig import Analysis, closed_on
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
-from sim_validate.hands.hand_gate import require_faithful_hands
-from sim_validate.hands.validate_hand import hand_setup
+from sim_validate.hands.trials import hand_setup, require_faithful_hands
 from sim_validate.protocols.published import PROTOCOLS, PublishedProtocol
 from sim_validate.protocols.runs import their_verdict
 from sim_validate.protocols.verdict import Judgement, OurVerdict
@@ -66,7 +69,7 @@ def judge_by(
     """
     found = _protocol(protocol)
     check_body(body)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
     contacts = given_contacts(body, grasp)
     given = grasp if isinstance(grasp, Grasp) else contacts
@@ -74,18 +77,13 @@ def judge_by(
     scene = fingertip_scene(
         body, given, found.friction, found.mass_of(body), found.physics, setup.fingers
     )
-    return Judgement(
-        grasp=given.id if isinstance(given, Grasp) else "",
-        protocol=found.name,
-        friction=friction,
-        mass_kg=scene.mass_kg,
-        push_n=float(scene.pushes_n.max()),
-        runs=their_verdict(found, scene, setup.threads),
-        ours=our_verdict(
-            body, contacts, friction, found.forces(scene.mass_kg), setup,
-            partial(setup.scene, body, given, friction),
-        ),
+    ours = our_verdict(
+        body, contacts, friction, found.forces(scene.mass_kg), setup,
+        partial(setup.scene, body, given, friction),
     )  # fmt: skip
+    return _judged(
+        found, scene, friction, setup, ours, given.id if isinstance(given, Grasp) else ""
+    )
 
 
 def judge_hand_by(
@@ -121,7 +119,7 @@ def judge_hand_by(
     found = _protocol(protocol)
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
-    coefficient(friction)
+    value_of(Friction, friction, "friction")
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
     file = hand_file(hand)
     stiffness = file.servo_n_m_per_rad if found.own_servos else None
@@ -136,16 +134,18 @@ def judge_hand_by(
     scene = hand_scene(
         hand, body, postures, found.friction, found.mass_of(body), found.physics, servos
     )
-    return Judgement(
-        grasp=reach.grasp,
-        protocol=found.name,
-        hand=hand.name,
-        friction=friction,
-        mass_kg=scene.mass_kg,
-        push_n=float(scene.pushes_n.max(initial=0.0)),
-        runs=their_verdict(found, scene, setup.threads),
-        ours=_ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup),
-    )
+    ours = _ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup)
+    return _judged(found, scene, friction, setup, ours, reach.grasp, hand.name)
+
+
+def _judged(
+    protocol: PublishedProtocol, scene: TestedScene, friction: float, setup: Setup,
+    ours: OurVerdict, grasp: str, hand: str = "",
+) -> Judgement:  # fmt: skip
+    """Run the test, and put its verdict beside ours."""
+    runs = their_verdict(protocol, scene, setup.threads)
+    push_n = float(scene.pushes_n.max(initial=0.0))
+    return Judgement(grasp, protocol.name, friction, scene.mass_kg, push_n, runs, ours, hand)
 
 
 def _ours(
@@ -184,20 +184,18 @@ def our_verdict(
     if not setup.closure(contacts, friction).closed:
         told = f"the contacts are proved not to be in force closure at friction {friction:g}"
         return OurVerdict(False, False, 0.0, told)
-    bench = Bench(scene(), threads=setup.threads, timeout_s=setup.timeout_s)
-    layout = bench.scene.layout
-    rig = squeezed(bench, setup, layout.squeeze_forces, friction)
+    rig = closed_on(scene(), setup, friction)
     named = [
         (" ".join(f"{part:.3g}" for part in force.tolist()) + " N",
          np.concatenate([force, np.zeros(3)]))
         for force in forces
     ]  # fmt: skip
-    loads = loads_as_they_are(body, contacts, friction, rig.idle, named, setup, motors=motors)
+    loads = Analysis(body, contacts, friction, setup, motors).as_they_are(rig.idle, named)
     margin = min((load.predicted_limit for load in loads), default=math.inf)
     held = [load.load for load in loads] or [rig.idle]
     names = [load.name for load in loads] or ["no load"]
     for name, trace in zip(names, rig.hold(held), strict=True):
-        found = judge(trace, layout, setup.hold)
+        found = judge(trace, rig.bench.scene.layout, setup.hold)
         if found.outcome is not Outcome.HELD:
             return OurVerdict(True, False, margin, f"{name}: {found.outcome.value}: {found.reason}")
     return OurVerdict(True, True, margin, "")

@@ -13,9 +13,8 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.checked import one_of
 from grasp_core.declared import Declared, summary
-from grasp_core.kinds import Number, OrInfinity
+from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.tested import Weld
 from scenes.settings import PhysicsSettings

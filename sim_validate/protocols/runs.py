@@ -18,13 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.declared import Declared
 from grasp_core.kinds import Measured, Number
-from scenes.mujoco.silent_mujoco import unlogged
 from scenes.mujoco.tested import TestedScene
-from sim_validate.engine.bench import batch, compiled, faults, mujoco, step
-from sim_validate.engine.schedules import samples
+from sim_validate.engine.bench import batch, compiled, mujoco, samples, stepped
 from sim_validate.engine.traces import rotation_angles
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run
 
@@ -157,46 +155,44 @@ class TestBench:
 
     def run(self, runs: Sequence[Timeline], began: Array) -> tuple[Motion, ...]:
         """Simulate runs, all from the same fingers, `began` (u,)."""
-        count = len(runs)
-        trials = batch.Batch(self.model, max(count, 2), self.threads)
-        trials.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        lengths = [len(each.commands) for each in runs]
+        trials = batch.Batch(self.model, max(len(runs), 2), self.threads)
+        trials.reset(np.arange(len(runs)), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         joints = trials.bind("qpos")
-        joints[:count, :FREE], joints[:count, FREE:] = AT_REST, began
-        poses = np.zeros((count, max(len(each.commands) for each in runs), FREE))
+        joints[: len(runs), :FREE], joints[: len(runs), FREE:] = AT_REST, began
         touching: list[list[frozenset[int]]] = [[] for _ in runs]
-        errors = self._stepped(trials, runs, poses, touching)
-        return tuple(
-            Motion(
-                poses[place, : len(each.commands)], tuple(touching[place]),
-                next(iter(faults(trials, place, errors.get(place, ""))), ""),
-            )
-            for place, each in enumerate(runs)
-        )  # fmt: skip
 
-    def _stepped(
-        self, trials: "batch.Batch", runs: Sequence[Timeline], poses: Array,
-        touching: list[list[frozenset[int]]],
-    ) -> dict[int, str]:  # fmt: skip
-        commands, applied = trials.bind("ctrl"), trials.bind("xfrc_applied")
-        told = (trials.bind("mocap_pos"), trials.bind("mocap_quat")) if self.model.nmocap else ()
-        joints = trials.bind("qpos")
-        lengths = np.array([len(each.commands) for each in runs])
-        errors: dict[int, str] = {}
-        with unlogged():
-            for sample in range(poses.shape[1]):
-                going = np.flatnonzero(lengths > sample)
-                for place in going.tolist():
-                    now = runs[place].commands[sample]
-                    commands[place] = now[FREE:] if told else now
-                    for part, values in zip(told, np.split(now[:FREE], [3]), strict=False):
-                        part[place, 0] = values
-                    applied[place, self.body] = runs[place].wrenches[sample]
-                step(trials, errors, CHUNK, going)
-                poses[going, sample] = joints[going, :FREE]
-                for place in going.tolist():
-                    if sample in runs[place].looks:
-                        touching[place].append(self._touching(trials.state[place]))
-        return errors
+        def following(going: Indices, samples: Indices) -> Indices:
+            for place, sample in zip(going.tolist(), samples.tolist(), strict=True):
+                if sample in runs[place].looks:
+                    touching[place].append(self._touching(trials.state[place]))
+            return samples + 1
+
+        told = self._told(trials, runs, max(lengths))
+        done = stepped(self.model, trials, CHUNK, told, [joints[:, :FREE]], lengths, following)
+        return tuple(
+            Motion(done.series[0][place, :length], tuple(touching[place]), done.health[place].fault)
+            for place, length in enumerate(lengths)
+        )
+
+    def _told(
+        self, trials: "batch.Batch", runs: Sequence[Timeline], most: int
+    ) -> list[tuple[Array, Array]]:
+        """Return what is told in each sample: wrenches, commands and, if it moves, a palm's pose.
+
+        After the end of a run it is zero.
+        """
+        commands = np.zeros((len(runs), most, len(runs[0].commands[0])))
+        wrenches = np.zeros((len(runs), most, 6))
+        for place, each in enumerate(runs):
+            commands[place, : len(each.commands)] = each.commands
+            wrenches[place, : len(each.wrenches)] = each.wrenches
+        told = [(trials.bind("xfrc_applied")[:, self.body], wrenches)]
+        if self.model.nmocap:
+            told.append((trials.bind("mocap_pos")[:, 0], commands[..., :3]))
+            told.append((trials.bind("mocap_quat")[:, 0], commands[..., 3:FREE]))
+            commands = commands[..., FREE:]
+        return [*told, (trials.bind("ctrl"), commands)]
 
     def _touching(self, state: Array) -> frozenset[int]:
         if not np.isfinite(state).all():

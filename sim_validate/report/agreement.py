@@ -3,6 +3,8 @@
 A trial that was predicted to hold and did not, or the reverse, contradicts the analysis or the
 simulation. As in `validate`, neither is counted for loads within `AGREEMENT` of their limit and for
 trials that prove nothing, such as those that diverged.
+
+How a grasp ended is said in words here, too.
 """
 
 import math
@@ -16,6 +18,7 @@ import numpy as np
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.verdict import AGREEMENT, Verdict, WrenchVerdict
 from sim_validate.engine.traces import LET_GO, Outcome
+from sim_validate.execution.verdict import ExecutedGrasp, Executions
 
 Record = Mapping[str, Any]
 
@@ -110,6 +113,8 @@ def _place(trial: WrenchVerdict | ControlTrial, wanted: bool | None) -> str:
 
 HELD = Outcome.HELD
 GOOD, BAD, QUIET = "good", "bad", "quiet"
+FAILED, LOST = "failed", "lost"
+"""Word that begins how many trials were not survived, and the one word for it."""
 
 
 def said_of(verdict: Verdict | None) -> tuple[str, str]:
@@ -126,3 +131,34 @@ def said_of(verdict: Verdict | None) -> tuple[str, str]:
     if not verdict.controls_let_go:
         return "a negative control is undecided", BAD
     return outcome, GOOD if verdict.held else BAD
+
+
+def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
+    """Say in words how the execution of a grasp ended, with the tone: good, bad or neither."""
+    if found is None:
+        return "not executed", QUIET
+    if found.execution is None:
+        return "no squeeze", BAD
+    if not found.controls_let_go:
+        return "a negative control held", BAD
+    if not found.execution.trials:
+        return "no trial is possible", BAD
+    if lost := found.execution.lost:
+        return f"{FAILED} {len(lost)} of {len(found.execution.trials)} trials", BAD
+    return "survived", GOOD
+
+
+def said_of_both(
+    verdict: Verdict | None, executions: Executions | None, found: ExecutedGrasp | None
+) -> tuple[str, str]:
+    """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
+
+    Gives the words, and the tone: good, bad or neither; bad if either ending is.
+    """
+    closure, tone = said_of(verdict)
+    if executions is None:
+        return closure, tone
+    ended, other = said_of_execution(found)
+    tones = {tone, other}
+    worst = next(each for each in (BAD, GOOD, QUIET) if each in tones)
+    return f"closure: {closure}; execution: {LOST if ended.startswith(FAILED) else ended}", worst

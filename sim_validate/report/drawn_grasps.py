@@ -23,12 +23,10 @@ from sim_validate.closure.replaying import Wanted, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict
 from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
-from sim_validate.kit.result_folders import CLIPS, PICTURES
-from sim_validate.planning.regions_json import GraspRegions
-from sim_validate.report.grasp_charts import margin_panels, wrench_panels
-from sim_validate.report.reached_grasps import held_in
-from sim_validate.report.run_charts import motion_panels
+from sim_validate.kit.files import CLIPS, PICTURES
+from sim_validate.report.charts import margin_panels, motion_panels, wrench_panels
 from sim_validate.report.run_folder import RunFolder
+from sim_validate.report.sections import held_in
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,9 +34,10 @@ class Task:
     """A grasp to draw, in a form that can be sent to another process."""
 
     saved: Plan
-    friction: float
+    """The object with the grasp alone, at the friction of the tests."""
+    grasp: Grasp
+    """The grasp, with its certified regions if it has any that may be drawn."""
     verdict: Verdict | None
-    regions: GraspRegions | None
     executions: Executions | None
     held: PosedHand | None
     """The hand in the grasp; None if there is none, or it does not reach the grasp."""
@@ -47,11 +46,6 @@ class Task:
     folder: Path
     name: str
     clip: bool
-
-    @property
-    def grasp(self) -> Grasp:
-        """The grasp, with its certified regions if it has any."""
-        return certified(self.saved.grasps[0], self.regions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +86,8 @@ def tasks_of(
     return [
         Task(
             saved=replace(run.saved, grasps=(grasp,), friction=run.friction),
-            friction=run.friction,
-            verdict=run.verdicts.get(grasp.id),
-            regions=run.shaded.get(grasp.id),
+            grasp=run.shown(grasp),
+            verdict=run.verdict(grasp.id),
             executions=None
             if run.executions is None or (found := run.executed(grasp.id)) is None
             else replace(run.executions, grasps=(found,)),
@@ -108,29 +101,22 @@ def tasks_of(
     ]
 
 
-def certified(grasp: Grasp, found: GraspRegions | None) -> Grasp:
-    """Replace the regions of a grasp by certified ones, if it has any."""
-    if found is None or found.regions is None:
-        return grasp
-    return replace(grasp, regions=found.regions)
-
-
 def draw(task: Task) -> Drawn:
     """Draw one grasp and write its pictures and charts."""
-    body, grasp = task.saved.body, task.grasp
+    body, grasp, friction = task.saved.body, task.grasp, task.saved.friction
     view = best_view(body, grasp)
     path = task.folder / PICTURES / f"{task.name}.svg"
-    write_text(path, svg_of(grasp_sheet(body, grasp, task.friction, view=view), alone=True))
+    write_text(path, svg_of(grasp_sheet(body, grasp, friction, view=view), alone=True))
     drawn = Drawn(f"{PICTURES}/{path.name}")
     if task.held is not None:
         path = task.folder / PICTURES / f"{task.name}-hand.svg"
-        sheet = grasp_sheet(body, grasp, task.friction, held=task.held)
+        sheet = grasp_sheet(body, grasp, friction, held=task.held)
         write_text(path, svg_of(sheet, alone=True))
         drawn = replace(drawn, hand=f"{PICTURES}/{path.name}")
-    if force_closure(grasp, friction=task.friction).closed:
+    if force_closure(grasp, friction=friction).closed:
         largest = largest_push(task.verdict)
-        wrenches = wrench_panels(body, grasp, task.friction, view=view)
-        margins = margin_panels(body, grasp, task.friction, max_normal_force_n=largest)
+        wrenches = wrench_panels(body, grasp, friction, view=view)
+        margins = margin_panels(body, grasp, friction, max_normal_force_n=largest)
         drawn = replace(
             drawn, wrenches=tuple(map(svg_of, wrenches)), margins=tuple(map(svg_of, margins))
         )

@@ -6,23 +6,13 @@ from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
-from grasp_core.checked import function, path_of, whole
 from grasp_core.files.text_files import write_text
+from grasp_core.kinds import Count, Number, function, path_of, value_of
 from scenes.drawing.pages import as_text, object_data
+from sim_validate.kit import files
 from sim_validate.kit.processes import available_cores, each
-from sim_validate.kit.result_folders import (
-    GRASPS,
-    INDEX,
-    REPORT,
-    STATIC,
-    STYLE,
-    new_pages,
-    require_report_folder,
-)  # fmt: skip
+from sim_validate.report import pages
 from sim_validate.report.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.report.grasp_page import MIRRORED, ROTATED, Copy, grasp_page
-from sim_validate.report.index_page import Shown, cards_of, index_page
-from sim_validate.report.pages import asset, style
 from sim_validate.report.run_folder import RunFolder, folder_of, runs_in
 
 FIRST = 4
@@ -81,88 +71,78 @@ def write_report(
             holds other files.
     """
     folder = folder_of(path_of(folder, "folder"))
-    out = folder / REPORT if out is None else path_of(out, "out")
+    out = folder / files.REPORT if out is None else path_of(out, "out")
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None:
-            whole(value, name, least=1)
-    whole(clips, "clips")
+            value_of(Count, value, name)
+    value_of(Number, clips, "clips")
     function(progress, "progress")
     function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))
-    require_report_folder(out)
-    with new_pages(out) as place:
+    files.require_report_folder(out)
+    with files.new_pages(out) as place:
         cards = list(_cards(runs, place, clips))
         ready = ready if place == out else _nothing
         report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
-    return replace(report, index=out / INDEX)
-
-
-@dataclass(frozen=True, slots=True)
-class _Card:
-    run: RunFolder
-    script: str
-    """Name of the script with the object's drawing."""
-    task: Task
-    copies: tuple[Copy, ...]
-
-    @property
-    def page(self) -> str:
-        """Path of the page of the card's grasp, relative to the report's folder."""
-        return f"{GRASPS}/{self.task.name}.html"
+    return replace(report, index=out / files.INDEX)
 
 
 def _written(
-    cards: Sequence[_Card], runs: Runs, out: Path, jobs: int,
+    cards: Sequence[tuple[pages.Card, Task]], runs: Runs, out: Path, jobs: int,
     progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
 ) -> Report:  # fmt: skip
-    for name in STATIC:
-        write_text(out / name, style() if name == STYLE else asset(name))
+    for name in files.STATIC:
+        write_text(out / name, pages.style() if name == files.STYLE else pages.asset(name))
     for number, run in enumerate(runs):
         data = as_text(object_data(run.saved.body))
         write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
-    tasks = [card.task for card in cards]
+    tasks = [task for _, task in cards]
     names = [None, *(f"{task.name}.html" for task in tasks), None]
-    shown = list[Shown]()
+    shown = list[pages.Card]()
     no_clip, next_index = "", min(FIRST, len(cards))
     results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
-    for card, drawn in zip(cards, results, strict=True):
+    for (card, _), drawn in zip(cards, results, strict=True):
         around = names[len(shown)], names[len(shown) + 2]
         shown.append(_pages_of(card, drawn, out, around))
         no_clip = no_clip or drawn.no_clip
         if len(shown) == next_index:
             waiting = len(cards) - len(shown)
-            index = write_text(out / INDEX, index_page(runs, shown, waiting))
+            index = write_text(out / files.INDEX, pages.index_page(runs, shown, waiting))
             if next_index == FIRST and waiting:
                 ready(index, len(shown), len(cards))
             next_index = min(2 * next_index, len(cards))
         progress(len(shown), len(cards))
-    grasps = sum(1 + len(card.copies) for card in cards)
-    return Report(out / INDEX, grasps, no_clip, len(cards))
+    grasps = sum(1 + len(card.copies) for card in shown)
+    return Report(out / files.INDEX, grasps, no_clip, len(cards))
 
 
-def _cards(runs: Runs, out: Path, clips: int) -> Iterator[_Card]:
+def _cards(runs: Runs, out: Path, clips: int) -> Iterator[tuple[pages.Card, Task]]:
     for number, run in enumerate(runs):
         prefix = f"{number}-" if len(runs) > 1 else ""
         grasps = run.saved.grasps
-        classes = cards_of(run)
+        classes = pages.cards_of(run)
         firsts = [grasps[each.first] for each in classes]
         for found, task in zip(classes, tasks_of(run, firsts, out, prefix, clips), strict=True):
             copies = tuple(
-                Copy(grasps[place].id, f"{GRASPS}/{prefix}{grasps[place].id}.html",
-                     MIRRORED if place in found.mirrored else ROTATED)
+                pages.Copy(grasps[place].id, f"{files.GRASPS}/{prefix}{grasps[place].id}.html",
+                     pages.MIRRORED if place in found.mirrored else pages.ROTATED)
                 for place in found.places if place != found.first
             )  # fmt: skip
-            yield _Card(run, f"object-{number}.js", task, copies)
+            script, path = f"object-{number}.js", f"{files.GRASPS}/{task.name}.html"
+            yield pages.Card(run, grasps[found.first], script, path, copies), task
 
 
-def _pages_of(card: _Card, drawn: Drawn, out: Path, around: tuple[str | None, str | None]) -> Shown:
+def _pages_of(
+    card: pages.Card, drawn: Drawn, out: Path, around: tuple[str | None, str | None]
+) -> pages.Card:
     """Write the page of a card's grasp, and those of its copies, which have no pictures."""
     grasps = {grasp.id: grasp for grasp in card.run.saved.grasps}
-    first = grasps[card.task.saved.grasps[0].id]
-    text = grasp_page(card.run, first, card.script, drawn, neighbours=around, copies=card.copies)
+    text = pages.grasp_page(
+        card.run, card.grasp, card.script, drawn, neighbours=around, copies=card.copies
+    )
     write_text(out / card.page, text)
     for copy in card.copies:
-        drawn_one = Copy(first.id, card.page, copy.kind)
-        text = grasp_page(card.run, grasps[copy.id], card.script, first=drawn_one)
+        first = pages.Copy(card.grasp.id, card.page, copy.kind)
+        text = pages.grasp_page(card.run, grasps[copy.id], card.script, first=first)
         write_text(out / copy.page, text)
-    return Shown(card.run, first, card.page, drawn.hand or drawn.picture, card.copies)
+    return replace(card, picture=drawn.hand or drawn.picture)

@@ -1,27 +1,35 @@
 """Reads the folder of a run: its grasps, verdicts, executions, regions, and a hand's poses."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
+from grasp_core.grasp_tables import ById, Named
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
+from grasp_core.values import Grasp
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
-from sim_validate.kit.result_folders import REACHES
+from sim_validate.kit.files import REACHES
 from sim_validate.planning.asked_objects import GRASPS
-from sim_validate.planning.best_json import Best
-from sim_validate.planning.regions_json import GraspRegions, Regions
+from sim_validate.planning.best import Best
+from sim_validate.planning.regions import Regions
 from sim_validate.protocols.verdict import Judgements
-from sim_validate.report.agreement import BAD, said_of
+from sim_validate.report.agreement import BAD, said_of_both
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import Reaches
 
 File = TypeVar("File", Verdicts, Executions, Regions, Judgements, Best)
+Item = TypeVar("Item", bound=Named)
+
+
+def about_grasp(results: ById[Item] | None, name: str) -> Item | None:
+    """Return what a file of results has about a grasp; None if it has nothing, or is missing."""
+    return next((each for each in results if each.id == name), None) if results else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,32 +63,31 @@ class RunFolder:
         kept = tuple(grasp for grasp in grasps if grasp.id in chosen)
         return replace(self, saved=replace(self.saved, grasps=kept), left_out=len(grasps) - limit)
 
+    def said(self, name: str) -> tuple[str, str]:
+        """Say in words how the tests of a grasp ended, with the tone: good, bad or neither."""
+        return said_of_both(self.verdict(name), self.executions, self.executed(name))
+
     def alarms(self, name: str) -> bool:
         """Tell whether the verdict on a grasp is a problem, or its execution lost the object."""
-        found = self.executed(name)
-        lost = found is not None and not (found.survived and found.controls_let_go)
-        return lost or said_of(self.verdicts.get(name))[1] == BAD
+        return self.said(name)[1] == BAD
+
+    def verdict(self, name: str) -> Verdict | None:
+        """Return the verdict on a grasp; None if the grasp was not tested."""
+        return about_grasp(self.tested, name)
 
     def executed(self, name: str) -> ExecutedGrasp | None:
         """Return what the execution of a grasp found; None if the grasp was not executed."""
-        grasps = () if self.executions is None else self.executions.grasps
-        return next((each for each in grasps if each.id == name), None)
+        return about_grasp(self.executions, name)
+
+    def shown(self, grasp: Grasp) -> Grasp:
+        """Return a grasp with its certified regions, if it has any that may be drawn."""
+        found = about_grasp(self.certified, grasp.id) if self.shades else None
+        return replace(grasp, regions=found.regions) if found and found.regions else grasp
 
     @property
-    def verdicts(self) -> Mapping[str, Verdict]:
-        """Verdicts by the ids of the grasps; empty if no grasp was tested."""
-        return {each.id: each for each in self.tested or ()}
-
-    @property
-    def regions(self) -> Mapping[str, GraspRegions]:
-        """Certified regions by the ids of the grasps; empty if none were asked for."""
-        return {} if self.certified is None else {each.id: each for each in self.certified.grasps}
-
-    @property
-    def shaded(self) -> Mapping[str, GraspRegions]:
-        """Certified regions that may be drawn: those for the friction of the verdicts, or less."""
-        enough = self.certified is not None and self.certified.friction <= self.friction
-        return self.regions if enough else {}
+    def shades(self) -> bool:
+        """Whether certified regions may be drawn: they are for the friction of the verdicts."""
+        return self.certified is not None and self.certified.friction <= self.friction
 
     @property
     def verdicts_path(self) -> Path:

@@ -14,12 +14,12 @@ import grasp_core.quality.wrench_limits as checked
 from grasp_core.execution import carried_mass, squeeze_certificate
 from grasp_core.execution.payload import Payload
 from grasp_core.execution.squeeze_certificate import Survival
-from grasp_core.quality.wrench_limits import WrenchLimit, body_of
-from tests.attacks.searching import Attack, always, cycled, power, tiny
+from grasp_core.quality.wrench_limits import body_of
+from tests.attacks.searching import Attack, cycled, power, tiny
 from tests.tampering import table
 from tests.tampering.exact_closure import conic, locals_of, unit_arms
 from tests.tampering.hand_payloads import held
-from tests.tampering.squeezes import GRAVITY, largest_scale, ray, responding
+from tests.tampering.squeezes import GRAVITY, largest_scale, responding
 from tests.tampering.wrench_bounds import scaled, torques_of
 
 SEEDS = 12
@@ -237,77 +237,35 @@ SQUEEZE = Attack(
 )  # fmt: skip
 
 
-@cache
-def payload(seed):
-    """A genuine payload without motors, and the least mass of the tests' own rays."""
-    contacts, springs = table.held(seed)
-    c = gc.payload(*contacts, max_push_n=10.0, **springs)
-    ways = np.random.default_rng(seed).normal(size=(40, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    return c, min(ray(c.fixed.grip, None, 10.0, way) for way in ways)
-
-
-def less_mass(rng):
-    """A free mass that is too low, by one long facet."""
-    c, least = payload(any_seed(rng))
-    truth = min(least, c.free.lower)
-    upper = 0.5 * truth * (1.0 - power(rng, -3, 0))
-    d = rng.normal(size=3)
-    w = np.append(GRAVITY * d / np.linalg.norm(d), np.zeros(3))
-    z = rng.normal(size=6) * rng.choice([0.0, 1.0], size=6)
-    z -= w * (w @ z) / (w @ w)
-    y = power(rng, -3, 25) * z - w / (w @ w)
-    held_up = WrenchLimit(
-        w, 0.0, upper * rng.uniform(0.5, 1.0), np.zeros(c.fixed.grip.arms.shape), y
-    )
-    free = replace(c.free, lower=0.0, upper=upper, rays=(held_up,), triangles=c.free.triangles[:0])
-    return lambda: Payload(c.fixed, free)
-
-
-def more_mass(rng):
-    """A free mass that is too high, by longer rays or triangles that come again."""
-    c, least = payload(any_seed(rng))
-    lower = least * (1.0 + power(rng, -3, 1)) + SURE * 10.0 / GRAVITY
-    grown = lower / c.free.lower
-    rays = tuple(
-        replace(
-            r, limit=r.limit * grown, upper=max(r.upper, r.limit * grown),
-            forces=r.forces * rng.choice([1.0, grown]),
-        ) for r in c.free.rays
-    )  # fmt: skip
-    triangles = c.free.triangles
-    if rng.uniform() < 0.5:
-        rays, some = c.free.rays, rng.permutation(len(triangles))[: len(triangles) // 2]
-        triangles = np.vstack([triangles[some], triangles[some][:, ::-1]])
-    free = replace(
-        c.free, lower=lower, upper=max(lower, c.free.upper), rays=rays, triangles=triangles
-    )
-    return lambda: Payload(c.fixed, free)
-
-
-PAYLOAD = Attack(
-    lambda rng: cycled(rng, [less_mass, more_mass]),
-    (lambda monkeypatch: monkeypatch.setattr(checked, "bounds", always(True)),), 1500,
-)  # fmt: skip
-
-
-@cache
-def hand(seed):
-    """A genuine payload of a hand, and the least mass that it holds in some orientations."""
-    c = table.hand_payload(seed)
-    ways = np.random.default_rng(seed).normal(size=(40, 3))
+def holding_most(c):
+    """A genuine payload, and the least mass that its hand holds in some orientations."""
+    ways = np.random.default_rng(0).normal(size=(40, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     return c, min(held(c.hand, way) for way in ways)
 
 
-def hand_holds_less(rng):
+@cache
+def payload(seed):
+    """A genuine payload without motors, and what its forces chosen anew hold."""
+    contacts, springs = table.held(seed)
+    c = gc.payload(*contacts, max_push_n=10.0, **springs)
+    return c.fixed, holding_most(c.free)
+
+
+@cache
+def hand(seed):
+    """A genuine payload of a hand, and what it holds."""
+    return holding_most(table.hand_payload(seed))
+
+
+def holds_less(rng, c, least):
     """Facets of any length, also so short that the support of the contacts has no digits."""
-    c, least = hand(any_seed(rng))
     upper = 0.97 * min(least, c.lower) * (1.0 - power(rng, -3, 0))
     if upper <= 0.0:
         return None
+    longest = np.abs(np.append(c.facet, c.motor_multipliers)).max()
     if rng.uniform() < 0.7:
-        size = rng.uniform(0.6, 9.0) / max(np.abs(c.facet).max(), np.abs(c.motor_multipliers).max())
+        size = rng.uniform(0.6, 9.0) / longest
         last = -int(rng.choice([1074, 1073, 1072]))
         facet = np.ldexp(np.rint(size * c.facet + rng.uniform(-0.5, 0.5, 6)), last)
         m = np.ldexp(np.rint(size * c.motor_multipliers), last)
@@ -321,9 +279,8 @@ def hand_holds_less(rng):
     )  # fmt: skip
 
 
-def hand_holds_more(rng):
+def holds_more(rng, c, least):
     """Larger hulls, forces that grow with the claim, or triangles that come again."""
-    c, least = hand(any_seed(rng))
     lower = least * (1.0 + power(rng, -3, 3)) + SURE * c.hand.max_push_n / GRAVITY
     g, f = c.gravities * power(rng, -1, 3), c.forces * rng.choice([1.0, lower / c.lower])
     f = f + power(rng, -12, 0) * rng.normal(size=f.shape)
@@ -333,12 +290,31 @@ def hand_holds_more(rng):
     )
 
 
-HAND = Attack(
-    lambda rng: cycled(rng, [hand_holds_less, hand_holds_more]),
-    (
-        lambda monkeypatch: monkeypatch.setattr(
-            carried_mass, "of_order_one", lambda *arrays: list(arrays)
-        ),
-    ),
-    2000,
+def of_hand(claim):
+    """A claim about the payload of a hand."""
+    return lambda rng: claim(rng, *hand(any_seed(rng)))
+
+
+def of_contacts(claim):
+    """A claim about the payload of contacts, beside a genuine squeeze."""
+
+    def made(rng):
+        fixed, known = payload(any_seed(rng))
+        free = claim(rng, *known)
+        return None if free is None else lambda: Payload(fixed, free())
+
+    return made
+
+
+CLAIMS = [holds_less, holds_more]
+
+
+def short_facets(monkeypatch):
+    """Facets count at the length at which they come."""
+    monkeypatch.setattr(carried_mass, "of_order_one", lambda *arrays: list(arrays))
+
+
+PAYLOAD = Attack(
+    lambda rng: cycled(rng, [of_contacts(claim) for claim in CLAIMS]), (short_facets,), 1500
 )
+HAND = Attack(lambda rng: cycled(rng, [of_hand(claim) for claim in CLAIMS]), (short_facets,), 2000)

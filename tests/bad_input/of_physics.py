@@ -3,7 +3,7 @@
 from functools import partial
 from pathlib import Path
 
-from grasp_core.checked import LARGEST_FRICTION, MOST_EDGES, MOST_SEED
+from grasp_core.kinds import LARGEST_FRICTION, MOST_EDGES, MOST_SEED
 from tests.bad_input.cases import Case, file_case, flag_case
 from tests.bad_input.good_files import grasps_text, with_value
 

@@ -18,15 +18,18 @@ import numpy as np
 
 import grasp_core as gc
 import scenes
-from grasp_core.closure.contacts import contact_frictions
-from grasp_core.closure.soft_contacts import contact_torsions
+from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.settings import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
-from sim_validate.engine.bench import Bench
-from sim_validate.engine.limits import bisected_limits, part, ramped_limits, released_friction
-from sim_validate.engine.rig import squeezed
-from sim_validate.engine.schedules import Load
+from sim_validate.engine.bench import Bench, Load
+from sim_validate.engine.rig import (
+    bisected_limits,
+    part,
+    ramped_limits,
+    released_friction,
+    squeezed,
+)
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.kit.processes import available_cores, each

@@ -21,9 +21,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from sim_validate.engine.bench import Bench
-from sim_validate.engine.limits import loads_as_they_are, part, planned_loads, ramped_limits
-from sim_validate.engine.rig import squeezed
+from sim_validate.engine.rig import Analysis, closed_on, part, ramped_limits
 from sim_validate.engine.traces import holds
 from tests.benchmarks.objects import scaled
 
@@ -48,17 +46,14 @@ def reached(hand, body, count):
 
 def rig_of(scene, setup):
     """The hand, closed on the object."""
-    layout = scene.layout
-    return squeezed(Bench(scene), setup, layout.squeeze_forces, layout.friction)
+    return closed_on(scene, setup, scene.layout.friction)
 
 
 def around(body, contacts, verdict):
     """False answers just below and above the limits, of how many, as counts."""
     setup, layout = verdict.setup, verdict.scene.layout
     rig, counted = rig_of(verdict.scene, setup), Counter()
-    planned = planned_loads(
-        body, contacts, FRICTION, rig.idle, AGENDA, setup, motors=layout.motors
-    )  # fmt: skip
+    planned = Analysis(body, contacts, FRICTION, setup, layout.motors).planned(rig.idle, AGENDA)
     limits = [each.limit for each in planned]
     for share, right in ((BELOW, True), (ABOVE, False)):
         traces = rig.hold([part(rig.idle, limit, share) for limit in limits])
@@ -156,9 +151,8 @@ def carried(hand, body, found, way, setup):
     scene = scenes.build_hand_scene(hand, body, found, FRICTION, down=tuple(way))
     rig = rig_of(scene, setup)
     weight = [("weight", np.append(GRAVITY_M_PER_S2 * way, np.zeros(3)))]
-    (load,) = loads_as_they_are(
-        body, found.contacts, FRICTION, rig.idle, weight, setup, motors=scene.layout.motors
-    )
+    analysis = Analysis(body, found.contacts, FRICTION, setup, scene.layout.motors)
+    (load,) = analysis.as_they_are(rig.idle, weight)
     (at,) = ramped_limits(rig, [load.limit])
     share = np.nan if at is None else at.share
     return share, load.predicted_limit * share

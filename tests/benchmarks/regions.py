@@ -23,7 +23,7 @@ from grasp_core.objects.face_pieces import piece_of
 from grasp_core.regions.certify_regions import CONES, certify_regions
 from grasp_core.values import Contact
 from sim_validate.kit.processes import available_cores, each
-from sim_validate.planning.regions_json import area_of
+from sim_validate.planning.regions import area_of
 from tests.benchmarks.objects import FAMILIES
 
 FRICTION = 0.5

@@ -21,9 +21,9 @@ KINDS = {
     "building": [("mjcf.py", "build_scene"), ("bench.py", "compiled")],
     "analysis": [
         ("controls.py", "negative_controls"),
-        ("loads.py", "planned_loads"),
+        ("rig.py", "planned"),
         ("contact_forces.py", "least_friction_forces"),
-        ("limits.py", "forces_just_above"),
+        ("rig.py", "forces_just_above"),
     ],
     "reading motions": [("traces.py", "traces"), ("traces.py", "judge")],
 }

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from sim_validate.kit.result_folders import alone_in
+from sim_validate.kit.files import alone_in
 from sim_validate.main import main
 from tests.faults.conftest import contents
 

@@ -11,7 +11,7 @@ from pyarrow import parquet
 from sim_validate.datasets.parquet import parquet_bytes, read_columns
 from sim_validate.datasets.rows import TABLES
 from sim_validate.kit.files import arrays_of
-from sim_validate.planning.regions_json import SHAPES, regions_of
+from sim_validate.planning.regions import SHAPES, regions_of
 from tests.fuzzing.targets import Target
 
 MEMORY = Path("/dev/shm")  # noqa: S108 - a folder in memory, where there is one

@@ -19,7 +19,7 @@ from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
-from sim_validate.datasets.manifest import (
+from sim_validate.datasets.open_dataset import (
     Listed,
     Manifest,
     left_out_from,
@@ -32,7 +32,7 @@ from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.command_flags import Run
 from sim_validate.kit.files import tables_of_toml
 from sim_validate.kit.flag_values import flags_from, flags_of
-from sim_validate.planning.regions_json import Regions
+from sim_validate.planning.regions import Regions
 from sim_validate.planning.wrenches_json import wrenches_from_json
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text

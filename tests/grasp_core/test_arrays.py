@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.arrays import (
-    are_units,
-    frozen,
-    is_array,
-    is_indices,
-    to_digits,
-)
+from grasp_core.arrays import frozen, is_array, to_digits
 from scenes.example_objects import example_object
 from tests.tampering.changes import forged
 
@@ -50,14 +44,14 @@ def test_arrays_are_float64():
 
 
 def test_indices_are_int64():
-    assert is_indices(np.zeros((2, 3), dtype=np.int64), None, 3)
+    assert is_array(np.zeros((2, 3), dtype=np.int64), None, 3, whole=True)
     for kind in (np.int8, np.int32, np.uint8, np.uint64, np.float64, bool):
-        assert not is_indices(np.zeros(3).astype(kind), 3), kind
+        assert not is_array(np.zeros(3).astype(kind), 3, whole=True), kind
 
 
 def test_lengths_that_overflow_are_no_units():
-    assert not are_units(np.array([[300.0, 0.0, 0.0]], dtype=np.float16), 1, 3)
-    assert not are_units(np.array([[1, 0, 0]], dtype=np.int8), 1, 3)
+    assert not is_array(np.array([[300.0, 0.0, 0.0]], dtype=np.float16), 1, 3, units=True)
+    assert not is_array(np.array([[1, 0, 0]], dtype=np.int8), 1, 3, units=True)
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.int8, np.uint64, np.longdouble])

@@ -13,7 +13,7 @@ from grasp_core.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 KERNEL = "grasp_core.solvers.lp_kernel"
-CALLER, CALLED = "grasp_core.cones.spanning_kernel", "grasp_core.geometry.vectors_kernel"
+CALLER, CALLED = "grasp_core.cones.tilting_kernel", "grasp_core.geometry.vectors_kernel"
 NOWHERE = "/proc/nowhere"
 SCRIPT = f"""
 import numpy as np

@@ -9,9 +9,8 @@ from typing import Annotated, Literal
 import numpy as np
 import pytest
 
-from grasp_core.declared import FieldError
 from grasp_core.errors import InputError
-from grasp_core.kinds import Direction, Ending, Range, Vector
+from grasp_core.kinds import Direction, Ending, FieldError, Range, Vector
 from grasp_core.settings import CHOSEN, Settings, for_users
 
 

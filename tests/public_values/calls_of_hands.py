@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import grasp_core as gc
-from sim_validate.hands.hand_gate import cube, hinged_hand, stance
+from sim_validate.hands.trials import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,

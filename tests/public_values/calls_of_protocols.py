@@ -4,7 +4,7 @@ import numpy as np
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.hands.hand_gate import cube, hinged_hand, stance
+from sim_validate.hands.trials import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     NOT_NEGATIVE,
     NOT_NUMBERS,

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.declared import FieldError
+from grasp_core.kinds import FieldError
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 WEIRD = [

@@ -9,7 +9,7 @@ from typing import get_args, get_origin
 import pytest
 
 import grasp_core as gc
-from grasp_core.hands.named_hands import hand_names
+from grasp_core.hands.named_hands import HANDS
 from grasp_core.kinds import takes
 from scenes.settings import PhysicsSettings
 from sim_validate.datasets.config import HandName
@@ -70,7 +70,7 @@ def test_torsion_has_no_values_that_mujoco_would_raise(value):
 
 
 def test_hands_of_datasets_are_the_built_in_ones():
-    assert set(get_args(HandName)) == {"", *hand_names()}
+    assert set(get_args(HandName)) == {"", *HANDS}
 
 
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9_-]*(?:\.[a-z0-9_-]+)?")

@@ -8,13 +8,13 @@ import grasp_core as gc
 import scenes
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.datasets.manifest import Manifest
+from sim_validate.datasets.open_dataset import Manifest
 from sim_validate.datasets.workers import UnitRecord
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.main import main
-from sim_validate.planning.best_json import Best
-from sim_validate.planning.regions_json import Regions
+from sim_validate.planning.best import Best
+from sim_validate.planning.regions import Regions
 from sim_validate.protocols.verdict import Judgements
 from tests.damaged import check_refused, optional_keys, unbounded_keys
 from tests.fuzzing.data_files import TARGETS

@@ -1,13 +1,10 @@
 """What is claimed of squeezes and payloads: by the springs' own equations, grids and programs."""
 
-from types import SimpleNamespace
-
 import numpy as np
 from scipy.optimize import linprog
-from scipy.spatial import ConvexHull
 
 from tests.tampering.exact_closure import UNIT, conic, contacts_make_sense, locals_of, tangents
-from tests.tampering.wrench_bounds import scaled, torques_of, wrench_limit
+from tests.tampering.wrench_bounds import scaled, torques_of
 
 GRAVITY = 9.80665
 TURNS = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
@@ -188,43 +185,6 @@ def largest_scale(g, frames, offset, change, c):
         scale = answer.x[-1]
         rows.take(rows.worst(answer.x[:-1].reshape(k, 3), scale))
     return scale * unit
-
-
-def payload(c):
-    """The squeeze is as claimed, the rays too, and a hull of other rays agrees with the bounds."""
-    g, free, most = c.fixed.grip, c.free, c.fixed.max_push_n
-    E = c.fixed.loads.axes
-    ball = np.diag([GRAVITY**2] * 3 + [0.0] * 3)
-    if c.fixed.loads.offset.any() or np.abs(E @ E.T - ball).max() > 1e-6 or not squeeze(c.fixed):
-        return False
-    if not 0.0 <= free.lower <= free.upper:
-        return False
-    for ray in free.rays:
-        if abs(np.linalg.norm(ray.wrench) - GRAVITY) > 1e-7 or ray.wrench[3:].any():
-            return False
-        claimed = SimpleNamespace(
-            found=ray, positions=g.arms, normals=g.normals, friction=g.friction,
-            max_normal_force=most, center=np.zeros(3), motors=c.fixed.motors, torsion_m=0.0,
-        )  # fmt: skip
-        if not wrench_limit(claimed):
-            return False
-    if c.fixed.motors is not None and c.fixed.motors.gravity.any():
-        return False
-    inner, outer = bounds(g, c.fixed.motors, most, np.array([ray.wrench[:3] for ray in free.rays]))
-    slack = 1e-6 * most
-    return bool(free.lower <= outer + slack and free.upper >= inner - slack)
-
-
-def bounds(g, motors, most, directions):
-    """Mass held in every orientation, and the least held in some, by a hull of ends of rays."""
-    rng = np.random.default_rng(0)
-    d = np.vstack([directions, rng.normal(size=(30, 3))])
-    d /= np.linalg.norm(d, axis=1, keepdims=True)
-    held = np.array([ray(g, motors, most, each) for each in d])
-    if held.min() < 1e-7 * most:
-        return 0.0, held.min()
-    hull = ConvexHull(held[:, None] * d)
-    return max(-hull.equations[:, -1].max(), 0.0), held.min()
 
 
 def ray(g, motors, most, d):

@@ -18,7 +18,7 @@ from grasp_core.families.free import Absence, place_free
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.quality.measures import Measure, resisted_loads
 from grasp_core.regions.certify_regions import certify_regions
-from sim_validate.planning.regions_json import SHAPES, proof_arrays, regions_of
+from sim_validate.planning.regions import SHAPES, proof_arrays, regions_of
 from tests.judges import random_contacts
 from tests.tampering import (
     best_grasps,
@@ -345,7 +345,7 @@ TABLE = {
     "a cut tree for other loads": Row(cut_tree_for_loads, best_grasps.proof, 0.4),
     "a best grasp for a task": Row(lambda _: best_for_loads(0), best_grasps.best, 0.4),
     "ResistedLoads": Row(resisted, wrench_bounds.resisted),
-    "Payload": Row(payload, lambda c, _: squeezes.payload(c), 0.4),
+    "Payload": Row(payload, lambda c, _: hand_payloads.payload_of_contacts(c), 0.4),
     "HandPayload": Row(hand_payload, lambda c, _: hand_payloads.payload(c), 0.8),
     "proof file of regions": Row(
         proof_file, lambda c, rng: on_planes.regions(regions_of(vars(c)), rng), 0.4

@@ -153,7 +153,7 @@ def wrench_limit(c):
 
 def torques_of(motors, n, largest):
     """Rows of both directions of every joint for local unit forces, over limits, and their room."""
-    if motors is None:
+    if motors is None or not len(motors.limits):
         return np.zeros((0, 3 * len(n))), np.zeros(0)
     frames = np.array([np.column_stack([normal, tangents(normal)]) for normal in n])
     levers = np.einsum("jki,kil->jkl", motors.levers.reshape(-1, len(n), 3), frames)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.proofs import proves_closure, refutes_closure
+from grasp_core.closure.proofs import ContactCones, proves_closure, refutes_closure
 from tests.grasp_core.bodies import BODIES, holds, moved
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
@@ -140,14 +140,13 @@ def test_frictionless_contacts_nearly_in_one_place_are_not_closed():
 def test_giant_numbers_prove_nothing():
     """Overflow is not smaller than overflow: such twists and forces are no certificates."""
     arms, normals = np.tile(TETRA_CENTERS, (3, 1, 1)), np.tile(TETRA_NORMALS, (3, 1, 1))
-    friction = np.full((3, 1), 0.5)
+    cones = ContactCones.at(arms, normals, np.full((3, 1), 0.5))
     for giant in (1e200, np.inf, np.nan):
         twists = np.full((3, 6), 1.0)
         twists[1] = giant
-        assert not refutes_closure(twists, arms, normals, friction).any()
+        assert not refutes_closure(cones, twists).any()
         forces = 0.25 * normals
         forces[1] = giant
-        np.testing.assert_array_equal(
-            proves_closure(forces, arms, normals, friction), [True, False, True]
-        )
-    assert not refutes_closure(np.full(6, 1e200), arms[0], normals[0], friction[0])
+        np.testing.assert_array_equal(proves_closure(cones, forces), [True, False, True])
+    alone = ContactCones.at(arms[0], normals[0], np.array([0.5]))
+    assert not refutes_closure(alone, np.full(6, 1e200))

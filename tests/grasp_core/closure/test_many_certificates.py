@@ -7,7 +7,7 @@ import pytest
 
 from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.force_closure import certificates, closing_margins, force_closure
-from grasp_core.closure.proofs import margin_ceiling, proved_margin
+from grasp_core.closure.proofs import ContactCones, margin_ceiling, proved_margin
 from grasp_core.errors import UndecidedError
 
 SETS = 300
@@ -87,11 +87,13 @@ def test_margins_are_those_of_one_set_whatever_forces_and_twists_are_given():
     twists = rng.normal(size=(SETS, 6))
     for caution in (1.0, 1.01):
         mu = np.full(4, 0.6)
-        lower = proved_margin(forces, arms, normals, mu, caution)
-        upper = margin_ceiling(twists, arms, normals, mu, caution)
+        cones = ContactCones.at(arms, normals, mu)
+        lower = proved_margin(cones, forces, caution)
+        upper = margin_ceiling(cones, twists, caution)
         for i in range(SETS):
-            one = proved_margin(forces[i], arms[i], normals[i], mu, caution)
-            other = margin_ceiling(twists[i], arms[i], normals[i], mu, caution)
+            cones = ContactCones.at(arms[i], normals[i], mu)
+            one = proved_margin(cones, forces[i], caution)
+            other = margin_ceiling(cones, twists[i], caution)
             assert lower[i] == pytest.approx(one, rel=1e-9, abs=1e-13)
             assert upper[i] == pytest.approx(other, rel=1e-9, abs=1e-13)
             tested += math.isfinite(one)

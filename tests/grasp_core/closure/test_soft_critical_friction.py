@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.soft_closure import friction_interval
-from grasp_core.closure.soft_contacts import SoftContacts, margin_ceiling, proved_margin
+from grasp_core.closure.contacts import unit_size
+from grasp_core.closure.friction_search import soft_ends
+from grasp_core.closure.proofs import ContactCones, proves_closure, refutes_closure
 from tests.grasp_core.soft_cones import OPPOSITE
 from tests.judges import random_contacts
 
@@ -64,9 +65,9 @@ def test_certificates_agree_on_both_sides(count):
 
 
 def proved(found):
-    at = found.contacts.at_friction
-    below = found.twist is None or margin_ceiling(at(found.lower), found.twist) <= 0.0
-    return below and (found.local is None or proved_margin(at(found.upper), found.local) > 0.0)
+    at = found.cones.at_friction
+    below = found.twist is None or refutes_closure(at(found.lower), found.twist)
+    return below and (found.forces is None or proves_closure(at(found.upper), found.forces))
 
 
 def test_the_interval_proves_both_ends_and_is_narrow():
@@ -74,8 +75,9 @@ def test_the_interval_proves_both_ends_and_is_narrow():
     narrow = 0
     for _ in range(CASES):
         x, n = random_contacts(rng, 3, 0.5)
-        contacts = SoftContacts.of(x, n, np.ones(3), np.full(3, 0.2))
-        found = friction_interval(contacts, gc.critical_friction(x, n) or 1.0)
+        arms, _, size = unit_size(x)
+        cones = ContactCones.at(arms, n, np.ones(3), np.full(3, 0.2 / size))
+        found = soft_ends(cones, gc.critical_friction(x, n) or 1.0)
         assert proved(found)
         if 1e-3 < found.upper < math.inf:
             assert found.upper - found.lower <= 1e-7 * found.upper

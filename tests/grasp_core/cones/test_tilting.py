@@ -1,15 +1,14 @@
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.cones import tilting
 from grasp_core.cones.spanning import cones_positively_span, span_angle, span_sines
 from grasp_core.cones.tilting import tilted_cones, toward, widened
-from grasp_core.families.concurrent import BEFORE, BEHIND, cone_footprint, place_on_sides
-from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.families.placing import BEFORE, BEHIND, CONSTRUCTIONS, regions_of
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
@@ -82,14 +81,15 @@ def test_a_bore_is_held_from_inside_with_the_focus_behind_the_fingers():
             for n, s in zip(sides, (1, 1, -1, -1), strict=True)]  # fmt: skip
     found = widened(np.array([axes]), sides[None], np.full((1, 4), math.atan(friction)))
     cones = [ForceCone(axis, 0.99 * float(found.half_angles[0])) for axis in found.axes[0]]
-    assert isinstance(place_on_sides(chosen, cones, BEFORE, least=1e-3), NoPlacement)
-    placed = place_on_sides(chosen, cones, BEHIND, least=1e-3)
-    assert isinstance(placed, Placement)
-    regions = [cone_footprint(p, c, placed.foci[0], at)
-               for p, c, at in zip(chosen, cones, placed.positions, strict=True)]  # fmt: skip
+    before, behind = (
+        replace(CONSTRUCTIONS["concurrent"], patterns=sides[None]).place(chosen, cones, 1e-3)
+        for sides in (BEFORE, BEHIND)
+    )
+    assert before is None
+    (regions,) = regions_of("cone", [(chosen, cones, behind)])
     rng = np.random.default_rng(0)
     for _ in range(60):
-        points = [rng.dirichlet(np.full(len(r), 0.3)) @ r for r in regions]
+        points = [rng.dirichlet(np.full(len(r.polygon), 0.3)) @ r.polygon for r in regions]
         assert gc.force_closure(points, sides, friction).closed
 
 
@@ -109,18 +109,15 @@ def test_axes_lean_the_same_way_where_the_point_is_in_a_face_but_for_rounding():
     np.testing.assert_allclose(above.axes, below.axes, atol=1e-5)
 
 
-def test_compiled_cones_are_those_of_the_arrays(monkeypatch):
+def test_compiled_cones_are_those_of_the_arrays():
     rng = np.random.default_rng(3)
     normals = rng.normal(size=(600, 4, 3))
     normals[:200, :, 2] *= 0.05  # nearly in a plane, as the sides of a box
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     thetas = rng.uniform(0.1, 0.7, size=(600, 4))
     quick = tilted_cones(normals, thetas)
-    monkeypatch.setattr(tilting, "half_angle", reference.half_angle)
-    monkeypatch.setattr(tilting, "_balanced", reference.balanced)
-    monkeypatch.setattr(tilting, "_improved", reference.improved)
-    slow = tilted_cones(normals, thetas)
-    np.testing.assert_allclose(quick.half_angles, slow.half_angles, atol=1e-12)
-    np.testing.assert_allclose(quick.axes, slow.axes, atol=1e-10)
-    assert (slow.half_angles > 0.01).sum() >= 300
-    assert (slow.half_angles < 0.0).sum() >= 20
+    axes, half_angles = reference.tilted_cones(normals, thetas)
+    np.testing.assert_allclose(quick.half_angles, half_angles, atol=1e-12)
+    np.testing.assert_allclose(quick.axes, axes, atol=1e-10)
+    assert (half_angles > 0.01).sum() >= 300
+    assert (half_angles < 0.0).sum() >= 20

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from grasp_core.execution.payload import ball_in, nearest_facet, outward
+from grasp_core.execution.carried_mass import ball_in, nearest_facet, outward
 
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
 INSIDE = 1.0 / np.sqrt(3.0)

@@ -7,8 +7,13 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.execution import carried_mass as carried_mass_module
-from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
-from grasp_core.execution.payload import ball_in
+from grasp_core.execution.carried_mass import (
+    GAP,
+    CarryingHand,
+    HandPayload,
+    ball_in,
+    carried_mass,
+)
 from tests.grasp_core.execution.held import bodies_and_grasps, box, directions, opposed
 from tests.grasp_core.execution.jointed import LEVER_M, hand_of, jaws, lifting, pushing
 from tests.tampering.changes import forged

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.execution.payload import GAP
+from grasp_core.execution.carried_mass import GAP
 from tests.grasp_core.execution.held import (
     bodies_and_grasps,
     box,
@@ -161,9 +161,9 @@ def test_false_claims_are_no_certificate():
     false = [
         {"lower": free.lower * 1.001}, {"upper": free.lower * 0.999},
         {"upper": free.upper * (1.0 - 1e-6)}, {"triangles": free.triangles[1:]},
-        {"triangles": free.triangles[:, ::-1]}, {"rays": free.rays[1:]}, {"rays": ()},
-        {"triangles": None}, {"rays": None}, {"lower": np.nan}, {"upper": "a"},
-        {"rays": (None,) * len(free.rays)},
+        {"triangles": free.triangles[:, ::-1]}, {"forces": 0.9 * free.forces},
+        {"gravities": free.gravities[1:]}, {"facet": np.zeros(6)}, {"facet": -free.facet},
+        {"triangles": None}, {"forces": None}, {"lower": np.nan}, {"upper": "a"}, {"hand": None},
     ]  # fmt: skip
     for change in false:
         changed = forged(found, free=forged(free, **change))

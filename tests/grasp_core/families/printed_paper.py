@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.cones.pyramids import inscribed_facets
-from grasp_core.cones.spanning import balancing_weights
+from grasp_core.cones.pyramids import PYRAMID_SIDES, pyramid_facets
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.values import ForceCone
+from tests.judges import balancing_weights
 
 LEAST = 1e-3
 """Smallest disc radius accepted from the printed pencil program, in object radii."""
@@ -109,7 +109,7 @@ def printed_regulus(
         across = np.asarray(np.cross(N[i], u), dtype=np.float64)
         F.append(u[:, None] * x + sign * (across[:, None] * y + N[i][:, None] * z))
         contact = D[-1] - F[-1]
-        flat, G = T.T @ contact, inscribed_facets(cone, T[:, 0])
+        flat, G = T.T @ contact, pyramid_facets(cone.axis, cone.half_angle, T[:, 0], PYRAMID_SIDES)
         rows += [piece.E @ flat, flat - v[12], -flat - v[12], -G @ F[-1], -(n @ F[-1])[None]]
         limits += [piece.b + piece.E @ middle, middle, -middle, np.zeros(len(G)), least]
         A_eq.append(n @ contact)

@@ -1,14 +1,13 @@
-"""Reference for the bounds by corners in `discs_kernel`: its bounds (1) and (2) in NumPy."""
+"""Reference for `disc_bounds_kernel`: its bounds (1) and (2) in NumPy."""
 
 from itertools import combinations
 
 import numpy as np
 
-from grasp_core.cones.spanning import balancing_weights
-from grasp_core.families.discs_kernel import SAME_AXIS
-from grasp_core.families.pencil import pencil_radius_bounds
-from grasp_core.families.placements import PAIRINGS
+from grasp_core.families.disc_bounds import pencil_radius_bounds
+from grasp_core.families.disc_bounds_kernel import SAME_AXIS
 from grasp_core.values import FINGERS
+from tests.judges import balancing_weights
 
 
 def disc_limits(corners, faces, axes, half_angles):
@@ -16,7 +15,7 @@ def disc_limits(corners, faces, axes, half_angles):
     points, angles = corners.points[faces], np.maximum(half_angles, 0.0)
     far, wide = reaches(points, axes), widths(points, axes)
     concurrent = far * np.tan(angles)
-    return np.hstack([concurrent[:, None], pencil_radius_bounds(far, wide, angles, PAIRINGS)])
+    return np.hstack([concurrent[:, None], pencil_radius_bounds(far, wide, angles)])
 
 
 def reaches(corners, axes):

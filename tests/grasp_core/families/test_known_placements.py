@@ -2,15 +2,15 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
-from grasp_core.families.concurrent import place_concurrent
-from grasp_core.families.pencil import CELL_A, place_pencil
-from grasp_core.families.placements import NoPlacement, Placement
+from grasp_core.families.placements import LEAST_RADIUS
+from grasp_core.families.placing import CELL_A, CONSTRUCTIONS
 from grasp_core.geometry.polygons import edge_rows, plane_frame
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.face_pieces import FacePiece, unit_pieces
@@ -60,9 +60,9 @@ def test_equal_displacements_leave_no_focus_unless_there_is_enough_friction(shif
     assert gc.force_closure(positions, normals, 1e-3).closed
     pieces = [small_piece(*contact) for contact in zip(positions, normals, strict=True)]
     needed = math.sqrt(3.0) * np.linalg.norm(shift)
-    for share, kind in ((0.5, NoPlacement), (0.99, NoPlacement), (1.025, Placement)):
+    for share, held in ((0.5, False), (0.99, False), (1.025, True)):
         cones = [ForceCone(normal, math.atan(share * needed)) for normal in normals]
-        assert isinstance(place_concurrent(pieces, cones, least=0.0), kind)
+        assert bool(CONSTRUCTIONS["concurrent"].place(pieces, cones, 0.0)) is held
 
 
 def bar(length):
@@ -97,8 +97,9 @@ def test_pencils_on_the_ends_of_a_bar_do_not_depend_on_its_length(theta_deg, len
     t = math.tan(math.radians(theta_deg) / 2.0)
     assert length > (1.0 - t) / (1.0 + t)
     cones = half_angle_cones(ends, theta_deg)
-    placed = place_pencil(ends, cones, least=1e-3, least_gap=1e-3, cells=(CELL_A,))
-    assert isinstance(placed, Placement)
+    construction = replace(CONSTRUCTIONS["pencil"], patterns=CELL_A[None])
+    placed = construction.place(ends, cones, LEAST_RADIUS)
+    assert placed is not None
     expected = math.sqrt(2.0) * t / (1.0 + t)
     assert body.radius * placed.merit == pytest.approx(expected, abs=body.radius * TOLERANCE)
 
@@ -110,9 +111,10 @@ def test_a_focus_serves_both_ends_of_a_bar_only_up_to_a_known_length():
     q = math.tan(math.radians(10.0))
     longest = [2.0 / (1.0 - share * q) - 1.0 for share in (math.cos(math.pi / 16.0), 1.0)]
     assert longest == pytest.approx([1.4182, 1.4281], abs=5e-5)
-    for length, kind in ((longest[0] - 1e-3, Placement), (longest[1] + 1e-3, NoPlacement)):
+    for length, held in ((longest[0] - 1e-3, True), (longest[1] + 1e-3, False)):
         _, ends = bar(length)
-        assert isinstance(place_concurrent(ends, half_angle_cones(ends, 10.0), least=0.0), kind)
+        cones = half_angle_cones(ends, 10.0)
+        assert bool(CONSTRUCTIONS["concurrent"].place(ends, cones, 0.0)) is held
 
 
 @pytest.mark.parametrize(
@@ -135,8 +137,8 @@ def test_tilted_cones_hold_a_cube_by_its_four_sides(friction, tilt_deg, half_ang
     spans = math.degrees(gc.span_angle([cone.axis for cone in cones]))
     assert spans == pytest.approx(half_angle_deg, abs=1e-3)
     assert math.degrees(math.atan(friction)) - tilt_deg == pytest.approx(spans, abs=1e-3)
-    placed = place_concurrent(sides, cones, least=1e-4)
-    assert isinstance(placed, Placement)
+    placed = CONSTRUCTIONS["concurrent"].place(sides, cones, 1e-4)
+    assert placed is not None
     assert 0.983 * radius < body.radius * placed.merit < 1.005 * radius
     rng = np.random.default_rng(4)
     for turns in rng.uniform(0, 2 * np.pi, (10, 4)):

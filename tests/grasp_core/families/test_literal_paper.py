@@ -7,6 +7,7 @@ the constructions back.
 """
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -14,13 +15,11 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
-from grasp_core.cones.spanning import balancing_weights
-from grasp_core.families.pencil import CELL_A, place_pencil
-from grasp_core.families.placements import Placement
-from grasp_core.families.regulus import LEAST_DEPTH, place_regulus
+from grasp_core.families.placements import LEAST_RADIUS
+from grasp_core.families.placing import CELL_A, CONSTRUCTIONS
+from grasp_core.families.regulus_kernel import LEAST_DEPTH
 from tests.grasp_core.families.disc_borders import descended_margin
 from tests.grasp_core.families.printed_paper import (
-    LEAST,
     PAIR,
     Discs,
     focus_gap,
@@ -29,6 +28,7 @@ from tests.grasp_core.families.printed_paper import (
     unit,
 )
 from tests.grasp_core.quadruples import paired_quadruples
+from tests.judges import balancing_weights
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -70,9 +70,11 @@ def test_on_the_tetrahedron_the_printed_pencil_program_prefers_the_wrong_order(t
         assert scale * discs.radii[0] == pytest.approx(printed, abs=1e-6)
         assert focus_gap(quad, discs.foci) < -1.0
         assert not in_a_safe_cell(quad, discs)
-        proved = place_pencil(quad, cones, least=LEAST, least_gap=0.0, cells=(CELL_A,))
-        assert isinstance(proved, Placement)
-        assert scale * proved.merit == pytest.approx(math.tan(theta / 2.0) / scale, abs=TOLERANCE)
+        proved = replace(CONSTRUCTIONS["pencil"], patterns=CELL_A[None]).place(quad, cones)
+        assert proved is not None
+        # half of the least gap puts each focus 1 / sqrt(3) of it nearer to its faces
+        depth = 1.0 / scale - 0.5 * LEAST_RADIUS
+        assert scale * proved.merit == pytest.approx(depth * math.tan(theta / 2.0), abs=TOLERANCE)
 
 
 COUNTEREXAMPLE_THETA = math.radians(5.0)
@@ -178,8 +180,8 @@ def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
         if discs is not None and not in_a_safe_cell(quad, discs):
             printed += 1
             broken += adversarial_margin(quad, discs) < -TOLERANCE
-        placed = place_pencil(quad, cones, least=LEAST, least_gap=LEAST)
-        if isinstance(placed, Placement):
+        placed = CONSTRUCTIONS["pencil"].place(quad, cones, LEAST_RADIUS)
+        if placed is not None:
             discs = Discs(placed.positions, placed.radii, placed.foci)
             assert in_a_safe_cell(quad, discs)
             assert adversarial_margin(quad, discs) > 0.0
@@ -214,8 +216,8 @@ def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
             printed += 1
             independent += fourth_singular_value(loose.positions, loose.forces) > 10 * TOLERANCE
             unclosed += not gc.force_closure(loose.positions, normals, friction).closed
-            placed = place_regulus(quad, cones)
-            if isinstance(placed, Placement):
+            placed = CONSTRUCTIONS["regulus"].place(quad, cones)
+            if placed is not None:
                 assert -placed.merit >= loose.offset - TOLERANCE
                 assert fourth_singular_value(placed.positions, placed.forces) < TOLERANCE
                 assert gc.force_closure(placed.positions, normals, friction).closed

@@ -1,29 +1,30 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.cones.spanning import balancing_weights
-from grasp_core.families.pencil import CELL_A, CELL_B, pencil_radius_bounds, place_pencil
-from grasp_core.families.placements import Placement
-from grasp_core.families.placing import AS_LISTED
+from grasp_core.families.disc_bounds import pencil_radius_bounds
+from grasp_core.families.placements import LEAST_RADIUS
+from grasp_core.families.placing import AS_LISTED, CELL_A, CELL_B, CONSTRUCTIONS
 from grasp_core.objects.face_pieces import unit_pieces
 from scenes.example_objects import example_object
 from tests.grasp_core.families.disc_borders import descended_margin, extremes, least_margin
 from tests.grasp_core.quadruples import paired_quadruples, tilted_side_cones
+from tests.judges import balancing_weights
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
 BORDER = 1e-6
 """Friction above that of the force cones: contacts on the borders use their very edge."""
-LEAST = 1e-3
 
 
-def pencils(name, theta, limit=None, cells=(CELL_A, CELL_B), gap=LEAST):
+def pencils(name, theta, limit=None, cells=(CELL_A, CELL_B)):
+    construction = replace(CONSTRUCTIONS["pencil"], patterns=np.array(cells))
     for quad, cones in paired_quadruples(name, theta, limit):
-        placed = place_pencil(quad, cones, least=LEAST, least_gap=gap, cells=cells)
-        if isinstance(placed, Placement):
+        placed = construction.place(quad, cones, LEAST_RADIUS)
+        if placed is not None:
             yield quad, cones, placed
 
 
@@ -33,14 +34,16 @@ def pencils(name, theta, limit=None, cells=(CELL_A, CELL_B), gap=LEAST):
 def test_the_tetrahedron_has_discs_of_half_the_cone_angle_in_all_pairings(theta_deg, radius):
     """r = rho0 tan(theta / 2) with rho0 = 1 / sqrt(3), for vertices at distance sqrt(3).
 
-    With the foci pushed together, that is; with the foci in the other order, but near enough
-    to each other, discs get larger.
+    With the foci pushed together, that is, as far as the least gap lets them: each is half of it
+    from the middle, and 1 / sqrt(3) of that nearer to its faces. With the foci in the other order,
+    but near enough to each other, discs get larger.
     """
     theta = math.radians(theta_deg)
-    found = list(pencils("tetrahedron", theta, cells=(CELL_A,), gap=0.0))
+    found = list(pencils("tetrahedron", theta, cells=(CELL_A,)))
+    nearer = 0.5 * LEAST_RADIUS * math.tan(theta / 2.0)
     assert len(found) == 3
     for _, _, placed in found:
-        np.testing.assert_allclose(math.sqrt(3.0) * placed.radii, radius, atol=1e-6)
+        np.testing.assert_allclose(math.sqrt(3.0) * placed.radii, radius - nearer, atol=1e-6)
     near = list(pencils("tetrahedron", theta, cells=(CELL_B,)))
     assert len(near) == 3
     for quad, _, placed in near:
@@ -132,8 +135,8 @@ def test_tilted_cones_hold_a_box_by_its_four_sides():
     rng, tested = np.random.default_rng(0), 0
     for order in ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2)):
         quad = [pieces[i] for i in order]
-        placed = place_pencil(quad, [cones[i] for i in order], least=LEAST, least_gap=LEAST)
-        if isinstance(placed, Placement):
+        placed = CONSTRUCTIONS["pencil"].place(quad, [cones[i] for i in order], LEAST_RADIUS)
+        if placed is not None:
             choices = [*extremes(quad), *rng.uniform(0, 2 * np.pi, (40, 4))]
             discs = placed.positions, placed.radii
             assert least_margin(quad, *discs, choices, 0.5 + BORDER) > 0.0

@@ -1,20 +1,21 @@
-"""Contacts placed for many attempts at once beside those placed one by one."""
-
-from types import SimpleNamespace
+"""Contacts placed for many attempts at once, in compiled code and by HiGHS."""
 
 import numpy as np
 import pytest
 
+from grasp_core.errors import SolverError
 from grasp_core.families import placing
-from grasp_core.families.discs_kernel import optimum
-from grasp_core.families.placements import LEAST_RADIUS, LEFT, NONE, PLACED, Placement
-from grasp_core.families.placing import CONSTRUCTIONS, MIXED, ManyPlacements, regions_of
-from grasp_core.objects.face_pieces import face_shapes
+from grasp_core.families.placements import LEAST_RADIUS, face_table
+from grasp_core.families.placing import CONSTRUCTIONS, MIXED, attempts_of, regions_of
+from grasp_core.objects.face_pieces import edge_rows, face_shapes, inscribed_radius
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, PlannedCones
 from grasp_core.planning.quadruples import all_blocks
+from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import ForceCone, four
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
+from tests.grasp_core.families import reference_programs as programs
+from tests.grasp_core.quadruples import leave_all
 
 SAME = 1e-9
 """Ten times less than what a program's answer may be off; optima are unique."""
@@ -45,34 +46,49 @@ def attempts(body, theta, orders, count=EACH):
     return [shape.hull if shape else None for shape in shapes], [found[i] for i in picks]
 
 
+def placed(construction, pieces, listed, least=LEAST_RADIUS):
+    """What a construction places for each attempt, all of them asked for at once."""
+    many = construction.placed(face_table(pieces), attempts_of(listed), np.full(len(listed), least))
+    return [construction.one_of(many, a) for a in range(len(listed))]
+
+
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("friction", [0.18, 0.5, 0.9])
-def test_many_placements_are_those_placed_one_by_one(case, friction):
+def test_discs_are_the_largest_that_plain_rows_allow(case, friction):
     construction, ends = CASES[case], {True: 0, False: 0}
+    plain = programs.pencil if case == "pencil" else programs.concurrent
     for name in OBJECTS:
         pieces, listed = attempts(
             example_object(name), float(np.arctan(friction)), construction.orders
         )
-        asked = [(faces, cones, LEAST_RADIUS) for faces, cones in listed]
-        for (faces, cones, least), known in zip(
-            asked, ManyPlacements(pieces).of(construction, asked), strict=True
-        ):
+        found = placed(construction, pieces, listed)
+        for (faces, cones), at in zip(listed, found, strict=True):
             on = [pieces[face] for face in faces]
-            alone = construction.place(on, cones, least)
-            assert known is not None
-            assert isinstance(alone, Placement) is (known.placement is not None)
-            ends[known.placement is not None] += 1
-            if known.placement is not None:
-                agrees(known.placement, alone)
-                regions = regions_of(construction.region, on, cones, alone)
-                for one, other in zip(known.regions, regions, strict=True):
-                    assert one.kind == other.kind
-                    assert not one.polygon.flags.writeable
-                    np.testing.assert_allclose(one.polygon, other.polygon, rtol=0.0, atol=SAME)
-                    assert one.inscribed_radius == pytest.approx(other.inscribed_radius, abs=SAME)
+            best = max(plain(on, cones, signs) for signs in construction.patterns) - RESIDUAL
+            assert (at is not None) is (best >= LEAST_RADIUS - RESIDUAL)
+            ends[at is not None] += 1
+            if at is not None:
+                assert at.merit == pytest.approx(best, abs=1e-6 * best)  # a later pattern, if equal
     assert sum(ends.values()) == EACH * len(OBJECTS)
     assert ends[True] >= (0 if case == "mixed" else 100)
     assert ends[False] >= (10 if case == "mixed" else 0)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_highs_places_what_compiled_code_leaves_in_the_same_way(case, monkeypatch):
+    construction, tested = CASES[case], 0
+    for name in OBJECTS:
+        pieces, listed = attempts(example_object(name), 0.4, construction.orders)
+        quick = placed(construction, pieces, listed)
+        with monkeypatch.context() as patch:
+            leave_all(patch)
+            slow = placed(construction, pieces, listed)
+        for one, other in zip(quick, slow, strict=True):
+            assert (one is None) is (other is None)
+            if one is not None:
+                agrees(one, other)
+                tested += 1
+    assert tested >= (20 if case == "mixed" else 100)
 
 
 def agrees(one, other):
@@ -81,70 +97,61 @@ def agrees(one, other):
     assert one.merit == pytest.approx(other.merit, abs=SAME)
 
 
+@pytest.mark.parametrize("case", ["concurrent", "mixed"])
+def test_regions_are_the_faces_cut_to_the_inverted_cones(case):
+    construction, planned = CASES[case], []
+    for name in OBJECTS:
+        pieces, listed = attempts(example_object(name), 0.4, construction.orders)
+        for (faces, cones), at in zip(listed, placed(construction, pieces, listed), strict=True):
+            if at is not None:
+                planned.append(([pieces[face] for face in faces], cones, at))
+    for (pieces, cones, at), regions in zip(planned, regions_of("cone", planned), strict=True):
+        for piece, cone, contact, region in zip(pieces, cones, at.positions, regions, strict=True):
+            polygon = programs.footprint(piece, cone, at.foci[0], contact)
+            rows = edge_rows((polygon - piece.origin) @ piece.frame)
+            assert not region.polygon.flags.writeable
+            np.testing.assert_allclose(region.polygon, polygon, rtol=0.0, atol=SAME)
+            assert region.inscribed_radius == pytest.approx(inscribed_radius(*rows), abs=SAME)
+    assert len(planned) >= (20 if case == "mixed" else 100)
+
+
 def test_curved_patches_are_allowed_for():
     """Patches have depths, which the rows of the programs lose."""
-    body = curved_body()
-    construction, placed = CONSTRUCTIONS["concurrent"], 0
-    pieces, listed = attempts(body, 0.6, construction.orders)
-    assert max(piece.depth for piece in pieces if piece) > 0.0
-    asked = [(faces, cones, LEAST_RADIUS) for faces, cones in listed]
-    for ask, known in zip(asked, ManyPlacements(pieces).of(construction, asked), strict=True):
-        alone = construction.place([pieces[face] for face in ask[0]], *ask[1:])
-        assert isinstance(alone, Placement) is (known.placement is not None)
-        if known.placement is not None:
-            agrees(known.placement, alone)
-            placed += 1
-    assert placed >= 10
+    for family, plain in (("concurrent", programs.concurrent), ("pencil", programs.pencil)):
+        construction, tested = CONSTRUCTIONS[family], 0
+        pieces, listed = attempts(curved_body(), 0.6, construction.orders)
+        assert max(piece.depth for piece in pieces if piece) > 0.0
+        for (faces, cones), at in zip(listed, placed(construction, pieces, listed), strict=True):
+            on = [pieces[face] for face in faces]
+            best = max(plain(on, cones, signs) for signs in construction.patterns) - RESIDUAL
+            assert (at is not None) is (best >= LEAST_RADIUS)
+            if at is not None:
+                assert at.merit == pytest.approx(best, abs=1e-6 * best)
+                tested += 1
+        assert tested >= 10
 
 
 def test_discs_that_are_too_small_are_proved_to_be_none():
     construction = CONSTRUCTIONS["pencil"]
     pieces, listed = attempts(example_object("random-12-1"), 0.4, construction.orders)
-    known = ManyPlacements(pieces).of(construction, [(*each, 10.0) for each in listed])
-    assert len(known) == EACH
-    assert all(each is not None and each.placement is None for each in known)
+    assert placed(construction, pieces, listed, 10.0) == [None] * EACH
 
 
-def test_reguli_and_cones_of_different_widths_are_left():
+def test_of_cones_with_different_widths_the_narrowest_counts():
     pieces, listed = attempts(example_object("random-12-1"), 0.4, ((0, 1, 2, 3),))
     faces, cones = listed[0]
-    wider = ForceCone(cones[3].axis, 0.5 * cones[3].half_angle)
-    many = ManyPlacements(pieces)
-    assert many.of(CONSTRUCTIONS["regulus"], [(faces, cones, -np.inf)]) == [None]
-    assert many.of(CONSTRUCTIONS["pencil"], [(faces, (*cones[:3], wider), 1e-3)]) == [None]
-    assert many.of(CONSTRUCTIONS["pencil"], []) == []
+    narrow = four(ForceCone(cone.axis, 0.5 * cone.half_angle) for cone in cones)
+    mixed = (*cones[:3], narrow[3])
+    one, other = placed(CONSTRUCTIONS["pencil"], pieces, [(faces, narrow), (faces, mixed)])
+    agrees(one, other)
 
 
-def test_what_compiled_code_leaves_is_left(monkeypatch):
-    construction = CONSTRUCTIONS["concurrent"]
-    pieces, listed = attempts(example_object("random-12-1"), 0.4, construction.orders)
-    kernels = placing.compiled
+def test_a_program_that_nobody_solves_is_said_to_fail(monkeypatch):
+    def failing(*_):
+        raise SolverError("no answer")
 
-    def leaving(name):
-        kernel = kernels(name)
-
-        def place(*given):
-            kernel.place(*given)
-            given[-1].ends[::2] = LEFT
-
-        return SimpleNamespace(place=place, footprints=kernel.footprints)
-
-    monkeypatch.setattr(placing, "compiled", leaving)
-    asked = [(*each, LEAST_RADIUS) for each in listed]
-    known = ManyPlacements(pieces).of(construction, asked)
-    assert [each is None for each in known] == [i % 2 == 0 for i in range(EACH)]
-
-
-def test_programs_in_compiled_code_end_as_they_should():
-    """A square: its corner, a bound below the cutoff, no bound at all, nothing feasible, NaN."""
-    A = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-    b, c, x = np.array([1.0, 2.0, 0.0, 0.0]), np.array([1.0, 1.0]), np.zeros(2)
-    assert optimum(c, A, b, -np.inf, x) == (PLACED, pytest.approx(3.0, abs=1e-12))
-    np.testing.assert_allclose(x, [1.0, 2.0], rtol=0.0, atol=1e-12)
-    end, bound = optimum(c, A, b, 5.0, x)
-    assert end == NONE
-    assert 3.0 - 1e-9 <= bound <= 5.0
-    assert optimum(c, A[2:].copy(), b[2:].copy(), -np.inf, x)[0] == LEFT
-    assert optimum(c, A, np.array([1.0, 2.0, -3.0, 0.0]), -np.inf, x)[0] == LEFT
-    assert optimum(c, A, np.array([1.0, np.nan, 0.0, 0.0]), -np.inf, x)[0] == LEFT
-    assert optimum(np.array([1.0, np.nan]), A, b, -np.inf, x)[0] == LEFT
+    pieces, listed = attempts(example_object("random-12-1"), 0.4, ((0, 1, 2, 3),))
+    leave_all(monkeypatch)
+    monkeypatch.setattr(placing, "maximize_above", failing)
+    with pytest.raises(SolverError, match="neither solved nor proved"):
+        placed(CONSTRUCTIONS["concurrent"], pieces, listed[:1])

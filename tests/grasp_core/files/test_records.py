@@ -12,7 +12,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.arrays import Array, Indices, Point, Shape, UnitVector
 from grasp_core.declared import Declared
-from grasp_core.files.json_text import value_of
+from grasp_core.files.json_text import json_of
 from grasp_core.files.records import (
     FLAT,
     UNRECORDED,
@@ -22,16 +22,7 @@ from grasp_core.files.records import (
     record_of,
     recorded,
 )
-from grasp_core.kinds import (
-    Count,
-    Direction,
-    Many,
-    Measured,
-    OrInfinity,
-    Quantity,
-    Seed,
-    Vector,
-)
+from grasp_core.kinds import Count, Direction, Many, Measured, OrInfinity, Quantity, Seed, Vector
 from tests.damaged import check_refused, damaged, optional_keys, value_at
 
 
@@ -96,7 +87,7 @@ WHOLE = Whole(
 
 
 def read(text):
-    return from_record(Whole, value_of(text), hidden="here")
+    return from_record(Whole, json_of(text), hidden="here")
 
 
 @pytest.mark.parametrize(

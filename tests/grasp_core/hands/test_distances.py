@@ -5,9 +5,13 @@ import pytest
 import scipy.optimize
 import trimesh
 
+import grasp_core as gc
 import scenes
 from grasp_core.compiled import compiled
-from grasp_core.hands.collisions import surface_tree
+from grasp_core.hands.collisions import FAR, surface_tree
+from grasp_core.hands.collisions import KERNEL as HANDS
+from grasp_core.hands.hand_arrays import hand_arrays
+from grasp_core.hands.kinematics import places
 from tests.judges import random_rotation
 
 KERNEL = "grasp_core.hands.distances_kernel"
@@ -75,19 +79,6 @@ def corners(h, R, middle):
     return middle + (signs * h) @ R.T
 
 
-def test_boxes_and_triangles_are_as_far_apart_as_a_program_says():
-    rng, kernel = np.random.default_rng(3), compiled(KERNEL)
-    apart = 0
-    for _ in range(300):
-        h = rng.uniform(0.1, 1.0, 3) * rng.integers(0, 2, 3)
-        T = rng.normal(size=(3, 3)) + rng.normal(scale=1.5, size=3)
-        found = kernel.box_triangle(h, T, 10.0)
-        true = hulls_apart(corners(h, np.eye(3), np.zeros(3)), T)
-        apart += found > 0.01
-        assert max(found, 0.0) == pytest.approx(true, abs=1e-6)
-    assert 100 < apart < 300
-
-
 def test_boxes_are_as_far_apart_as_a_program_says_and_the_way_and_point_lie_between():
     rng, kernel = np.random.default_rng(4), compiled(KERNEL)
     way, point, apart = np.empty(3), np.empty(3), 0
@@ -153,18 +144,33 @@ def test_nearest_points_are_those_of_trimesh(name):
     assert kernel.nearest(np.full(3, 9.0), 1.0, tree, near) == -1
 
 
-def test_a_box_and_a_surface_are_as_far_apart_as_its_nearest_triangle():
-    body, rng = scenes.example_object("cross"), np.random.default_rng(7)
-    tree, kernel, seen = surface_tree(body), compiled(KERNEL), 0
-    for _ in range(60):
-        h, R, middle = (
-            rng.uniform(0.002, 0.02, 3),
-            random_rotation(rng),
-            rng.uniform(-0.12, 0.12, 3),
-        )
-        found = kernel.box_surface(h, R, middle, 1.0, tree)
-        box = corners(h, R, middle)
-        true = min(hulls_apart(box, T) for T in body.vertices[body.triangles])
-        assert max(found, 0.0) == pytest.approx(true, abs=1e-7)
-        seen += found > 1e-3
-    assert 20 < seen < 60
+@pytest.mark.parametrize("name", ["allegro", "leap"])
+def test_a_hand_is_as_far_from_a_surface_as_its_nearest_hull_or_overlaps_it(name):
+    """Boxes without rounding too: those of LEAP's links."""
+    hand, body, rng = gc.load_hand(name), scenes.example_object("cross"), np.random.default_rng(7)
+    arrays, kernel, overlaps, apart = hand_arrays(hand), compiled(HANDS), 0, 0
+    tree, low, high = surface_tree(body), *hand.ranges.T
+    needs = np.full(len(arrays.shape_links), FAR)
+    for _ in range(12):
+        angles, pose = rng.uniform(low, high), np.eye(4)
+        pose[:3, :3], pose[:3, 3] = random_rotation(rng), rng.normal(scale=0.12, size=3)
+        found = places(hand, angles, pose)
+        turned, middles = np.empty((len(needs), 3, 3)), np.empty((len(needs), 3))
+        frame = pose[:3, :3].copy(), pose[:3, 3].copy()
+        links = found.link_rotations[0], found.link_positions[0]
+        kernel.place_shapes(arrays, *frame, *links, turned, middles)
+        said = kernel.of_object(arrays, turned, middles, tree, needs)
+        cores = [kernel.core_in(arrays, turned[s], middles[s], s) for s in range(len(needs))]
+        hulls = [
+            (min(hulls_apart(core, T) for T in body.vertices[body.triangles]), rounding)
+            for core, rounding in cores
+        ]
+        inside = any(is_inside(core[0], body) for core, _ in cores)
+        if inside or min(away for away, _ in hulls) < EXACT:
+            overlaps += 1
+            assert said == -tree.radii[0]
+        else:
+            apart += 1
+            true = min(away - rounding for away, rounding in hulls) - FAR
+            assert min(said, 0.0) == pytest.approx(min(true, 0.0), abs=EXACT)
+    assert min(overlaps, apart) >= 2

@@ -12,8 +12,8 @@ import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files import glb as glb_files
 from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.polygons import TextPoints
 from grasp_core.mesh_files.reading import read_triangles
-from grasp_core.mesh_files.rounding import TextPoints
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
 from tests.bad_input.mesh_texts import obj as obj_text

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from grasp_core.mesh_files.polygons import BLOCK, most_digits, single_rounding, text_rounding
 from grasp_core.mesh_files.reading import mesh_of_bytes
-from grasp_core.mesh_files.rounding import BLOCK, most_digits, single_rounding, text_rounding
 from tests.bad_input.mesh_texts import obj, off, ply, stl, stl_text
 
 MOST = 50_000

@@ -9,6 +9,7 @@ import trimesh
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
+from grasp_core.objects.booleans import hull
 from grasp_core.objects.curved_patches import clearest_point, clearing, flat_patches
 from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body, inside, met
 
@@ -43,6 +44,17 @@ def _room(face):
     inward = np.cross(face.normal, edges)
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)
     return np.einsum("ki,ki->k", inward, face.centroid - face.polygon).min()
+
+
+def test_a_patch_of_one_large_triangle_keeps_the_limits_too():
+    """Roofs of four triangles that lean by 4 degrees, whose average normals are upright."""
+    square = itertools.product((-0.05, 0.05), (-0.05, 0.05), (0.0, 0.03))
+    rise = 0.05 * math.tan(math.radians(4.0))
+    solid = hull([*square, (0.0, 0.0, -rise), (0.0, 0.0, 0.03 + rise)])
+    limits = gc.PatchLimits()
+    found = flat_patches(solid.vertices, solid.triangles, limits)
+    assert len(found) == 12
+    assert max(face.depth for face in found) <= limits.depth * 0.1
 
 
 def test_no_patch_spans_a_hole_in_the_surface():

@@ -27,12 +27,6 @@ def test_every_format_gives_the_same_box(box, kind, tmp_path):
     )
 
 
-def test_the_unit_scales_lengths(box, tmp_path):
-    box.apply_scale(1000.0).export(tmp_path / "box.stl")
-    body = gc.load_polyhedron(tmp_path / "box.stl", unit="mm")
-    assert body.volume == pytest.approx(0.006, rel=1e-6)
-
-
 def test_a_scale_multiplies_the_coordinates_of_a_file_besides_its_unit(box, tmp_path):
     path = tmp_path / "box.obj"
     box.copy().apply_scale(2000.0).export(path)
@@ -65,15 +59,6 @@ def test_an_inside_out_mesh_is_turned_and_says_so(box):
     assert body.volume == pytest.approx(0.006)
     assert "inside out" in body.notes[0]
     assert not polyhedron_from_mesh(box.vertices, box.faces).notes
-
-
-def test_a_cavity_is_part_of_a_solid(box):
-    inner = box.copy().apply_scale(0.5)
-    vertices = np.vstack([box.vertices, inner.vertices])
-    triangles = np.vstack([box.faces, inner.faces[:, ::-1] + 8])
-    body = polyhedron_from_mesh(vertices, triangles)
-    assert body.volume == pytest.approx(0.006 * 7 / 8)
-    assert len(body.faces) == 12
 
 
 def test_a_density_gives_a_mass(box):

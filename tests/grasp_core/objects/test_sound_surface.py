@@ -10,9 +10,8 @@ import trimesh
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.objects.booleans import Solid
-from grasp_core.objects.planar_faces import triangle_neighbours
-from grasp_core.objects.solid_checks import balanced, surface_fault
 from grasp_core.objects.sound_surface import caps_of
+from grasp_core.objects.triangles import Edges
 from tests.bad_input import mesh_texts
 
 TURN = trimesh.transformations.rotation_matrix(0.7, [3.0, 1.0, 2.0])[:3, :3]
@@ -290,7 +289,7 @@ def test_a_plane_border_of_any_shape_is_filled_without_overlap(count, dent):
     points, faces = ring(outline, 0.7)
     caps = caps_of(points, faces)
     whole = np.concatenate([faces, caps.triangles])
-    assert surface_fault(whole) is None
+    assert Edges.of(whole).fault() is None
     assert len(caps.triangles) == count - 2
     assert caps.widths == pytest.approx([2.0], abs=0.002)
     area = outline_area(outline)
@@ -306,14 +305,14 @@ def test_a_plane_border_of_any_shape_is_filled_without_overlap(count, dent):
 def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
     rng = np.random.default_rng(seed)
     mesh = trimesh.creation.icosphere(subdivisions=3)
-    across, gone = triangle_neighbours(mesh.faces), [int(rng.integers(len(mesh.faces)))]
+    across, gone = Edges.of(mesh.faces).neighbours(), [int(rng.integers(len(mesh.faces)))]
     while len(gone) < 40:
         gone.append(int(rng.choice(np.setdiff1d(across[gone], gone))))
     for wound in (mesh.faces, mesh.faces[:, ::-1]):
         left = np.delete(wound, gone, axis=0)
         caps = caps_of(mesh.vertices, left)
         whole = np.concatenate([left, caps.triangles])
-        assert balanced(whole)
+        assert not Edges.of(whole).balance.any()
         assert abs(abs(Solid(mesh.vertices, whole).volume) - mesh.volume) <= caps.hidden
 
 

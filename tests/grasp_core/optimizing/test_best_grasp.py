@@ -10,8 +10,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.optimizing import best_grasp as searching
 from grasp_core.optimizing import search
+from grasp_core.optimizing.ascent import CLIMBED, climbed
 from grasp_core.optimizing.grounds import exact_maps, grounds_of
-from grasp_core.optimizing.incumbents import CLIMBED, climbed
 from grasp_core.optimizing.search import Searching, Stop
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
@@ -181,6 +181,7 @@ def test_changed_proofs_are_refused(searched):
     proof, loads = found.proof, found.proof.measure.loads
     changes = [
         {"threshold": 0.5 * proof.threshold}, {"twists": 1.5 * proof.twists},
+        {"lines": np.full((1, 3), 1e308)},  # heights above it would be no numbers
         {"measure": forged(Measure("weight"), name="volume")},
     ]  # fmt: skip
     if found.measure == "task":

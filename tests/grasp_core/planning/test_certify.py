@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.planning import certify as module
 from grasp_core.planning.certify import Candidate, certify_each, witness_faults
-from grasp_core.planning.methods import prepared, run
+from grasp_core.planning.plan_search import PlanSearch
 from grasp_core.planning.request import PlanRequest
 from grasp_core.values import PUT_OFF
 from scenes.example_objects import example_object
@@ -90,7 +90,7 @@ def test_candidates_with_faulty_witnesses_are_rejected():
     """Among them are lines of another family."""
     body = example_object("random-10-1")
     request = PlanRequest(FRICTION, ("concurrent", "pencil"))
-    found = list(run(*prepared(body, request)[:1], request, prepared(body, request)[1], None))
+    found = list(PlanSearch.of(body, request).run())
     candidates, sound = [], []
     for place, one in enumerate(found):
         placement = replace(one.placement, forces=spoilt(one, place % 4))

@@ -5,18 +5,19 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import SolverError
-from grasp_core.families import placements
+from grasp_core.families import placing
 from grasp_core.families.disc_bounds import AttemptBounds
-from grasp_core.families.placing import CONSTRUCTIONS, ManyPlacements
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.planning import family_search as promising_module
 from grasp_core.planning.family_search import SAME_MERIT, BestFirst
-from grasp_core.planning.methods import prepared
+from grasp_core.planning.plan_search import in_standard_order
 from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.quadruples import all_blocks
 from grasp_core.planning.request import PlanRequest
 from grasp_core.planning.result import Tally
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
+from tests.grasp_core.quadruples import leave_all
 
 CASES = {
     "convex": (lambda: example_object("random-12-1"), {"friction": 0.4}),
@@ -63,7 +64,7 @@ def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
 def opened(body, family, least):
     """Quadruples as they are handed out, and blocks that were made."""
     request = PlanRequest(0.4, (family,), None, "tilted")
-    on, _ = prepared(body, request)
+    on = in_standard_order(body, request)
     cones = PlannedCones(on.body, on.shapes, request.theta, tilted=True)
     (rooms, blocks), made = all_blocks(cones, len(on.faces), on.shared), []
 
@@ -100,8 +101,8 @@ def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for():
 
 
 def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
-    """Every attempt comes to its whole programs, some of which have no answer here."""
-    body, calls, solve = example_object("random-10-1"), [], placements.maximize_above
+    """Compiled code leaves every attempt; some of their programs have no answer here."""
+    body, calls, solve = example_object("random-10-1"), [], placing.maximize_above
 
     def sometimes(program, cutoff):
         calls.append(program)
@@ -110,9 +111,9 @@ def test_a_program_that_fails_leaves_its_attempt_to_the_search(monkeypatch):
         return solve(program, cutoff)
 
     expected = gc.plan(body, 0.4, families="concurrent", limit=5).grasps
-    monkeypatch.setattr(ManyPlacements, "of", lambda _, __, asked: [None] * len(asked))
+    leave_all(monkeypatch)
     monkeypatch.setattr(AttemptBounds, "of", lambda *args: np.full(len(args[2].faces), np.inf))
-    monkeypatch.setattr(placements, "maximize_above", sometimes)
+    monkeypatch.setattr(placing, "maximize_above", sometimes)
     plan = gc.plan(body, 0.4, families="concurrent", limit=5)
     assert len(calls) >= 20
     assert len(plan.grasps) == 5

@@ -10,8 +10,9 @@ import sys
 import pytest
 
 import grasp_core as gc
-from grasp_core.planning import methods, parts
-from grasp_core.planning.parts import Object, found_elsewhere
+from grasp_core.planning import plan_search
+from grasp_core.planning.plan_search import PlanSearch, found_elsewhere
+from grasp_core.planning.request import PlanRequest
 from grasp_core.processes import receive, send, unpacked
 from scenes.example_objects import example_object
 from tests.patience import HANGING_S
@@ -57,7 +58,7 @@ def bits(plan):
     ],
 )
 def test_any_number_of_processes_gives_the_same_plan(what, numbers, monkeypatch):
-    monkeypatch.setattr(parts, "QUADRUPLES_PER_PROCESS", 1)
+    monkeypatch.setattr(plan_search, "QUADRUPLES_PER_PROCESS", 1)
     name, keywords = PLANS[what]
     body = example_object(name)
     one = gc.plan(body, **keywords, jobs=1)
@@ -84,44 +85,44 @@ def test_parts_that_another_process_finds_are_the_same(name, monkeypatch):
             yield sent(found_elsewhere(given, sent(part)))
 
     here = gc.plan(body, 0.3)
-    monkeypatch.setattr(Object, "each_found", elsewhere)
+    monkeypatch.setattr(PlanSearch, "each_found", elsewhere)
     assert bits(gc.plan(body, 0.3)) == bits(here)
     assert {type(part).__name__ for part in seen} == {"Block", "Batch"}
 
 
 def test_an_error_of_a_part_reaches_the_caller_with_its_own_type(monkeypatch):
-    monkeypatch.setattr(parts, "QUADRUPLES_PER_PROCESS", 1)
+    monkeypatch.setattr(plan_search, "QUADRUPLES_PER_PROCESS", 1)
 
     def fails(_, part):  # in this process, which takes the first part or one after it
         raise gc.SolverError(f"no answer on {part}")
 
-    monkeypatch.setattr(Object, "found_at_once", fails)
+    monkeypatch.setattr(PlanSearch, "found_at_once", fails)
     with pytest.raises(gc.SolverError, match="no answer on"):
         gc.plan(example_object("random-14-7"), jobs=2)
 
 
 def test_few_quadruples_and_searches_that_end_early_start_no_process():
-    request = methods.PlanRequest(0.5, ("pencil",))
-    assert parts.worth_starting(example_object("box"), request, 8) == 0
+    request = PlanRequest(0.5, ("pencil",))
+    assert plan_search.worth_starting(example_object("box"), request, 8) == 0
     large = example_object("random-24-1")
-    limited = methods.PlanRequest(0.5, ("pencil",), limit=5)
-    assert parts.worth_starting(large, limited, 8) == 0
-    assert parts.worth_starting(large, request, 1) == 0
-    assert parts.worth_starting(large, request, 8) <= 2
+    limited = PlanRequest(0.5, ("pencil",), limit=5)
+    assert plan_search.worth_starting(large, limited, 8) == 0
+    assert plan_search.worth_starting(large, request, 1) == 0
+    assert plan_search.worth_starting(large, request, 8) <= 2
 
 
 INTERRUPTED = """
 import signal
 
 import grasp_core as gc
-from grasp_core.planning import parts
+from grasp_core.planning import plan_search
 from scenes.example_objects import example_object
 
 # a shell starts what runs in its background with interrupts ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # loops are loaded before: where numba calls Python meanwhile, an interrupt is swallowed
 gc.plan(example_object("random-11-1"), 0.3)
-parts.QUADRUPLES_PER_PROCESS = 1
+plan_search.QUADRUPLES_PER_PROCESS = 1
 seen = []
 def told(*numbers):
     seen or print("planning", flush=True)

@@ -12,7 +12,7 @@ import scenes
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.on_faces import within
 from grasp_core.regions.certify_regions import certify_regions
-from sim_validate.planning.regions_json import area_of
+from sim_validate.planning.regions import area_of
 from tests.grasp_core.curved import curved_body, inside, met
 from tests.judges import random_rotation
 

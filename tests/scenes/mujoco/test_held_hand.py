@@ -43,7 +43,7 @@ def test_servos_hold_the_squeeze_that_they_are_told(hand):
     forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])
     most = np.abs(best.grip.squeeze).max()
     assert forces == pytest.approx(best.grip.squeeze, abs=0.01 * most)
-    assert not motion.faults
+    assert not motion.health.fault
 
 
 @pytest.mark.parametrize("hand", HANDS)

@@ -35,7 +35,7 @@ def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
     def fail(_):
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(gate_module, "_measured", fail)
+    monkeypatch.setattr(gate_module, "measured", fail)
     assert verdict_of(arrived).held
     assert verdict_of(arrived).gate == job.gate
 

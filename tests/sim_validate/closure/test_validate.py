@@ -118,9 +118,9 @@ def test_a_users_wrench_is_applied_as_it_is_and_need_not_hold():
 
 def test_what_contradicts_the_analysis_is_said(monkeypatch):
     """With half of the friction in the simulation only, much goes wrong, and all of it is named."""
-    from sim_validate.engine import schedules
+    from sim_validate.engine.bench import Schedule
 
-    hold, release = schedules.hold, schedules.release
+    hold, release = Schedule.hold, Schedule.release
 
     def slippery_hold(idle, load, frictions, *rest):
         return hold(idle, load, tuple(0.5 * mu for mu in frictions), *rest)
@@ -130,8 +130,8 @@ def test_what_contradicts_the_analysis_is_said(monkeypatch):
 
     body, (grasp, *_) = grasps("random-12-1", 0.4, 1, ("regulus",))
     sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)  # the gate is measured before
-    monkeypatch.setattr(schedules, "hold", slippery_hold)
-    monkeypatch.setattr(schedules, "release", slippery_release)
+    monkeypatch.setattr(Schedule, "hold", slippery_hold)
+    monkeypatch.setattr(Schedule, "release", slippery_release)
     verdict = sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)
     assert not verdict.good
     assert any("though the predicted limit is 1.25" in line for line in verdict.mismatches)
@@ -228,16 +228,16 @@ def test_a_simulator_that_disagrees_makes_the_verdict_bad(monkeypatch):
     assert sv.validate(body, grasp, 0.5, agenda=agenda).good
     for kind, says in (("release", "critical friction: "), ("ramp", "limit")):
         with monkeypatch.context() as patched:
-            patched.setattr(f"sim_validate.engine.rig.schedules.{kind}", _weaker(kind))
+            patched.setattr(f"sim_validate.engine.bench.Schedule.{kind}", _weaker(kind))
             verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
         assert not verdict.good
         assert any(says in mismatch for mismatch in verdict.mismatches)
 
 
 def _weaker(kind):
-    from sim_validate.engine import schedules
+    from sim_validate.engine.bench import Schedule
 
-    faithful = getattr(schedules, kind)
+    faithful = getattr(Schedule, kind)
 
     def weakened(*arguments, **settled):
         made = faithful(*arguments, **settled)

@@ -13,7 +13,7 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.units import WorkerError, units_of
 from sim_validate.datasets.workers import Staging, do_unit, drive
-from sim_validate.kit.clusters import dask_workers, ray_workers
+from sim_validate.kit.processes import dask_workers, ray_workers
 from tests.sim_validate.datasets.configs import CONFIG
 from tests.sim_validate.datasets.engines import contents, silent
 

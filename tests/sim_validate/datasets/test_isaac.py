@@ -20,7 +20,7 @@ from grasp_core.objects.on_faces import nearest_on_surface
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import SPLITS, DatasetConfig, SplitName
 from sim_validate.datasets.isaac import export, yaml_number
-from sim_validate.datasets.manifest import read_manifest, write_manifest
+from sim_validate.datasets.open_dataset import read_manifest, write_manifest
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import whole_folder
 from sim_validate.main import main

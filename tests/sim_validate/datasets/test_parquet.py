@@ -5,10 +5,9 @@ import grasp_core as gc
 from sim_validate.datasets import parquet
 from sim_validate.datasets.columns import Column
 from sim_validate.datasets.config import KEYS, DatasetConfig
-from sim_validate.datasets.make_unit import made_of, split_of
 from sim_validate.datasets.parquet import each_batch, parquet_bytes, read_table
 from sim_validate.datasets.rows import TABLES
-from sim_validate.datasets.units import body_of, units_of
+from sim_validate.datasets.units import body_of, made_of, split_of, units_of
 
 pytest.importorskip("pyarrow")
 

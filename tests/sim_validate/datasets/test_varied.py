@@ -10,13 +10,12 @@ from grasp_core.errors import UnfaithfulError
 from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import validate
-from sim_validate.datasets import figures as varied_figures
+from sim_validate.datasets import learning as varied_figures
 from sim_validate.datasets.config import (
     Learning,
     config_from_toml,
 )
-from sim_validate.datasets.figures import execution_cells
-from sim_validate.datasets.varied import RATIOS, Varying, region_exit, variants
+from sim_validate.datasets.learning import RATIOS, Varying, execution_cells, region_exit, variants
 from sim_validate.datasets.verify import Sample, verify
 from sim_validate.engine.setup import Agenda
 from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of
@@ -109,7 +108,7 @@ def test_a_whole_dataset_has_no_fault_and_comes_out_the_same_again(learned):
         ("friction_near", {"made_from": "x"}, "named in made_from, has no row"),
         ("friction_near", {"friction_ratio": 2.0}, "friction_ratio is 2.0, but"),
         ("friction_near", {"kind": "friction_above"}, "is none of the kind friction_above"),
-        ("moved_out", {"displaced_m": [0.0] * 4}, "displaced_m is not the distance"),
+        ("moved_out", {"displaced_m": [0.0] * 4}, "by the contacts of made_from"),
         ("moved_out", {"region_exit_m": [1.0] * 4}, "is still in its region"),
     ],
 )
@@ -154,7 +153,7 @@ def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
         raise UnfaithfulError("the simulator is not faithful here")
 
     (grasp,) = gc.plan(WEDGE, 0.5, families=("concurrent",), limit=1).grasps
-    varying = Varying(Learning(moved_out=1), 0.5, Agenda(), LEARNED.execution)
+    varying = Varying(LEARNED, Learning(moved_out=1), 0.5, Agenda())
     verdict = validate(WEDGE, grasp, 0.5, agenda=Agenda(controls=False))
     monkeypatch.setattr(varied_figures, "execute", unfaithful)
     (tried,) = varying.of(WEDGE, grasp, verdict, None)

@@ -8,9 +8,8 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.mujoco.closure_scene import build_scene
-from sim_validate.engine import schedules
-from sim_validate.engine.bench import Bench
-from sim_validate.engine.limits import bisected, forces_just_above, released_friction
+from sim_validate.engine.bench import Bench, Schedule
+from sim_validate.engine.rig import bisected, forces_just_above, released_friction
 from sim_validate.engine.setup import Setup
 from sim_validate.settings import FrictionProtocol
 from tests.marks import more
@@ -87,7 +86,7 @@ def test_forces_just_above_the_critical_friction_need_it_and_balance():
 )
 def test_a_simulator_with_another_friction_is_seen_through(monkeypatch, factor, found):
     """Friction in the simulation is so many times what it should be: the critical one is less."""
-    release = schedules.release
+    release = Schedule.release
 
     def with_other_friction(still, frictions, *rest, **settled):
         high, friction = frictions
@@ -95,7 +94,7 @@ def test_a_simulator_with_another_friction_is_seen_through(monkeypatch, factor, 
 
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1, ("regulus",))
     sv.simulated_critical_friction(body, grasp)  # measures the gate, which is kept
-    monkeypatch.setattr(schedules, "release", with_other_friction)
+    monkeypatch.setattr(Schedule, "release", with_other_friction)
     simulated = sv.simulated_critical_friction(body, grasp)
     if found:
         assert simulated * factor == pytest.approx(grasp.critical_friction, rel=0.03)

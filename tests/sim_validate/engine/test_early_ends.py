@@ -7,11 +7,10 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
-from sim_validate.engine.early_ends import USABLE, WATCHED, EarlyEnds, Thresholds
-from sim_validate.engine.limits import part
-from sim_validate.engine.schedules import Load, hold, release
+from sim_validate.engine.bench import Load, Schedule
+from sim_validate.engine.rig import part
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.traces import Outcome, judge
+from sim_validate.engine.traces import USABLE, WATCHED, EarlyEnds, Outcome, Thresholds, judge
 from sim_validate.settings import FrictionProtocol, HoldProtocol
 from tests.marks import more
 from tests.sim_validate.engine.test_traces import pose
@@ -35,7 +34,7 @@ def looking(held):
     _, _, rig = held
     layout, idle = rig.bench.scene.layout, rig.idle
     limit = 2e-4 * layout.grasp_size_m
-    trial = hold(idle, idle, (1.5, 0.5), SAMPLE_S, HoldProtocol())
+    trial = Schedule.hold(idle, idle, (1.5, 0.5), SAMPLE_S, HoldProtocol())
     return EarlyEnds(layout, [trial], SAMPLE_S, Thresholds(limit, limit))
 
 
@@ -116,7 +115,7 @@ def test_contacts_nearly_on_a_line_end_only_when_lost(looking):
     """Their levers are shorter than the size that the bound is told with."""
     layout = looking.layout
     wide = replace(layout, grasp_size_m=1.01 * layout.grasp_size_m)
-    trial = hold(Load(np.zeros(6), np.zeros((4, 3))), Load(np.zeros(6), np.zeros((4, 3))),
+    trial = Schedule.hold(Load(np.zeros(6), np.zeros((4, 3))), Load(np.zeros(6), np.zeros((4, 3))),
                  (1.5, 0.5), SAMPLE_S, HoldProtocol())  # fmt: skip
     limits = Thresholds(layout.grasp_size_m, layout.grasp_size_m)
     assert EarlyEnds(layout, [trial], SAMPLE_S, limits).springs is not None
@@ -227,7 +226,9 @@ def test_settling_ends_when_the_object_is_calm_and_not_before(looking):
 def test_rigid_fingertips_end_only_by_loss(held):
     layout = held[2].bench.scene.layout
     rigid = replace(layout, drive=replace(layout.drive, rigid=True))
-    trial = release(Load(np.zeros(6), np.zeros((4, 3))), (1.0, 0.5), SAMPLE_S, FrictionProtocol())
+    trial = Schedule.release(
+        Load(np.zeros(6), np.zeros((4, 3))), (1.0, 0.5), SAMPLE_S, FrictionProtocol()
+    )
     ends = EarlyEnds(rigid, [trial], SAMPLE_S, Thresholds(1e-6))
     still, lost = pose()[:7], pose((2e-6, 0.0, 0.0))[:7]
     for sample in range(40):

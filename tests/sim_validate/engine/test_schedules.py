@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from sim_validate.engine import schedules
-from sim_validate.engine.limits import OVERLOAD, part
-from sim_validate.engine.schedules import Load
+from sim_validate.engine.bench import Load, Schedule, smooth
+from sim_validate.engine.rig import OVERLOAD, part
 from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
@@ -13,7 +12,7 @@ LOAD = Load(np.arange(1.0, 7.0), np.full((4, 3), 5.0))
 
 
 def test_smooth_shares_rise_from_almost_nothing_to_one():
-    shares = schedules.smooth(20)
+    shares = smooth(20)
     steps = np.diff(np.concatenate([[0.0], shares]))
     assert shares[-1] == 1.0
     assert (steps > 0).all()
@@ -21,7 +20,7 @@ def test_smooth_shares_rise_from_almost_nothing_to_one():
 
 
 def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
-    schedule = schedules.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol())
+    schedule = Schedule.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol())
     watched = schedule.watched
     assert watched == 16 + 10
     assert len(schedule.friction) == watched + 40
@@ -33,9 +32,9 @@ def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
 
 def test_schedules_say_from_where_their_loads_are_constant():
     made = (
-        schedules.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol()),
-        schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol()),
-        schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, (HoldProtocol(), LimitProtocol()))[0],
+        Schedule.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol()),
+        Schedule.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol()),
+        Schedule.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, (HoldProtocol(), LimitProtocol()))[0],
     )
     assert [each.resting for each in made] == [16, 0, len(made[2].friction)]
     for each in made:
@@ -44,9 +43,9 @@ def test_schedules_say_from_where_their_loads_are_constant():
 
 
 def test_settling_and_a_settled_release_are_a_release():
-    whole = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol())
-    rest = schedules.settle(STILL, 2.0, SAMPLE_S, FrictionProtocol())
-    left = schedules.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol(), settled=True)
+    whole = Schedule.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol())
+    rest = Schedule.settle(STILL, 2.0, SAMPLE_S, FrictionProtocol())
+    left = Schedule.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol(), settled=True)
     assert (rest.watched, left.watched) == (10, 0)
     for name in ("forces", "wrenches", "friction"):
         parts = [getattr(each, name) for each in (rest, left)]
@@ -55,7 +54,7 @@ def test_settling_and_a_settled_release_are_a_release():
 
 def test_a_ramp_watches_while_the_load_rises_between_the_shares():
     protocols = HoldProtocol(), LimitProtocol()
-    schedule, shares = schedules.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, protocols)
+    schedule, shares = Schedule.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, protocols)
     assert len(shares) == len(schedule.friction) - schedule.watched == 50
     assert shares[-1] == pytest.approx(1.1)
     applied = schedule.wrenches[schedule.watched :] / LOAD.wrench

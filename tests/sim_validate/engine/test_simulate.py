@@ -7,11 +7,8 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.arrays import to_digits
-from sim_validate.engine import schedules
-from sim_validate.engine.bench import CHUNK, Bench
-from sim_validate.engine.limits import part
-from sim_validate.engine.rig import squeezed
-from sim_validate.engine.schedules import Load
+from sim_validate.engine.bench import CHUNK, Bench, Load, Schedule
+from sim_validate.engine.rig import part, squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol
@@ -33,7 +30,7 @@ def trials_of(held, count=5):
     shares = np.linspace(0.8, 1.2, count)
     protocol, sample_s = HoldProtocol(), rig.bench.sample_s
     return [
-        schedules.hold(rig.idle, part(rig.idle, limit, share), (1.5, 0.5), sample_s, protocol)
+        Schedule.hold(rig.idle, part(rig.idle, limit, share), (1.5, 0.5), sample_s, protocol)
         for limit, share in zip(limits, shares, strict=True)
     ]
 
@@ -77,7 +74,7 @@ def test_friction_is_that_of_the_schedule_and_not_of_the_scene(held):
     load = part(rig.idle, limit, 0.97)
     outcomes = []
     for friction in (0.5, 0.4):
-        trial = schedules.hold(rig.idle, load, (1.5, friction), rig.bench.sample_s, HoldProtocol())
+        trial = Schedule.hold(rig.idle, load, (1.5, friction), rig.bench.sample_s, HoldProtocol())
         (motion,) = rig.bench.run([trial], rig.closed.state)
         outcomes.append(np.abs(motion.joints[-1, :3] - motion.joints[trial.watched - 1, :3]).max())
     assert outcomes[0] < 1e-7

@@ -10,11 +10,9 @@ import scenes
 import sim_validate as sv
 from grasp_core.settings import as_table
 from scenes.settings import PhysicsSettings
-from sim_validate.engine.bench import Bench
+from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.gate import measured_gate, require_faithful
-from sim_validate.engine.limits import bisected_limits
-from sim_validate.engine.rig import squeezed
-from sim_validate.engine.schedules import Load
+from sim_validate.engine.rig import bisected_limits, squeezed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome, judge
 from tests.sim_validate.rigs import grasps

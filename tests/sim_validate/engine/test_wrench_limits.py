@@ -3,9 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim_validate.engine.bench import Health
-from sim_validate.engine.limits import _onset, bisected_limits, ramped_limits
-from sim_validate.engine.schedules import Load
+from sim_validate.engine.bench import Health, Load
+from sim_validate.engine.rig import _onset, bisected_limits, ramped_limits
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Trace
 from sim_validate.settings import LimitProtocol

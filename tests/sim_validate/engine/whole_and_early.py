@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
 from sim_validate.engine.bench import Bench
-from sim_validate.engine.limits import forces_just_above, part, planned_loads
-from sim_validate.engine.rig import squeezed
+from sim_validate.engine.rig import Analysis, forces_just_above, part, squeezed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import judge
 
@@ -40,7 +39,7 @@ def of_holds(body, grasp, friction):
     setup = Setup()
     scene = setup.scene(body, grasp, friction)
     rig = squeezed(Bench(scene), setup, scene.layout.squeeze_forces, friction)
-    planned = planned_loads(body, grasp.contacts, friction, rig.idle, Agenda(), setup)
+    planned = Analysis(body, grasp.contacts, friction, setup, None).planned(rig.idle, Agenda())
     loads = [part(rig.idle, each.limit, share) for each in planned for share in SHARES]
     return judged(rig, loads)
 

@@ -50,7 +50,7 @@ def box_bench(**rig):
 def squeezed(**rig):
     """The simulator's state after the box is squeezed."""
     motion, state = box_bench(**rig).settled(paths.closing())
-    assert not motion.faults
+    assert not motion.health.fault
     return state
 
 

@@ -9,9 +9,8 @@ import grasp_core as gc
 import scenes
 from scenes.mujoco.held_mjcf import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.bench import HeldBench, outcome, seen
 from sim_validate.execution.paths import Pose, Table, idle, joined
-from sim_validate.execution.slips import outcome, seen
 from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import (
     MASS,
@@ -30,7 +29,7 @@ FIELDS = ("moved", "turned", "palm", "tips", "forces", "table")
 def ran(*drives, start=None, **rig):
     state = squeezed(**rig) if start is None else start
     motions = box_bench(**rig).run(drives, state)
-    assert not any(motion.faults for motion in motions)
+    assert not any(motion.health.fault for motion in motions)
     return motions
 
 
@@ -56,7 +55,7 @@ def several():
 
 def test_the_squeeze_comes_and_leaves_the_object_where_it_is():
     motion, _ = box_bench().settled(paths.closing())
-    assert not motion.faults
+    assert not motion.health.fault
     assert motion.forces[-1] == pytest.approx(box_scene().layout.pushes, rel=1e-3, abs=1e-6)
     assert np.abs(motion.moved).max() < 1e-6
     assert motion.table == pytest.approx(np.zeros_like(motion.table), abs=1e-9)
@@ -109,7 +108,7 @@ def test_the_palm_follows_its_path_and_takes_the_object_along():
     drive, begun = paths.lift(UP, 0.2, 0.6)
     height = box().center_of_mass[2] - box().vertices[:, 2].min()
     (motion,) = box_bench().run([replace(drive, table=Table(-height * UP, UP))])
-    assert not motion.faults
+    assert not motion.health.fault
     speeds = SAMPLE_S * np.cumsum(drive.accelerations[:, 2])
     path = SAMPLE_S * np.cumsum(speeds - 0.5 * SAMPLE_S * drive.accelerations[:, 2])
     # within a step the simulator's palm has the velocity at the end of it
@@ -171,7 +170,7 @@ def test_friction_is_that_of_each_contact():
     drive = paths.held_weight(DOWN, 0.4)
     bench = box_bench(mass=light)
     (motion,) = bench.run([joined(paths.closing(), drive)], friction=friction)
-    assert not motion.faults
+    assert not motion.health.fault
     across = np.linalg.norm(motion.forces[..., 1:], axis=2)
     assert across[:, 1:3].max() < 1.1e-5 * 5.0  # the simulator's least friction is 1e-5
     assert across[-1, [0, 3]] == pytest.approx(light * G / 2, rel=0.02)
@@ -182,7 +181,7 @@ def test_a_displaced_object_starts_where_it_is():
     reached = np.zeros((4, 3))
     bench = box_bench()
     (motion,) = bench.run([replace(paths.closing(), pose=pose, reached=reached)])
-    assert not motion.faults
+    assert not motion.health.fault
     assert motion.moved[0] == pytest.approx(pose.moved, abs=1e-6)
     assert motion.forces[-1] == pytest.approx(box_scene().layout.pushes, abs=0.05)
 
@@ -194,7 +193,7 @@ def test_a_finger_that_meets_nothing_pushes_nothing():
     reached[0] = -0.02 * layout.axes[0].T @ layout.frames[0, :, 0]
     bench = box_bench()
     (motion,) = bench.run([replace(paths.closing(0.5), reached=reached)])
-    assert not motion.faults
+    assert not motion.health.fault
     assert not motion.forces[:, 0].any()
     travel = motion.tips[-1, 0] - reached[0]
     assert np.linalg.norm(travel) == pytest.approx(5.0 / 2000.0, rel=1e-3)

@@ -14,7 +14,7 @@ from grasp_core.errors import UnfaithfulError
 from scenes.mujoco.fingertips import fitting_radius
 from sim_validate import run
 from sim_validate.execution import execute as jobs
-from sim_validate.execution.execute import execute_with
+from sim_validate.execution.execute import executed_grasp, execution_of
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.settings import ExecutionSettings
@@ -99,11 +99,11 @@ def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
 @pytest.mark.usefixtures("here")
 def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
     def kept(*given, **more):
-        found = execute_with(*given, **more)
+        found = execution_of(*given, **more)
         held = tuple(replace(each, let_go=False) for each in found.controls[:1])
         return replace(found, controls=held + found.controls[1:])
 
-    monkeypatch.setattr(jobs, "execute_with", kept)
+    monkeypatch.setattr(jobs, "execution_of", kept)
     words = ["execute", "grasps.json", "--mass-kg", "0.3", "--limit", "1", *QUICK, "--out", "."]
     assert main(words) == Exit.INTERNAL
     assert "control friction 0.9 did not slip, though it must" in capsys.readouterr().err
@@ -114,12 +114,12 @@ def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
 
 @pytest.mark.usefixtures("here")
 def test_what_was_done_is_kept_where_the_simulator_fails(capsys, monkeypatch):
-    def failing(body, grasp, *given, **more):
-        if grasp.id == IDS[1]:
+    def failing(job):
+        if job.grasp.id == IDS[1]:
             raise UnfaithfulError("knock +x: a number is not finite")
-        return execute_with(body, grasp, *given, **more)
+        return executed_grasp(job)
 
-    monkeypatch.setattr(jobs, "execute_with", failing)
+    monkeypatch.setattr(jobs, "executed_grasp", failing)
     words = ["execute", "grasps.json", "--mass-kg", "0.3", *QUICK, "--out", "."]
     assert main(words) == Exit.INTERNAL
     said = capsys.readouterr()

@@ -8,18 +8,17 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from sim_validate.engine.bench import Health
 from sim_validate.execution import execute
-from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.bench import HeldBench, outcome
 from sim_validate.execution.execute import (
     FINE_S,
-    chosen_squeeze,
+    Fingertips,
     confirming_bench,
-    held_scene,
     run_again,
     run_trials,
 )
 from sim_validate.execution.predictions import held_dynamics
-from sim_validate.execution.slips import outcome
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import trial_in_words
 from tests.sim_validate.execution.held_rigs import planned
@@ -56,8 +55,9 @@ def test_a_loss_of_a_step_that_is_too_long_does_not_count(bar, monkeypatch):
 def test_a_run_of_short_steps_alone_agrees(bar):
     """It is what `run_again` continues, from the first sample on."""
     body, grasp = bar
-    best = chosen_squeeze(body, grasp, 0.4, LIGHT)
-    scene = held_scene(body, best.grip, LIGHT)
+    fingers = Fingertips(body, grasp.contacts, 0.4)
+    best = fingers.squeeze(LIGHT)
+    scene = fingers.scene(LIGHT, best)
     short = replace(scene.physics, timestep=FINE_S)
     alone = sv.execute(body, grasp, 0.4, LIGHT, physics=short)
     confirmed = sv.execute(body, grasp, 0.4, LIGHT)
@@ -72,8 +72,9 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
     """Motions are joined where they were parted, with the speed that a stop begins with."""
     body, grasp = planned("box")
     settings = sv.ExecutionSettings(MASSES[kind], trials=(kind,), max_mm=5e3, max_deg=180.0)
-    best = chosen_squeeze(body, grasp, 0.5, settings)
-    scene = held_scene(body, best.grip, settings)
+    fingers = Fingertips(body, grasp.contacts, 0.5)
+    best = fingers.squeeze(settings)
+    scene = fingers.scene(settings, best)
     bench = HeldBench(scene)
     lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
     trials, _ = trials_of(body, scene.layout, settings, lowest)
@@ -96,8 +97,9 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
 
 def test_steps_that_are_short_already_are_not_made_shorter(bar):
     body, grasp = bar
-    best = chosen_squeeze(body, grasp, 0.4, LIGHT)
-    scene = held_scene(body, best.grip, LIGHT)
+    fingers = Fingertips(body, grasp.contacts, 0.4)
+    best = fingers.squeeze(LIGHT)
+    scene = fingers.scene(LIGHT, best)
     bench = confirming_bench(HeldBench(scene))
     assert bench is not None
     assert bench.step_s == pytest.approx(FINE_S)
@@ -114,7 +116,7 @@ def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
 
     def diverging(trial, motion, *more):
         if trial.name == "knock -y":
-            motion = replace(motion, faults=("a number is not finite",))
+            motion = replace(motion, health=Health(finite=False))
         return judged(trial, motion, *more)
 
     monkeypatch.setattr(execute, "_judged", diverging)
@@ -142,8 +144,9 @@ def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
     """Contacts may slip within samples only; then no sample has one on its cone."""
     body, grasp = planned("box")
     settings = sv.ExecutionSettings(0.1, trials=("weight",))
-    best = chosen_squeeze(body, grasp, 0.5, settings)
-    scene = held_scene(body, best.grip, settings)
+    fingers = Fingertips(body, grasp.contacts, 0.5)
+    best = fingers.squeeze(settings)
+    scene = fingers.scene(settings, best)
     bench = HeldBench(scene)
     lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
     trials, _ = trials_of(body, scene.layout, settings, lowest)

@@ -9,8 +9,8 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.closure.contacts import cross_matrix
 from scenes.example_objects import example_object
-from sim_validate.execution.controls import SURE, idle, slipping_load, weaker_grips
-from sim_validate.execution.execute import chosen_squeeze, held_scene
+from sim_validate.execution.execute import Fingertips
+from sim_validate.execution.trials import SURE, idle, slipping_load, weaker_grips
 from tests.grasp_core.execution.held import planned_grips
 
 FRICTION = 0.5
@@ -20,8 +20,9 @@ SETTINGS = sv.ExecutionSettings(mass_kg=0.55, trials=("weight",))
 def squeezed(name):
     body = example_object(name)
     for grasp in gc.plan(body, FRICTION, limit=4).grasps:
-        best = chosen_squeeze(body, grasp, FRICTION, SETTINGS)
-        yield best, held_scene(body, best.grip, SETTINGS).layout
+        fingers = Fingertips(body, grasp.contacts, FRICTION)
+        best = fingers.squeeze(SETTINGS)
+        yield best, fingers.scene(SETTINGS, best).layout
 
 
 def test_springs_share_what_an_idle_finger_leaves():
@@ -78,7 +79,8 @@ def test_the_slipping_load_slips_also_where_a_push_reaches_its_limit_first():
     grasps = gc.plan(body, FRICTION, families=("pencil",), limit=8).grasps
     limited = 0
     for grasp in grasps:
-        best = chosen_squeeze(body, grasp, FRICTION, SETTINGS)
+        fingers = Fingertips(body, grasp.contacts, FRICTION)
+        best = fingers.squeeze(SETTINGS)
         load = slipping_load(best)
         slip = gc.first_slip(best.grip, load, model="linear")
         assert slip.event == "slip"

@@ -7,10 +7,10 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.execution.execute import chosen_squeeze
+from sim_validate.execution.execute import Fingertips
 from sim_validate.execution.predictions import CLEAR, Enough, NoSqueezeError, accelerations_g
 from sim_validate.execution.verdict import losses_in_words
-from sim_validate.hands.execute_hand import hand_execution_settings
+from sim_validate.hands.trials import hand_execution_settings
 from tests.grasp_core.execution.held import box
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.execution.held_rigs import G, opposed, planned
@@ -66,7 +66,7 @@ def test_the_push_is_the_least_for_loads_that_are_a_formula():
     assert least.verify()
     assert least.max_push_n <= enough.push_n <= 1.011 * least.max_push_n
     assert enough.load_multiple == pytest.approx(1.6, rel=0.012)
-    less = chosen_squeeze(box(), opposed(), 0.5, replace(settings, push_n=0.98 * enough.push_n))
+    less = Fingertips(box(), opposed(), 0.5).squeeze(replace(settings, push_n=0.98 * enough.push_n))
     assert less.upper < 1.6
 
 

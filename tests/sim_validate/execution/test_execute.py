@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from sim_validate.execution.execute import chosen_squeeze, held_scene
+from sim_validate.execution.execute import Fingertips
 from sim_validate.settings import KINDS
 from tests.grasp_core.execution.held import box
 from tests.scenes.meshes import dented_ball
@@ -186,10 +186,11 @@ def test_a_curved_surface_is_there_as_far_as_fingertips_come_and_no_farther():
     body = dented_ball()
     grasp = gc.plan(body, 0.5, limit=1).grasps[0]
     settings = sv.ExecutionSettings(mass_kg=0.1, trials=("weight", "misplaced"), off_mm=1.0)
-    best = chosen_squeeze(body, grasp, 0.5, settings)
-    near = held_scene(body, best.grip, settings).layout
+    fingers = Fingertips(body, grasp.contacts, 0.5)
+    best = fingers.squeeze(settings)
+    near = fingers.scene(settings, best).layout
     all_of_it = replace(settings, max_deg=80.0)
-    whole = held_scene(body, best.grip, all_of_it).layout
+    whole = fingers.scene(all_of_it, best).layout
     assert 0 < len(near.solids) < 0.8 * len(whole.solids)
     away = settings.most_m + (settings.most_rad + 0.01) * body.radius
     kept = {corners.tobytes() for corners in near.solids}

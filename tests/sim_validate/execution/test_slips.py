@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from scenes.mujoco.held import hinged, rotations
-from sim_validate.execution.bench import HeldMotion
-from sim_validate.execution.paths import Table, idle
-from sim_validate.execution.slips import (
+from sim_validate.engine.bench import Health
+from sim_validate.execution.bench import (
     SLID,
     TOUCHED,
+    HeldMotion,
     Seen,
     _first_slip,
     outcome,
     seen,
     slides,
 )
+from sim_validate.execution.paths import Table, idle
 from tests.judges import random_rotation
 from tests.scenes.mujoco.test_turns import quaternions, turn_about
 from tests.sim_validate.execution.held_rigs import box_scene
@@ -46,7 +47,7 @@ def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
         forces=forces,
         table=np.zeros((COUNT, 3)),
         states=np.zeros((COUNT, 0)),
-        faults=(),
+        health=Health(),
     )
 
 

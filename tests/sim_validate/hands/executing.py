@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import grasp_core as gc
 from scenes.mujoco.held_hand import held_hand_scene
-from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
+from sim_validate.hands.trials import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 OBJECT, RADIUS, MASS, TORQUE = "dodecahedron", 0.035, 0.07, 0.35
@@ -22,6 +22,6 @@ def standing(name):
     """Return a pose of a hand, the hand, its scene with an object, and the squeeze."""
     reach, hand = stood(name)
     body, settings = scaled(OBJECT, RADIUS), hand_execution_settings(MASS)
-    best = hand_squeeze(hand, body, reach, FRICTION, settings)
+    best = HandHolder(hand, body, reach, FRICTION).squeeze(settings)
     scene = held_hand_scene(hand, body, reach, best.grip, settings)
     return reach, hand, scene, best

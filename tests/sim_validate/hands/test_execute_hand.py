@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.errors import InputError
-from sim_validate.hands.execute_hand import hand_execution_settings, hand_squeeze
+from sim_validate.hands.trials import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, stood
 
@@ -51,7 +51,7 @@ def test_hands_slip_where_they_are_predicted_to(name):
 def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost():
     reach, hand = stood("allegro")
     body = scaled(OBJECT, RADIUS)
-    able = hand_squeeze(hand, body, reach, FRICTION, hand_execution_settings(MASS))
+    able = HandHolder(hand, body, reach, FRICTION).squeeze(hand_execution_settings(MASS))
     heavy = 10.0 * able.scale * MASS
     found = sv.execute_hand(
         hand, body, reach, FRICTION, replace(hand_execution_settings(heavy), trials=("weight",))

@@ -9,9 +9,9 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.hands.reaches import Reaches
-from sim_validate.hands.validate_hand import MOST_PUSH_N
+from sim_validate.hands.trials import MOST_PUSH_N
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.result_folders import REACHES
+from sim_validate.kit.files import REACHES
 from sim_validate.main import main
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.hand_models import hand_mjcf

@@ -10,8 +10,7 @@ import sim_validate as sv
 from grasp_core.errors import InputError, UnfaithfulError
 from scenes.settings import PhysicsSettings
 from sim_validate.closure.verdict import AGREEMENT
-from sim_validate.hands.hand_gate import known_hand
-from sim_validate.hands.validate_hand import hand_setup
+from sim_validate.hands.trials import KnownHand, hand_setup
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 DOWN = (0.0, 0.6, -0.8)
@@ -71,7 +70,7 @@ def test_twice_the_torque_holds_twice_as_much():
 
 
 def test_the_known_hand_is_exact_and_wrong_settings_are_refused():
-    checks = known_hand(hand_setup(), FRICTION)
+    checks = KnownHand(hand_setup(), FRICTION).checks()
     assert len(checks) == 4
     assert all(check.passed for check in checks), [str(check) for check in checks]
 

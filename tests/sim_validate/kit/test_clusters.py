@@ -3,7 +3,7 @@
 import os
 from types import SimpleNamespace
 
-from sim_validate.kit import clusters
+from sim_validate.kit import processes as clusters
 
 
 def test_settings_of_ray_are_set_while_it_runs_and_those_of_the_caller_stay(monkeypatch):

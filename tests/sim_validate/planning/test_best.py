@@ -11,7 +11,7 @@ from grasp_core.optimizing.support_cuts import read_proof
 from grasp_core.quality.measures import MeasureName
 from sim_validate.kit.command_flags import Plan
 from sim_validate.main import main
-from sim_validate.planning.best_json import Best
+from sim_validate.planning.best import Best
 
 ASKED = ["plan", "tetrahedron", "--limit", "2", "--families", "concurrent", "--best"]
 

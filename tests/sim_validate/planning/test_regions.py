@@ -13,7 +13,7 @@ from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.regions.proof import TwistCover
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.planning.regions_json import Regions
+from sim_validate.planning.regions import Regions
 
 NAMES = ("axes", "codes", "forces")
 

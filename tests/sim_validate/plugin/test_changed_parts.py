@@ -14,9 +14,8 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.compare import Status
-from sim_validate.baselines.demands import grasp_cases
 from sim_validate.baselines.part import ChangedPartError, Source, source_of
-from sim_validate.baselines.suite import suite_from_toml
+from sim_validate.baselines.suite import grasp_cases, suite_from_toml
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
@@ -454,10 +453,10 @@ def test_a_part_elsewhere_is_named_in_the_file(project):
     with pytest.raises(ChangedPartError, match=r"part\.stl: .* cannot be carried over"):
         _ = suite_from_toml(toml).present
     write_text(toml, 'grasps = "grasps.json"\nobject = "cad/renamed.obj"\n')
-    assert suite_from_toml(toml).source.file == elsewhere / "renamed.obj"
+    assert suite_from_toml(toml).present.source.file == elsewhere / "renamed.obj"
     write_text(toml, 'grasps = "grasps.json"\nobject = "cad/nowhere.obj"\n')
     with pytest.raises(gc.InputError, match=r"nowhere\.obj: "):
-        _ = suite_from_toml(toml).source
+        _ = suite_from_toml(toml).present
 
 
 def test_grasps_of_a_built_in_object_have_no_file(tmp_path):

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from sim_validate.main import main
-from sim_validate.planning.best_json import Best
-from sim_validate.report.grasp_page import possible_facts
+from sim_validate.planning.best import Best
+from sim_validate.report.pages import possible_facts
 from sim_validate.report.report import write_report
 from tests.sim_validate.changing import changed
 

@@ -14,7 +14,7 @@ from scenes.drawing.sheets import BAD, GOOD, LEVELS, Area, Dots, Image, png_of, 
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.closure.verdict import WrenchVerdict
-from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
+from sim_validate.engine.rig import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.report.agreement import (
@@ -24,17 +24,19 @@ from sim_validate.report.agreement import (
     limits_in,
     quadrants_in,
 )
-from sim_validate.report.grasp_charts import (
+from sim_validate.report.charts import (
     directions_of_map,
+    fidelity_panel,
+    friction_used,
     margin_figure,
     margin_panels,
     margins,
+    motion_panels,
     on_map,
     pixels,
     shadow_of,
     wrench_panels,
 )
-from sim_validate.report.run_charts import fidelity_panel, friction_used, motion_panels
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps
 

@@ -9,7 +9,8 @@ import scenes
 import sim_validate as sv
 from scenes.mujoco.held import gravity_of
 from scenes.settings import HeldSettings
-from sim_validate.execution.gate import cases_of, measured_case, require_faithful_execution
+from sim_validate.engine.gate import measured
+from sim_validate.execution.gate import cases_of, require_faithful_execution
 from tests.marks import MORE, more
 from tests.sim_validate.execution.gate.settings_of_gates import (
     BROKEN,
@@ -31,7 +32,7 @@ DRAWN, BLOCK = 40, 8
 
 def refused(where, numbers):
     case = held_case(*where)
-    gate = measured_case(replace(case, physics=replace(case.physics, **numbers)))
+    gate = measured(replace(case, physics=replace(case.physics, **numbers)))
     return [check for check in gate.checks if not check.passed]
 
 
@@ -42,7 +43,7 @@ def held(body, **more):
 
 
 def test_the_usual_settings_give_the_known_answers_and_every_figure_is_measured():
-    gate = measured_case(held_case(*USUAL))
+    gate = measured(held_case(*USUAL))
     assert gate.passed
     assert len(gate.checks) == 28
     assert len({check.name for check in gate.checks}) == 28
@@ -76,7 +77,7 @@ def test_so_it_is_with_other_pushes_frictions_fingertips_and_dampers(start):
             m, k, r, push_n=push, friction=friction, tip_radius_m=tip * r, tip_mass_kg=tip_mass,
             damping_ratio=damping,
         )  # fmt: skip
-        assert [str(check) for check in measured_case(case).checks if not check.passed] == []
+        assert [str(check) for check in measured(case).checks if not check.passed] == []
 
 
 @pytest.mark.parametrize(("where", "numbers"), BROKEN)
@@ -125,7 +126,7 @@ def test_settings_are_measured_once_whatever_the_direction_of_gravity():
     turned = replace(scene.physics, gravity=tuple(gravity_of(hand).tolist()))
     nearly = replace(scene.layout, object_kg=1.001 * scene.layout.object_kg)
     (second,) = cases_of(nearly, turned, hand, 10.0)
-    assert measured_case(first) is measured_case(second)
+    assert measured(first) is measured(second)
     require_faithful_execution(scene.layout, scene.physics, HeldSettings(), 10.0)
 
 

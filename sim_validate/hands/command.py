@@ -1,9 +1,10 @@
-"""Runs the command `reach`, which looks for poses in which a hand stands in grasps.
+"""Runs `reach`, which looks for poses of a hand in grasps, and `hand`, which shows a hand.
 
 Where it is asked to, the hand then holds test wrenches and executes the grasps in simulation, and
 poses are written as records of DexGraspBench.
 """
 
+import math
 import shlex
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -16,27 +17,33 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
-from grasp_core.files.records import RecordFile
+from grasp_core.files.records import RecordFile, record_of
+from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_motors import hand_payload
+from grasp_core.hands.named_hands import HANDS
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
+from scenes.hand_files.loading import load_hand
 from sim_validate.engine.setup import Agenda
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, loss_in_words
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.dexgraspbench import dex_record, write_dex_object, write_dex_record
-from sim_validate.hands.execute_hand import executed_by_hand, hand_execution_settings
-from sim_validate.hands.hand_command import asked_hand
 from sim_validate.hands.reaches import CarriedMass, ReachedGrasp, Reaches, ReachSettings
-from sim_validate.hands.validate_hand import MOST_PUSH_N, HandVerdict, validate_hand
+from sim_validate.hands.trials import (
+    MOST_PUSH_N,
+    HandVerdict,
+    executed_by_hand,
+    hand_execution_settings,
+    validate_hand,
+)
 from sim_validate.kit import processes
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
-from sim_validate.kit.console import TABLE_ROWS, Reporter, finished, say_cut
+from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.result_folders import alone_in, remove_results
+from sim_validate.kit.files import AboutObject, alone_in, remove_results
 from sim_validate.planning.asked_objects import GRASPS, asked_grasps
 from sim_validate.settings import ExecutionSettings
 
@@ -116,9 +123,10 @@ def _reach(
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
     results, count = processes.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
-    shown = reporter.counted("reaching", results, count, "reached", lambda each: each.reach.reached)
-    path = command.out and command.out / Reaches.FILE
-    return finished(shown, count, partial(_collected, job), path, reporter)
+    return reporter.collected(
+        "reaching", results, count, ("reached", lambda each: each.reach.reached),
+        partial(_collected, job), command.out,
+    )  # fmt: skip
 
 
 def _collected(job: ReachJob, found: tuple[ReachedGrasp, ...], *, complete: bool) -> Reaches:
@@ -253,3 +261,76 @@ def write_records(
         record = dex_record(hand, each, str(place.resolve()))
         write_dex_record(record, folder / "graspdata" / f"{each.grasp}.npy")
     reporter.say(f"wrote {counted(len(poses), 'record')} of DexGraspBench to {folder}")
+
+
+MM = 1e3
+SMALL_RANGE = math.radians(10.0)
+"""Fingers whose joints all turn by less hardly open [rad]."""
+SHAPES_WEIGH = "MuJoCo gives links without inertia in the file that of their shapes at 1,000 kg/m^3"
+
+
+def asked_hand(command: hand_flags.Hand | hand_flags.Reach) -> Hand:
+    """Load the hand that a command names."""
+    names = (name.strip() for name in command.fingertips.split(","))
+    return load_hand(command.hand, [name for name in names if name])
+
+
+def show_hand(command: hand_flags.Hand, reporter: Reporter) -> int:
+    """Show fingers, joints and fingertips of a hand."""
+    hand = asked_hand(command)
+    reporter.document(record_of(hand))
+    fingers = [
+        (
+            f.name, str(len(f.links)), f"{MM * f.tip.radius:.1f}",
+            "ball" if f.tip.corners is None else f"block of {len(f.tip.corners)} corners",
+            str(sum(len(link.shapes) for link in f.links)),
+        )
+        for f in hand.fingers
+    ]  # fmt: skip
+    reporter.table(
+        f"fingers of {hand.name}", ("fingertip", "joints", "radius mm", "kind", "shapes"), fingers
+    )
+    columns = ("joint", "fingertip", "range deg", "torque limit N m")
+    links = [(finger, link.joint) for finger in hand.fingers for link in finger.links]
+    joints = [
+        (
+            joint.name, finger.name, f"{math.degrees(low):.1f} to {math.degrees(high):.1f}",
+            "none stated" if joint.torque_limit_n_m is None else f"{joint.torque_limit_n_m:g}",
+        )
+        for (finger, joint), (low, high) in zip(links, hand.ranges.tolist(), strict=True)
+    ]  # fmt: skip
+    reporter.table("joints, from the palm outwards", columns, joints)
+    reporter.say(f"The palm has {counted(len(hand.palm), 'shape')} that must touch nothing.")
+    if hand.ignored_pairs:
+        listed = ", ".join(" and ".join(pair) for pair in hand.ignored_pairs)
+        reporter.say(f"Links that may overlap, besides neighbours: {listed}.")
+    if hand.couplings:
+        reporter.say(f"Joints that follow others: {', '.join(map(_follows, hand.couplings))}.")
+    reporter.say(f"Torque limits: {hand.torque_source}.")
+    reporter.say(_weight(hand))
+    if all(joint.highest - joint.lowest < SMALL_RANGE for joint in hand.joints):
+        reporter.say(
+            f"Every joint turns by less than {math.degrees(SMALL_RANGE):g} degrees: MJCF counts "
+            'angles in degrees unless it has <compiler angle="radian"/>.'
+        )
+    for note in hand.notes:
+        reporter.say(f"Note: {note}.")
+    for source in hand.sources:
+        reporter.say(f"Source: {source}.")
+    return Exit.GOOD
+
+
+def _weight(hand: Hand) -> str:
+    masses = [link.mass_kg for link in hand.links]
+    stated = [mass for mass in masses if mass is not None]
+    if len(stated) < len(masses):
+        return "Masses of links: unknown; without them gravity does not load the motors."
+    said = f"The links of the fingers weigh {1e3 * sum(stated):.3g} g together"
+    return said + ("." if hand.name in HANDS else f"; {SHAPES_WEIGH}.")
+
+
+def _follows(coupling: Coupling) -> str:
+    """Write a coupling as a formula, angles in degrees."""
+    said = f"{coupling.joint} = {coupling.ratio:g} {coupling.driver}"
+    offset = math.degrees(coupling.offset)
+    return f"{said} {'-' if offset < 0.0 else '+'} {abs(offset):.4g} deg" if offset else said

@@ -1,0 +1,336 @@
+"""Runs the methods that are asked for on one object, part by part, also in other processes.
+
+A search for all grasps has no threshold that one part could raise for another. Its parts are the
+blocks of quadruples of each construction, the batches of the free method, and what `complete` adds.
+They are the same for any number of processes. With a limit, each grasp that is kept raises the
+threshold: then a construction searches all its blocks in one part, and no other process helps.
+"""
+
+import math
+import pickle
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+from itertools import chain, combinations, islice
+from typing import TypeAlias
+
+from grasp_core.families.placing import CONSTRUCTIONS, chosen_shapes
+from grasp_core.kinds import METHODS, Family, Method
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
+from grasp_core.planning.certify import Certified
+from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
+from grasp_core.planning.free_search import found_on
+from grasp_core.planning.planned_cones import PlannedCones
+from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
+from grasp_core.planning.reach import Finger, reach
+from grasp_core.planning.request import PlanRequest
+from grasp_core.planning.result import Outcomes
+from grasp_core.processes import Processes
+from grasp_core.values import FINGERS, FaceQuadruple, four
+
+Progress: TypeAlias = Callable[[int, int, int], None]
+"""Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
+BATCH, LIMITED_BATCH = 1024, 64
+"""Number of face quadruples that are decided together, and with a limit on the grasps."""
+QUADRUPLES_PER_PROCESS = 5_000
+"""Number of face quadruples for which one more process is worth starting: the start takes a second,
+and so do a thousand to two thousand quadruples."""
+KEPT_BLOCKS = 8
+"""Number of blocks of face quadruples kept for all families: some hundred megabytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One block of quadruples, to be searched with one construction."""
+
+    family: Family
+    place: int
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Quadruples to be decided together by the free method, or again with more parts."""
+
+    quadruples: tuple[FaceQuadruple, ...]
+    again: bool = False
+
+
+Part: TypeAlias = Block | Batch
+
+
+@dataclass(slots=True, eq=False)
+class Found:
+    """What a part of a search holds."""
+
+    gathered: Gathered  # proofs and counts, complete once all grasps were taken
+    grasps: Iterable[list[Certified]]
+    """Grasps on each quadruple that was tried."""
+    seconds: float = 0.0
+    """Processor time of another process [s]; zero for parts found in this process."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanSearch:
+    """The search for grasps of one object: what is asked for, and what each method has found."""
+
+    body: Polyhedron
+    """The object as it was given."""
+    on: Standard
+    """The object as the planner works on it."""
+    request: PlanRequest
+    methods: dict[Method, MethodSearch]
+    """The search of each method that is asked for; the free method comes last."""
+    workers: Processes | None = None
+    """Other processes that search parts; None where this one is alone."""
+
+    @classmethod
+    def of(
+        cls, body: Polyhedron, request: PlanRequest, workers: Processes | None = None
+    ) -> "PlanSearch":
+        """Put an object into standard order, with faces cut as requested, and set up its search."""
+        on = in_standard_order(body, request)
+        reached = partial(_reached, on.body, request.finger)
+        methods: dict[Method, MethodSearch] = {
+            method: MethodSearch(method, request.searched, reached)
+            for method in METHODS
+            if method in request.families
+        }
+        return cls(body, on, request, methods, workers)
+
+    def run(self, progress: Progress | None = None) -> Iterator[Certified]:
+        """Yield each certified grasp in the order of the methods, on the standard object."""
+        total, found = len(self.methods) * self.on.quadruples, 0
+        for done, grasps in self._steps():
+            found += len(grasps)
+            if progress is not None:
+                progress(done, total, found)
+            yield from grasps
+        if progress is not None:
+            progress(total, total, found)
+
+    def _steps(self) -> Iterator[tuple[int, list[Certified]]]:
+        """Yield, for each quadruple tried, how many are finished at least, and its grasps.
+
+        With a limit, only grasps that are among the best when they are found.
+        """
+        limit, dealt_with, kept_so_far = self.request.searched, 0, list[int]()
+        families: list[Family] = [method for method in self.methods if method != "free"]
+        places = {family: range(len(self.blocks(family)[0])) for family in families}
+        blocks = (Block(family, place) for family in families for place in places[family])
+        every = self.each_found(blocks) if limit is None else iter(())
+        for method, search in self.methods.items():
+            if limit is not None:
+                left = max(limit - sum(kept_so_far), 0)
+                search.limit = left if method == "free" else _share(limit, kept_so_far)
+            if method == "free":
+                size = BATCH if limit is None else LIMITED_BATCH
+                found = self.each_found(self._batches(size, self.held))
+            elif limit is None:
+                found = islice(every, len(places[method]))
+            else:
+                steps = self._constructed(method, places[method], search)
+                found = iter([Found(Gathered(), steps)])
+            yield from enumerate(_timed(_taken(found, search), search), start=dealt_with + 1)
+            _prune(method, search, self.on.quadruples)
+            kept_so_far.append(len(search.best))
+            dealt_with += self.on.quadruples
+        if self.request.complete:
+            search = self.methods["free"]
+            open_yet = tuple(search.gathered.undecided)
+            search.gathered.undecided.clear()
+            found = self.each_found(Batch((faces,), again=True) for faces in open_yet)
+            for grasps in _timed(_taken(found, search), search):
+                yield dealt_with, grasps
+
+    def each_found(self, parts: Iterable[Part]) -> Iterator[Found]:
+        """Yield what each part holds, in order."""
+        if self.workers is None:
+            return map(self.found, parts)
+        find = partial(found_elsewhere, pickle.dumps((self.body, self.request)))
+        return self.workers.in_order(find, parts, here=self.found_at_once)
+
+    def found(self, part: Part) -> Found:
+        """Search one part; it is gone through while its grasps are taken."""
+        gathered = Gathered()
+        if isinstance(part, Block):
+            # with no limit, no grasp raises the threshold: nothing is kept here
+            search = MethodSearch(part.family, None, _unasked, gathered=gathered)
+            places = range(part.place, part.place + 1)
+            return Found(gathered, self._constructed(part.family, places, search))
+        tried = found_on(self.on, part.quadruples, self.request, gathered, again=part.again)
+        return Found(gathered, ([one] if one else [] for one in tried))
+
+    def found_at_once(self, part: Part) -> Found:
+        """Search one part and take all its grasps."""
+        found = self.found(part)
+        return Found(found.gathered, list(found.grasps))
+
+    def _constructed(
+        self, family: Family, places: range, search: MethodSearch
+    ) -> Iterator[list[Certified]]:
+        """Yield the grasps of a construction on each quadruple of some blocks, worth keeping."""
+        construction, shapes = CONSTRUCTIONS[family], self.on.shapes
+        friction, blocks = self.request.friction, self.blocks(family)
+        return found_in(construction, shapes, friction, blocks, places, search)
+
+    def blocks(self, family: Family) -> Blocks:
+        """Return the blocks for a construction; without bounds it uses cones around normals."""
+        around_normals, every = self._blocks
+        return around_normals if CONSTRUCTIONS[family].limits is None else every
+
+    @cached_property
+    def _blocks(self) -> tuple[Blocks, Blocks]:
+        """Blocks with cones around the normals, and blocks with all cones that may be used."""
+        on, request = self.on, self.request
+        whole = len(on.faces)
+        cones = PlannedCones(on.body, on.shapes, request.theta, tilted=False)
+        around_normals = kept(spanning_blocks(cones, whole), KEPT_BLOCKS)
+        if request.cones == "normal":
+            return around_normals, around_normals
+        cones = replace(cones, tilted=True)
+        return around_normals, kept(all_blocks(cones, whole, on.shared), KEPT_BLOCKS)
+
+    def _batches(self, size: int, held: AbstractSet[FaceQuadruple]) -> Iterator[Batch]:
+        """Yield the quadruples that hold no grasp yet and have room for contacts, in batches.
+
+        Those with two halves of a face come last.
+        """
+        shapes = self.on.shapes
+        whole = combinations(range(len(self.on.faces)), FINGERS)
+        quadruples = chain(whole, map(four, self.on.shared.tolist()))
+        while batch := list(islice(quadruples, size)):
+            yield Batch(tuple(
+                faces for faces in batch
+                if faces not in held and len(chosen_shapes(shapes, faces)) == FINGERS
+            ))  # fmt: skip
+
+    @property
+    def held(self) -> set[FaceQuadruple]:
+        """Quadruples on which a grasp was found."""
+        return set[FaceQuadruple]().union(*(search.held for search in self.methods.values()))
+
+    @property
+    def absent(self) -> set[FaceQuadruple]:
+        """Quadruples that are proved to hold no grasp."""
+        every = self.methods.values()
+        return set[FaceQuadruple]().union(*(search.gathered.absences for search in every))
+
+    @property
+    def unreached(self) -> dict[FaceQuadruple, str]:
+        """Quadruples with contacts, none of which fingers reach, and why not the last ones."""
+        known = self.held | self.absent
+        return {
+            faces: why
+            for search in self.methods.values()
+            for faces, why in search.unreached.items()
+            if faces not in known
+        }
+
+    @property
+    def outcomes(self) -> Outcomes:
+        """Counts of how the quadruples ended: held, absent, open or out of reach."""
+        held, out_of_reach = len(self.held), len(self.unreached)
+        # patches leave parts of the surface out, so a patch without room proves nothing
+        absent = len(self.absent) + (0 if self.on.body.patches else _without_room(self.on))
+        undecided = self.on.quadruples - held - absent - out_of_reach
+        return Outcomes(held, absent, undecided, out_of_reach)
+
+
+def in_standard_order(body: Polyhedron, request: PlanRequest) -> Standard:
+    """Put an object into standard order, with faces cut as requested."""
+    on = standard(body)
+    if request.edge_clearance_m:
+        on = replace(on, body=clear_of_edges(on.body, request.edge_clearance_m))
+    if request.share_faces_m is not None:
+        halved, owners = with_halves(on.body, request.share_faces_m)
+        on = replace(on, body=halved, owners=owners)
+    return on
+
+
+def _reached(body: Polyhedron, finger: Finger | None, found: Certified) -> Certified | str:
+    """Return a grasp with its fingers' ways out, if they are sought, or why it is out of reach."""
+    if finger is None:
+        return found
+    positions = body.center_of_mass + body.radius * found.placement.positions
+    ways = reach(body, found.faces, positions, found.normals, finger)
+    return ways if isinstance(ways, str) else replace(found, ways_out=ways)
+
+
+def found_elsewhere(given: bytes, part: Part) -> Found:
+    """Search one part to its end in another process, which tells its time.
+
+    Takes `given`, the pickled object and request, which are the same for all parts.
+    """
+    begun, found = time.process_time(), _search_of(given).found_at_once(part)
+    return replace(found, seconds=time.process_time() - begun)
+
+
+@lru_cache(maxsize=1)
+def _search_of(given: bytes) -> PlanSearch:
+    # the process that started this one packed it
+    return PlanSearch.of(*pickle.loads(given))  # noqa: S301
+
+
+def _unasked(_: Certified) -> str:
+    raise AssertionError("parts of a search keep no grasps")
+
+
+def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
+    """Return how many processes are worth starting beside this one.
+
+    A search with a limit needs the grasps of each block before the next, so it has one process.
+    """
+    if jobs < 2 or request.searched is not None:  # noqa: PLR2004 - nobody beside this one
+        return 0
+    worth = math.comb(len(body.faces), FINGERS) // QUADRUPLES_PER_PROCESS
+    return min(jobs - 1, worth)
+
+
+def _taken(found: Iterable[Found], search: MethodSearch) -> Iterator[list[Certified]]:
+    """Keep the grasps that parts hold, until the limit; yield those kept of each quadruple."""
+    for each in found:
+        if search.full:
+            return
+        for grasps in each.grasps:
+            yield search.keep_each(grasps)
+        search.take(each.gathered, each.seconds)
+
+
+def _prune(method: Method, search: MethodSearch, quadruples: int) -> None:
+    """Count what was not tried; each quadruple counts once per order of the fingers."""
+    orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
+    tally = search.gathered.tally
+    tally["pruned"] = quadruples * orders - tally["tried"]
+
+
+def _share(limit: int, before: Sequence[int]) -> int:
+    """Most grasps that a construction can keep, given how many the constructions before it found.
+
+    Families take turns. If all earlier ones but k run out, with n_1, n_2, .. grasps, this one
+    gets at most every (k + 1)-th grasp of what they leave.
+    """
+    found = sorted(before)
+    left = [limit - sum(found[:short]) for short in range(len(found) + 1)]
+    return max(each // (len(found) - short + 1) for short, each in enumerate(left))
+
+
+def _without_room(on: Standard) -> int:
+    """Number of quadruples with a face that has no room for a contact."""
+    whole = len(on.faces)
+    roomy = sum(shape is not None for shape in on.shapes[:whole])
+    shared = sum(any(on.shapes[face] is None for face in faces) for faces in on.shared.tolist())
+    return math.comb(whole, FINGERS) - math.comb(roomy, FINGERS) + shared
+
+
+def _timed(steps: Iterator[list[Certified]], search: MethodSearch) -> Iterator[list[Certified]]:
+    """Yield each of `steps`, adding the processor time it took to `search.seconds`."""
+    while True:
+        start = time.process_time()
+        step = next(steps, None)
+        search.seconds += time.process_time() - start
+        if step is None:
+            return
+        yield step

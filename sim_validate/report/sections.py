@@ -1,0 +1,284 @@
+"""Says what executions found, and where a hand stands in grasps, on cards and pages."""
+
+import math
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from grasp_core.declared import counted
+from grasp_core.figures import NONE, Figure, figures
+from grasp_core.files.records import record_of
+from grasp_core.hands.named_hands import HANDS
+from grasp_core.values import Grasp
+from scenes.drawing.hands import PosedHand, posed_hand
+from scenes.drawing.pages import number
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    ExecutionControl,
+    Executions,
+    ExecutionTrial,
+    multiple_in_words,
+    totals_in_words,
+)
+from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of_execution
+from sim_validate.report.run_folder import RunFolder, about_grasp
+from sim_validate.settings import ExecutionSettings
+
+if TYPE_CHECKING:
+    from sim_validate.hands.reaches import ReachedGrasp, Reaches
+
+Fact = tuple[str, str, str]
+"""Name, value and meaning of a figure."""
+REASONS = {
+    "collision": "a collision",
+    "limit": "a joint's limit",
+    "not found": "no pose found",
+    "no closure": "no three contacts close",
+}
+"""Words for what was in the way."""
+FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
+SAID_ABOVE = ("grasp", "id")
+"""Figures that the page has in its title."""
+MILLI = 1e3
+ALWAYS = ("mass_kg", "seed")
+"""Settings of executions whose usual value depends on the object or on the plan."""
+
+
+def held_in(reaches: "Reaches | None", grasp: Grasp) -> PosedHand | None:
+    """Return the hand in the pose in which it stands in a grasp."""
+    found = about_grasp(reaches, grasp.id)
+    if reaches is None or found is None or not found.reach.reached:
+        return None
+    return posed_hand(reaches.hand, found.reach, grasp)
+
+
+def why_not_held(reaches: "Reaches", grasp: Grasp) -> str:
+    """Say why there is no hand to draw in a grasp."""
+    found = about_grasp(reaches, grasp.id)
+    if found is None:
+        return f"reaches.json holds nothing about {grasp.id}; `graspproof reach` looks for a pose"
+    return f"{grasp.id}: {found.reach.explanation}"
+
+
+def said_of_reach(reaches: "Reaches | None", grasp: Grasp) -> tuple[str, str]:
+    """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
+    if reaches is None:
+        return "", QUIET
+    found, name = about_grasp(reaches, grasp.id), reaches.hand.name
+    if found is None:
+        return f"{name}: not asked", QUIET
+    reach, held, executed = found.reach, found.simulated, found.executed
+    if not reach.reached:
+        return f"{name}: not reached, {REASONS[reach.reason]}", QUIET
+    within = reach.within_regions or ()
+    inside = f"{sum(within)} of {len(within)} contacts "
+    said = [f"{name}: reached, {'' if all(within) else inside}within regions"]
+    if held is not None:
+        strength = f"held: {number(held.weakest_n)} N with its motors"
+        said.append(strength if held.held else "not held in simulation")
+    if executed is not None and executed.execution is None:
+        said.append("not executed")
+    elif executed is not None:
+        kept = sum(trial.survived for trial in executed.trials)
+        said.append(f"survived {kept} of {len(executed.trials)} trials")
+    lost = executed is not None and not all(trial.survived for trial in executed.trials)
+    return ", ".join(said), BAD if lost or (held is not None and not held.held) else GOOD
+
+
+def held_by_hand(reaches: "Reaches | None", grasp: Grasp) -> float | None:
+    """Return the weakest wrench that a hand resists in a grasp [N]; None if it was not simulated.
+
+    Torques count over the object's radius.
+    """
+    found = about_grasp(reaches, grasp.id)
+    return None if found is None or found.simulated is None else found.simulated.weakest_n
+
+
+def described_reaches(reaches: "Reaches | None") -> str:
+    """Say in one sentence how many grasps a hand reaches."""
+    if reaches is None:
+        return ""
+    asked = counted(len(reaches), "grasp")
+    said = f"The hand {reaches.hand.name} reaches {reaches.summary['reached']} of {asked}"
+    return said + ("." if reaches.complete else "; the search was interrupted.")
+
+
+def reach_settings(reaches: "Reaches") -> Iterable[tuple[str, str]]:
+    """Yield names and values of everything that was asked for."""
+    yield "hand.name", reaches.hand.name
+    yield "hand.friction", f"{reaches.friction:g}"
+    for name, value in record_of(reaches.asked).items():
+        yield f"hand.{name}", str(value)
+    limits = {joint.torque_limit_n_m for joint in reaches.hand.joints}
+    if stated := sorted(limit for limit in limits if limit is not None):
+        yield "hand.torque_limits_n_m", ", ".join(f"{limit:g}" for limit in stated)
+
+
+def reach_section(reaches: "Reaches | None", grasp: Grasp) -> Record | None:
+    """Build the section about the hand in a grasp; None where no hand was asked for."""
+    found = about_grasp(reaches, grasp.id)
+    if reaches is None or found is None:
+        return None
+    said, tone = said_of_reach(reaches, grasp)
+    return {
+        "hand": reaches.hand.name,
+        "said": said.partition(": ")[2],
+        "tone": tone,
+        "facts": list(_reach_facts(reaches, found)),
+        "explanation": found.reach.explanation,
+    }
+
+
+def _reach_facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
+    if found.reach.reached:
+        names = reaches.finger_names(found.reach)
+        yield "Fingers used", ", ".join(f"{k}: {name}" for k, name in enumerate(names)), FINGERS
+    yield from _figures(found, "")
+    if found.simulated is not None:
+        yield from _figures(found.simulated, "With its motors: ")
+    if (executed := found.executed) is not None:
+        yield from _figures(executed, "Executed with the hand: ")
+        if executed.reason is not None:
+            yield "Not executed", executed.reason, ""
+        yield from _enough(executed)
+
+
+def _enough(found: ExecutedGrasp) -> Iterable[Fact]:
+    if found.enough is not None:
+        yield "What would be enough", str(found.enough), ""
+
+
+def _figures(record: object, part: str) -> Iterable[Fact]:
+    """Yield the figures that a record has, but for the grasp that the page is about."""
+    for each in figures(type(record)):
+        if each.name not in SAID_ABOVE and each.of(record) is not None:
+            heading = f"{part}{each.shown.heading}"
+            yield heading[:1].upper() + heading[1:], each.cell(record), each.meaning
+
+
+def reach_commands(reaches: "Reaches | None", grasp: Grasp, path: str) -> Sequence[str]:
+    """Write the shell command that seeks the pose again; none for a hand from a file."""
+    if reaches is None or reaches.hand.name not in HANDS or grasp.id not in reaches:
+        return []
+    asked, usual = reaches.asked, type(reaches.asked)()
+    words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", grasp.id]
+    words += ["--friction", repr(reaches.friction)]
+    numbers = replace(asked, regions=usual.regions, table_down=usual.table_down)
+    words += _changed_flags(numbers, usual)
+    words += [] if asked.table_down is None else ["--table", *map(repr, asked.table_down)]
+    words += [] if asked.regions else ["--contacts-only"]
+    return [shlex.join(words)]
+
+
+def execution_row(found: ExecutedGrasp | None) -> Record:
+    """Build the cells about one grasp in the table of the first page, and on its card."""
+    said, tone = said_of_execution(found)
+    least = 0.0 if found is None else found.least_predicted_loss
+    listed = execution_figures()
+    return {
+        "said": said,
+        "tone": tone,
+        "loss": multiple_in_words(least),
+        "least_loss": "Infinity" if math.isinf(least) else f"{least:.6g}",  # as scripts read it
+        "cells": [(NONE if found is None else each.cell(found), "") for each in listed],
+    }
+
+
+def execution_figures() -> Sequence[Figure]:
+    """Return the figures of executed grasps, but for the id, which leads to a grasp's page."""
+    return figures(ExecutedGrasp)[1:]
+
+
+def described_executions(executions: Executions) -> str:
+    """Say how many grasps survived being executed, and which is best."""
+    ended = [] if executions.complete else ["the executions were interrupted"]
+    return " ".join(f"{line[0].upper()}{line[1:]}." for line in totals_in_words(executions) + ended)
+
+
+def execution_section(run: RunFolder, name: str) -> Record | None:
+    """Build the section about the execution of a grasp; None where no grasp was executed."""
+    if run.executions is None:
+        return None
+    found = run.executed(name)
+    said, tone = said_of_execution(found)
+    execution = None if found is None else found.execution
+    trials, controls = ((), ()) if execution is None else (execution.trials, execution.controls)
+    return {
+        "said": said,
+        "tone": tone,
+        "facts": list(_execution_facts(run.executions, found)),
+        "reason": None if found is None else found.reason,
+        "trials": records_table(trials, ExecutionTrial),
+        "controls": records_table(controls, ExecutionControl),
+        "skipped": () if execution is None else execution.skipped,
+    }
+
+
+def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
+    """Write the shell command that executes a grasp again, with the same settings."""
+    words = ["graspproof", "execute", path, "--grasp", grasp_id]
+    words += ["--friction", repr(executions.friction)]
+    usual = ExecutionSettings(executions.settings.object_kg).used
+    return shlex.join([*words, *_changed_flags(executions.settings, usual, ALWAYS)])
+
+
+def _changed_flags(settings: Any, usual: Any, always: Sequence[str] = ()) -> list[str]:
+    """Write flags for settings that are not the usual ones, and for some others."""
+    changed = {name: value for name, value in asdict(settings).items()
+               if name in always or value != getattr(usual, name)}  # fmt: skip
+    return [
+        word for name, value in changed.items()
+        for word in (f"--{name.replace('_', '-')}", *_words(value))
+    ]  # fmt: skip
+
+
+def _words(value: object) -> list[str]:
+    """Write the value of a flag: several numbers stand apart, names of trials have commas."""
+    if not isinstance(value, tuple):
+        return [repr(value)]
+    parts = cast("tuple[object, ...]", value)
+    if all(isinstance(part, str) for part in parts):
+        return [",".join(map(str, parts))]
+    return [repr(part) for part in parts]
+
+
+def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Iterable[Fact]:
+    settings, execution = executions.settings, None if found is None else found.execution
+    yield "Mass", f"{settings.object_kg:.4g} kg", f"at friction {executions.friction:g}"
+    tips = f"fingertips of {MILLI * settings.tip_mass_kg:.4g} g"
+    if execution is not None and execution.tip_radius_m is not None:
+        tips += f" and {MILLI * float(execution.tip_radius_m.max()):.4g} mm radius"
+    yield "Push of a finger", f"at most {settings.push_n:.4g} N", ""
+    yield "Springs", f"{settings.tip_stiffness_n_per_m:.5g} N/m", tips
+    yield "Counts as held", f"up to {settings.max_mm:g} mm and {settings.max_deg:g} deg", ""
+    if found is None or execution is None:
+        return
+    sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))
+    yield "Squeeze, finger by finger", f"{sizes} N", ""
+    for figure in execution_figures():
+        yield figure.shown.heading, figure.cell(found), figure.meaning
+    yield from _enough(found)
+
+
+def records_table(records: Sequence[object], kind: type) -> Record:
+    """Build a table of the figures of records, for the template `records.html`.
+
+    A figure that is true is good, and one that is false is bad. Those that no record has are left
+    out.
+    """
+    listed = [each for each in figures(kind) if any(each.of(one) is not None for one in records)]
+    tones = {True: GOOD, False: BAD}
+    return {
+        "columns": [(figure.shown.heading, figure.meaning) for figure in listed],
+        "rows": [
+            [
+                (figure.cell(one), tones[value] if isinstance(value, bool) else "")
+                for figure in listed
+                for value in [figure.of(one)]
+            ]
+            for one in records
+        ],
+    }

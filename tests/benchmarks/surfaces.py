@@ -1,0 +1,88 @@
+"""The object's own surface against pads: `python -m tests.benchmarks.surfaces [--quick]`.
+
+Grasps of all families on convex and other objects, each validated twice: with fingertips on the
+object itself, and on pads that are flush with its faces. Verdicts must be the same, and critical
+frictions within `ALIKE`; each exception is listed. Starts that overlap a face are counted too.
+"""
+
+import sys
+from dataclasses import dataclass
+
+import grasp_core as gc
+import scenes
+from sim_validate.closure.validate import tested
+from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.traces import Outcome
+from sim_validate.kit.processes import available_cores, each
+from sim_validate.settings import FrictionProtocol
+from tests.benchmarks.objects import FAMILIES
+
+OBJECTS = (
+    "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "prism",
+    "hexagonal-pyramid", "random-12-1", "random-20-7", "l-bracket", "cross", "screwdriver", "mug",
+    "hex-nut", "dodecahedron",
+)  # fmt: skip
+QUICK = ("wedge", "l-bracket", "hex-nut")
+FRICTION, EACH = 0.5, 6
+ALIKE = 1e-3
+"""Largest relative difference of critical frictions."""
+AGENDA = Agenda(controls=False)
+FINE = FrictionProtocol(rounds=7)
+"""Halves the interval of the critical friction to a share of 1.6e-4."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """What one grasp gave on the object's own surface, and on pads."""
+
+    name: str
+    grasp: str
+    own: tuple[str, ...]
+    pads: tuple[str, ...]
+    critical: tuple[float | None, float | None]
+    predicted: float
+
+    @property
+    def alike(self):
+        own, pads = self.critical
+        close = own == pads if None in self.critical else abs(own - pads) <= ALIKE * pads
+        return self.own == self.pads and close
+
+    def __str__(self):
+        other = [pair for pair in zip(self.own, self.pads, strict=True) if pair[0] != pair[1]]
+        return f"{self.name} {self.grasp}: critical {self.critical}, predicted {self.predicted:.6g}; outcomes {other}"
+
+
+def compared(case):
+    name, grasp = case
+    body = scenes.example_object(name)
+    found = [
+        tested(body, grasp, FRICTION, None, AGENDA, Setup(surface=surface, friction=FINE))
+        for surface in ("object", "pads")
+    ]
+    outcomes = [tuple(each.hold.outcome.value for each in verdict.wrenches) for verdict in found]
+    critical = [verdict.critical_friction.simulated for verdict in found]
+    return Pair(name, grasp.id, *outcomes, tuple(critical), grasp.critical_friction)
+
+
+def cases(names):
+    for name in names:
+        body = scenes.example_object(name)
+        for family in FAMILIES:
+            for grasp in gc.plan(body, FRICTION, families=(family,), limit=EACH).grasps:
+                yield name, grasp
+
+
+def main():
+    names = QUICK if "--quick" in sys.argv else OBJECTS
+    found = list(each(compared, list(cases(names)), jobs=available_cores()))
+    invalid = [pair for pair in found if Outcome.INVALID_START.value in pair.own]
+    differ = [pair for pair in found if not pair.alike]
+    print(f"{len(found)} grasps on {len(names)} objects, friction {FRICTION}")
+    print(f"{len(differ)} differ from pads (outcome, or critical friction by over {ALIKE:g}):")
+    print(*(f"  {pair}" for pair in differ), sep="\n")
+    print(f"{len(invalid)} start overlapping:", *(f"{p.name} {p.grasp}" for p in invalid))
+
+
+if __name__ == "__main__":
+    main()
