@@ -43,10 +43,9 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, Reactions
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.solvers.ties import (largest_first)
-from scenes.mujoco.held import (HeldLayout, rotations)
-from grasp_core.objects.sheets import (solid_angles)
-from grasp_core.solvers.ties import (first_best, largest_first)
+from grasp_core.objects.sheets import solid_angles
+from grasp_core.solvers.ties import first_best, largest_first
+from scenes.mujoco.held import HeldLayout, rotations
 from scenes.mujoco.mjcf_text import quaternion
 from scenes.mujoco.scene_parts import TOUCH
 from sim_validate.execution import paths

@@ -17,9 +17,8 @@ from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.kinds import FieldError, OrInfinity, Quantity, path_of
 from grasp_core.provenance import versions
 from grasp_core.solvers.ties import first_best
-from scenes.settings import (PhysicsSettings)
-
-from sim_validate.kit.files import (AboutGrasps)
+from scenes.settings import PhysicsSettings
+from sim_validate.kit.files import AboutGrasps
 from sim_validate.settings import ExecutionSettings, TrialKind
 
 Fate: TypeAlias = Literal["stuck", "slipped", "dropped", "diverged"]
