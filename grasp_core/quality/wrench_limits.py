@@ -121,8 +121,8 @@ class WrenchBody:
         self.width = LOCAL if torsions is not None else 3
         levers = in_frames(self.motors.levers, self.frames)
         self.levers = levers if torsions is None else np.zeros((0, LOCAL * k))
-        # (1) in units of f_max: G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques of
-        # each joint over its limit, both ways
+        # (1) in units of f_max: G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques
+        # of each joint over its limit, both ways
         n, carried = self.width * k, self.motors.gravity / self.motors.limits
         forces, multiple = np.eye(n, n + 1), np.eye(n + 1)[n]
         shares = self.max_normal_force * (self.levers @ forces) / self.motors.limits[:, None]
