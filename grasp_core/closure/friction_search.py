@@ -40,6 +40,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.checked import LARGEST_FRICTION
@@ -404,8 +405,10 @@ class Ends:
         length = float(np.linalg.norm(twist))
         if not 0.0 < length < math.inf:
             return
-        for slow in RESTING:
-            still, friction = _put_to_rest(twist / length, self.cones, slow)
+        speeds = np.linalg.norm(self.cones.velocities(twist / length), axis=1)
+        # fewest at rest first, and the same contacts once
+        for resting in np.unique([speeds <= slow for slow in RESTING], axis=0):
+            still, friction = _put_to_rest(twist / length, self.cones, resting)
             friction *= 1.0 - SHAVED
             if self.lower < friction < self.upper:
                 self.opened(still, friction)
@@ -442,9 +445,10 @@ class Ends:
         return max(2.0 * self.share * self.upper, FRICTIONLESS)
 
 
-def _put_to_rest(twist: Array, cones: ContactCones, slow: float) -> tuple[Array, float]:
+def _put_to_rest(
+    twist: Array, cones: ContactCones, slowest: NDArray[np.bool_]
+) -> tuple[Array, float]:
     """Put slow contacts to rest under a unit twist, which separates at most up to a friction."""
-    slowest = np.linalg.norm(cones.velocities(twist), axis=1) <= slow
     if slowest.any():
         resting = cones.only(slowest).maps.T
         for _ in range(2):  # once more for what rounding leaves
