@@ -45,8 +45,7 @@ from grasp_core.families.placements import (
     face_table,
     room_for,
 )
-from grasp_core.geometry.polygons import (circle, clip, edge_rows, tidy)
-from grasp_core.geometry.polygons import (clip, edge_rows, tidy)
+from grasp_core.geometry.polygons import circle, clip, edge_rows, tidy
 from grasp_core.objects.face_pieces import (
     FacePiece,
     FaceShape,
