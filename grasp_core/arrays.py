@@ -129,13 +129,14 @@ class Shape:
 
         Ends are not looked at.
         """
-        if type(value) is not np.ndarray or not _has_shape(value, self._lengths):
+        if type(value) is not np.ndarray or value.dtype != (np.int64 if self.whole else np.float64):
             return False
         array: NDArray[Any] = value
+        if not _has_shape(array, self._lengths):
+            return False
         if self.whole:
-            least, most = array.min(initial=0), array.max(initial=0)
-            return array.dtype == np.int64 and bool(0 <= least <= most <= MOST_COUNT)
-        if array.dtype != np.float64 or not np.abs(array).max(initial=0.0) <= LARGEST_ENTRY:
+            return bool(0 <= array.min(initial=0) <= array.max(initial=0) <= MOST_COUNT)
+        if not np.abs(array).max(initial=0.0) <= LARGEST_ENTRY:
             return False
         if not self.units:
             return True

@@ -40,6 +40,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH, grasp_map, normal_and_tangential, unit_size
@@ -148,22 +149,18 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
     departing[np.arange(k), :, np.arange(k)] = normals
     basis = null_space(np.hstack([grasp_map(arms).T, departing.reshape(3 * k, k)]))
     speeds = basis[WRENCH:]
-    rows = np.vstack([-speeds, speeds.sum(axis=0), np.eye(basis.shape[1]), -np.eye(basis.shape[1])])
-    limits = np.repeat([0.0, 1.0, LARGEST_VARIABLE, LARGEST_VARIABLE], [k, 1, *basis.shape[1:] * 2])
-    found = _best(speeds.sum(axis=0), rows, limits)
+    n, total = basis.shape[1], speeds.sum(axis=0)
+    rows = np.vstack([-speeds, total, np.eye(n), -np.eye(n)])
+    found = _best(total, rows, np.repeat([0.0, 1.0, LARGEST_VARIABLE], [k, 1, 2 * n]))
     return None if found is None else basis[:WRENCH] @ found
 
 
 def pushing_forces(arms: Array, normals: Array) -> Array | None:
     """Find balanced forces that push at every contact, as some friction allows; None if none do."""
     basis = null_space(grasp_map(arms))
-    n = basis.shape[1]
-    pushes = np.einsum("kin,ki->kn", basis.reshape(*arms.shape, n), normals)
-    rows = np.vstack([np.hstack([-pushes, np.ones((len(arms), 1))]), np.eye(2 * n, n + 1)])
-    rows[len(arms) :, :n] = np.vstack([np.eye(n), -np.eye(n)])
-    limits = np.repeat([0.0, 1.0], [len(arms), 2 * n])
-    found = _best(np.eye(n + 1)[n], rows, limits)
-    return None if found is None else (basis @ found[:n]).reshape(arms.shape)
+    pushes = np.einsum("kin,ki->kn", basis.reshape(*arms.shape, -1), normals)
+    found = _most_even(pushes)
+    return None if found is None else (basis @ found).reshape(arms.shape)
 
 
 def _most_pushes(rows: Array) -> Array | None:
@@ -187,11 +184,17 @@ def _most_pushes(rows: Array) -> Array | None:
 
 def _departing(outside: Array, pushes: Array) -> Array | None:
     """Find the combination of the columns of `outside` that departs most evenly."""
-    m, n = outside.shape[1], pushes.shape[1]
-    steep = np.hstack([pushes.T @ outside, np.ones((n, 1))])
-    box = np.hstack([np.vstack([np.eye(m), -np.eye(m)]), np.zeros((2 * m, 1))])
-    found = _best(np.eye(m + 1)[m], np.vstack([steep, box]), np.repeat([0.0, 1.0], [n, 2 * m]))
-    return None if found is None else outside @ found[:m]
+    found = _most_even(-pushes.T @ outside)
+    return None if found is None else outside @ found
+
+
+def _most_even(rows: Array) -> Array | None:
+    """Find x, from -1 to 1, for which the least of rows @ x is largest, and positive."""
+    m, n = rows.shape
+    box = np.eye(n, n + 1)
+    sides = np.vstack([np.hstack([-rows, np.ones((m, 1))]), box, -box])
+    found = _best(np.eye(n + 1)[n], sides, np.repeat([0.0, 1.0], [m, 2 * n]))
+    return None if found is None else found[:n]
 
 
 def _best(c: Array, A: Array, b: Array) -> Array | None:
@@ -402,8 +405,10 @@ class Ends:
         length = float(np.linalg.norm(twist))
         if not 0.0 < length < math.inf:
             return
-        for slow in RESTING:
-            still, friction = _put_to_rest(twist / length, self.cones, slow)
+        speeds = np.linalg.norm(self.cones.velocities(twist / length), axis=1)
+        # fewest at rest first, and the same contacts once
+        for resting in np.unique([speeds <= slow for slow in RESTING], axis=0):
+            still, friction = _put_to_rest(twist / length, self.cones, resting)
             friction *= 1.0 - SHAVED
             if self.lower < friction < self.upper:
                 self.opened(still, friction)
@@ -440,9 +445,10 @@ class Ends:
         return max(2.0 * self.share * self.upper, FRICTIONLESS)
 
 
-def _put_to_rest(twist: Array, cones: ContactCones, slow: float) -> tuple[Array, float]:
+def _put_to_rest(
+    twist: Array, cones: ContactCones, slowest: NDArray[np.bool_]
+) -> tuple[Array, float]:
     """Put slow contacts to rest under a unit twist, which separates at most up to a friction."""
-    slowest = np.linalg.norm(cones.velocities(twist), axis=1) <= slow
     if slowest.any():
         resting = cones.only(slowest).maps.T
         for _ in range(2):  # once more for what rounding leaves

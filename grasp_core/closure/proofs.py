@@ -13,12 +13,13 @@ normal part of its force acts. A matrix maps the forces of all contacts to their
 
 The program and the supports s_i are those of `force_closure`. Let d_i be the depth mu_i n_i.f_i -
 |tangential part of f_i| of force i in its cone, or n_i.f_i without friction, w the wrench of all
-forces, and sigma the sixth singular value of the matrix of wrenches that contacts can apply. A
-correction of length c = (|w| + rounding) / sigma balances the forces, and takes no more than
-sqrt(1 + mu_i^2) c from d_i. So forces prove closure, and the left side bounds the margin from
-below, if
+forces, and sigma the sixth singular value of the matrix of wrenches that contacts can apply, with
+tangential parts in units of e_i: of one, or of mu_i for soft contacts, whose torques are over mu_t
+then and have columns of order one. A correction of length c = (|w| + rounding) / sigma balances the
+forces, and takes no more than sqrt(e_i^2 + mu_i^2) c from d_i, or c without friction. So forces
+prove closure, and the left side bounds the margin from below, if
 
-    min_i (d_i - sqrt(1 + mu_i^2) c) / (sum n_i.f_i + sqrt(k) c)  >  0,                 (2)
+    min_i (d_i - sqrt(e_i^2 + mu_i^2) c) / (sum n_i.f_i + sqrt(k) c)  >  0,             (2)
 
 and a twist y refutes closure if no support is positive but for rounding:
 
@@ -129,20 +130,18 @@ class ContactCones:
         return frames
 
     @property
-    def generators(self) -> Array:
-        """Return matrices that span all wrenches that can be applied, (..., 6, k w).
+    def units(self) -> Array:
+        """Return the units e_i of tangential parts, zero without friction, (..., k) or (..., 1)."""
+        return np.where(self.friction > 0.0, 1.0, 0.0) if self.torsion is None else self.friction
 
-        What cannot act without friction is zero, and torques are over a length of one at most:
-        they are no harder to change than forces then, and all columns are of order one.
-        """
-        flat = np.broadcast_to(self.friction == 0.0, self.normals.shape[:-1])[..., None, None]
-        if self.torsion is None and not flat.any():
+    @property
+    def generators(self) -> Array:
+        """Return matrices that span all wrenches that can be applied, (..., 6, k w)."""
+        units = self.units[..., None, None]
+        if (units == 1.0).all():
             return self.maps
         along = self.normals[..., :, None] * self.normals[..., None, :]
-        acting = np.where(flat, along, np.eye(self.width))
-        if self.torsion is not None:
-            lengths = torsion_lengths(self.torsion, self.friction)
-            acting[..., 3, 3] /= np.maximum(lengths, 1.0)
+        acting = along + units * (np.eye(self.width) - along)
         blocks = self.maps.reshape(*self.maps.shape[:-1], *self.normals.shape[-2:])
         return np.einsum("...wki,...kij->...wkj", blocks, acting).reshape(self.maps.shape)
 
@@ -205,7 +204,7 @@ def proved_margin(cones: ContactCones, forces: Array, caution: float = 1.0) -> A
     imbalance = np.linalg.norm(wrenches, axis=-1)
     corrected = caution * (imbalance + rounding) / np.where(full, least, 1.0)
     pushes = along.sum(axis=-1) + math.sqrt(along.shape[-1]) * corrected
-    lost = np.sqrt(1.0 + cones.friction**2) * corrected[..., None]
+    lost = np.where(flat, 1.0, np.sqrt(cones.units**2 + cones.friction**2)) * corrected[..., None]
     left = (np.where(flat, along, cones.friction * along - across) - lost).min(axis=-1)
     usable = full & (pushes > 0.0)
     return np.where(usable, left / np.where(usable, pushes, 1.0), -math.inf)

@@ -186,34 +186,26 @@ class WrenchSet(Declared):
         slopes = slopes.reshape(-1, self.width)
         across = _across(slopes)
         each = slopes[:, 0] + self.friction * across
+        # all of it is one contact's for l1, and every positive one's for linf
+        pushing = each > 0.0 if self.norm == "linf" else np.arange(len(each)) == each.argmax()
         forces = np.zeros_like(slopes)
-        if self.norm == "l1":
-            i = int(each.argmax())
-            forces[i, 0] = 1.0
-            if across[i] > NO_SLIDE:
-                forces[i, 1:] = slopes[i, 1:] * (self.friction[i] / across[i])
-            return float(each[i]), forces.ravel()
-        pushing = each > 0.0
         forces[pushing, 0] = 1.0
         sliding = pushing & (across > NO_SLIDE)
-        forces[sliding, 1:] = (
-            slopes[sliding, 1:] * (self.friction[sliding] / across[sliding])[:, None]
-        )
+        ratios = self.friction[sliding] / across[sliding]
+        forces[sliding, 1:] = slopes[sliding, 1:] * ratios[:, None]
         return float(each[pushing].sum()), forces.ravel()
 
     def edges(self) -> Array:
         """Return local forces, one a row, whose wrenches span the same space as the set."""
         k, width = len(self.friction), self.width
-        ways = 2 * (width - 1)
-        frame = np.zeros((ways, width))
-        frame[:, 0] = 1.0
-        frame[np.arange(ways), 1 + np.arange(ways) // 2] = np.tile([1.0, -1.0], width - 1)
-        forces = np.zeros((ways * k + 1, k, width))
-        for i, mu in enumerate(self.friction):
-            forces[ways * i : ways * i + ways, i] = frame * np.append(1.0, np.full(width - 1, mu))
-        # the last row, no force at all, belongs to linf only
+        each, ways = np.arange(k), np.eye(width)[1:]
+        forces = np.zeros((k, 2 * (width - 1), k, width))
+        slides = np.stack([ways, -ways], axis=1).reshape(-1, width)
+        forces[each, :, each] = self.friction[:, None, None] * slides
+        forces[each, :, each, 0] = 1.0
         rows = forces.reshape(-1, width * k)
-        return rows if self.norm == "linf" else rows[:-1]
+        # no force at all belongs to linf only
+        return np.vstack([rows, np.zeros(width * k)]) if self.norm == "linf" else rows
 
     def holds(self, forces: Array, slack: float | Array) -> bool:
         """Return whether local forces, (n, 3k) or (n, 4k), are within cones and bounds."""

@@ -163,7 +163,8 @@ def footprints(
                 way[j] = foci[a, j] - positions[a, finger, j]
             side = 1.0 if dotted(attempts.axes[a, finger], way) > 0.0 else -1.0
             _aim_rows(faces, attempts, (a, finger), side, (3, 5), (A, b))
-            count = _corners(faces, face, flat[0])
+            count = int(faces.edges[face])
+            flat[0, :count] = faces.flat[face, :count]
             for m in range(len(A)):
                 row = A[m, 3], A[m, 4], b[m] - dotted(A[m], foci[a])
                 count = _clip(flat, heights, count, row)
@@ -173,17 +174,6 @@ def footprints(
                     polygons[a, finger, k, j] = (
                         o[j] + T[j, 0] * flat[0, k, 0] + T[j, 1] * flat[0, k, 1]
                     )
-
-
-@loop("numpy")
-def _corners(faces: FaceTable, face: int, flat: Array) -> int:
-    """Fill in a face's corners in plane coordinates; return how many there are."""
-    T, o, corner = faces.frames[face], faces.origins[face], np.empty(3)
-    for k in range(faces.edges[face]):
-        for j in range(3):
-            corner[j] = faces.corners[face, k, j] - o[j]
-        flat[k, 0], flat[k, 1] = dotted(T[:, 0], corner), dotted(T[:, 1], corner)
-    return int(faces.edges[face])
 
 
 @loop("numpy")

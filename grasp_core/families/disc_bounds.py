@@ -54,8 +54,7 @@ from grasp_core.families.placements import (
     face_table,
 )
 from grasp_core.families.placing import KERNEL as PLACING
-from grasp_core.families.placing import Construction
-from grasp_core.families.regulus import regulus_bounds
+from grasp_core.families.placing import Construction, regulus_bounds
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import RESIDUAL
@@ -86,10 +85,8 @@ def disc_limits(
     Columns: a concurrent grasp, a pencil in each of the `PAIRINGS`; in units of the corners.
     """
     limits = np.empty((len(faces), 1 + len(PAIRINGS)))
-    compiled(KERNEL).fill(
-        corners, np.ascontiguousarray(normals), np.ascontiguousarray(faces),
-        np.ascontiguousarray(axes), np.ascontiguousarray(half_angles), limits,
-    )  # fmt: skip
+    given = map(np.ascontiguousarray, (normals, faces, axes, half_angles))
+    compiled(KERNEL).fill(corners, *given, limits)
     return limits
 
 
@@ -159,11 +156,7 @@ class AttemptBounds:
 
         For reguli the bounds are infinite or, where no slopes are feasible, minus infinity.
         """
-        attempts = Attempts(
-            np.ascontiguousarray(attempts.faces),
-            np.ascontiguousarray(attempts.axes),
-            np.ascontiguousarray(attempts.half_angles),
-        )
+        attempts = Attempts._make(map(np.ascontiguousarray, attempts))
         if construction.patterns is None:
             merits, _ = regulus_bounds(self._table, attempts, any_choice=True)
             # merits are no radii: only a proof that excludes all slopes tells anything

@@ -152,8 +152,8 @@ def measure(rows: Rows) -> None:
 def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]:
     """Find the largest four equal discs, then enlarge each; return the end and the radius."""
     first = largest_last(of_equal_radii(program), least)
-    if first < least:
-        return NONE, first
+    if not least <= first < np.inf:
+        return (NONE if first < least else LEFT), first
     A, b, n = program.A, program.b, len(x)
     count, c = len(b) - SPARE, np.zeros(n)
     # the sum of the radii, where the smallest one stays nearly as large
@@ -204,18 +204,12 @@ def _unmet(A: Array, d: Array, x: Array, u: Array) -> tuple[float, float]:
             total += u[k] * A[k, j]
         unmet, every = max(unmet, abs(total)), every + total
     for k in range(len(d)):
-        slack = d[k] - _dot(A[k], x)
+        slack = d[k]
+        for j in range(len(x)):
+            slack -= A[k, j] * x[j]
         excess, every = max(excess, -slack), every + slack
         unmet = max(unmet, max(-slack, -u[k]))
         if u[k] != 0.0:
             unmet = max(unmet, slack)
     # a sum shows whether any of them is not a number, which a comparison may not
     return (unmet if abs(every) < np.inf else np.inf), excess
-
-
-@loop("numpy")
-def _dot(a: Array, b: Array) -> float:
-    total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total

@@ -13,7 +13,6 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.compiled import compiled
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.values import FINGERS
 
@@ -44,13 +43,6 @@ class Placement:
     """Forces for which the contacts were chosen, (4, 3); None if they are those of `forces`."""
 
 
-def balanced_forces(normals: Array, ways: Array) -> Array:
-    """Scale four positively spanning directions to forces whose sum is zero, (4, 3)."""
-    forces = np.empty((FINGERS, 3))
-    compiled("grasp_core.families.discs_kernel").balance(ways, normals, forces)
-    return forces
-
-
 LEFT, NONE, PLACED = -1, 0, 1
 """Ends of an attempt: neither solved nor refuted, proved to hold nothing as good as asked for, or
 placed."""
@@ -68,6 +60,7 @@ class FaceTable(NamedTuple):
     b: Array  # limits of the rows E y <= b, (f, e)
     edges: Indices  # number of edges of each face, (f,)
     corners: Array  # corners in space, (f, e, 3); a face with fewer corners leaves rows unused
+    flat: Array  # corners in plane coordinates, (f, e, 2)
     depths: Array  # largest distance of the surface from each plane, (f,)
 
 
@@ -97,6 +90,7 @@ def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
         b=np.zeros((count, most)),
         edges=np.zeros(count, dtype=np.int64),
         corners=np.zeros((count, most, 3)),
+        flat=np.zeros((count, most, 2)),
         depths=np.zeros(count),
     )
     for place, piece in enumerate(pieces):
@@ -105,7 +99,7 @@ def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
         edges = len(piece.E)
         table.normals[place], table.origins[place] = piece.normal, piece.origin
         table.frames[place], table.depths[place] = piece.frame, piece.depth
-        table.edges[place] = edges
+        table.edges[place], table.flat[place, :edges] = edges, piece.corners
         table.corners[place, :edges] = piece.origin + piece.corners @ piece.frame.T
         table.E[place, :edges], table.b[place, :edges] = piece.E, piece.b
     return table

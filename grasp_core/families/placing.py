@@ -16,7 +16,7 @@ triangles. Either way the contacts are on the surface, and are certified with th
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -25,7 +25,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array
+from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.declared import trusted
@@ -42,11 +42,9 @@ from grasp_core.families.placements import (
     Footprints,
     Placed,
     Placement,
-    balanced_forces,
     face_table,
     room_for,
 )
-from grasp_core.families.regulus import nearly_symmetric, place_reguli
 from grasp_core.geometry.polygons import circle, clip, edge_rows, tidy
 from grasp_core.objects.face_pieces import (
     FacePiece,
@@ -56,7 +54,14 @@ from grasp_core.objects.face_pieces import (
     inscribed_radius,
     piece_of,
 )
-from grasp_core.solvers.lp import Infeasible, LinearProgram, Optimum, maximize, maximize_above
+from grasp_core.solvers.lp import (
+    RESIDUAL,
+    Infeasible,
+    LinearProgram,
+    Optimum,
+    maximize,
+    maximize_above,
+)
 from grasp_core.solvers.ties import graded, nearest_optimum, surpassing
 from grasp_core.values import (
     FINGERS,
@@ -69,6 +74,8 @@ from grasp_core.values import (
 )
 
 KERNEL = "grasp_core.families.placing_kernel"
+DISCS = "grasp_core.families.discs_kernel"
+REGULUS = "grasp_core.families.regulus_kernel"
 AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
 BEFORE, BEHIND = np.ones(FINGERS), -np.ones(FINGERS)
 MIXED_SIDES = np.array([s for s in product((1.0, -1.0), repeat=FINGERS) if abs(sum(s)) < FINGERS])
@@ -76,6 +83,12 @@ MIXED_SIDES = np.array([s for s in product((1.0, -1.0), repeat=FINGERS) if abs(s
 """
 CELL_A, CELL_B = np.array([-1.0, -1.0, 1.0, 1.0]), np.array([1.0, 1.0, -1.0, -1.0])
 """Patterns of a pencil: signs of k u in the foci of the fingers, see `pencil_kernel`."""
+GIVEN_UP = 1e-9
+"""Offset given up in favour of the least variables: giving up less makes the contacts of two
+pairings differ from each other's."""
+Choice: TypeAlias = tuple[int, int, int]
+"""A choice for reguli: indices of the two pairs' slopes, and of the side of the focus line."""
+CHOICES: tuple[Choice, ...] = tuple(product(range(3), range(3), range(2)))
 DISC_CORNERS = 64
 """Number of points that are listed on the border of a disc."""
 MOST_CHOICES = 8
@@ -156,6 +169,14 @@ class Construction:
         return self.one_of(self.placed(face_table(pieces), attempts, np.array([least])), 0)
 
 
+def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
+    """Return whether both pairs of each quadruple leave their slopes a choice, (q,)."""
+    found = np.empty(len(axes), dtype=np.bool_)
+    kernel = compiled(REGULUS)
+    kernel.nearly_symmetric(np.ascontiguousarray(axes), np.ascontiguousarray(half_angles), found)
+    return found
+
+
 CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(
         "concurrent", "cone", AS_LISTED, np.array([BEFORE, BEHIND]), slice(0, 1)
@@ -182,7 +203,7 @@ def largest_discs(program: Any, least: float) -> tuple[Array, float] | None:
 
     Gives the variables (n,) and the largest smallest radius; None if it is proved to be less.
     """
-    rows = compiled("grasp_core.families.discs_kernel").of_equal_radii(program)
+    rows = compiled(DISCS).of_equal_radii(program)
     objective = np.eye(len(rows.At))[-1]
     first = maximize_above(LinearProgram(objective, np.array(rows.At.T), rows.b), least)
     if isinstance(first, Infeasible):
@@ -207,6 +228,57 @@ def largest_discs(program: Any, least: float) -> tuple[Array, float] | None:
     x = np.append(first.x[:-1], np.full(n - program.radii, first.value))
     x[program.radii] += program.excess
     return x, first.value
+
+
+def regulus_bounds(
+    table: FaceTable, attempts: Attempts, *, any_choice: bool = False
+) -> tuple[Array, Indices]:
+    """Bound the merits of regulus grasps, minus the largest offsets, for many attempts.
+
+    Gives the merits of the best choices, or of any choices, (a,): minus infinity where a proof
+    excludes every choice, infinity where a choice was not decided. Then these choices, (a, 3), -1
+    where there is none.
+    """
+    bounds = np.empty(len(attempts.faces))
+    chosen = np.empty((len(bounds), 3), dtype=np.int64)
+    compiled(REGULUS).regulus_bounds(table, attempts, any_choice, bounds, chosen)
+    return bounds, chosen
+
+
+def place_reguli(table: FaceTable, attempts: Attempts, placed: Placed) -> None:
+    """Place four contacts for each attempt on the lines of one regulus, near the faces' middles.
+
+    The merit is minus the largest offset t; no placement means none for the slopes tried.
+    """
+    merits, chosen = regulus_bounds(table, attempts)
+    for a, (merit, choice) in enumerate(zip(merits.tolist(), chosen.tolist(), strict=True)):
+        try:
+            best = place_best(table, attempts, a, [tuple(choice)] if choice[0] >= 0 else [], placed)
+            # the program, solved again, has to confirm what compiled code chose
+            if not (best == merit or abs(best - merit) <= RESIDUAL):
+                place_best(table, attempts, a, CHOICES, placed)
+        except SolverError:
+            placed.ends[a] = LEFT
+
+
+def place_best(
+    table: FaceTable, attempts: Attempts, a: int, choices: Iterable[Choice], placed: Placed
+) -> float:
+    """Enter the best placement of one attempt over given choices, and return its merit."""
+    kernel, best, placed.ends[a] = compiled(REGULUS), -math.inf, NONE
+    for choice in choices:
+        usable, rows = kernel.regulus_program(table, attempts, a, choice)
+        if not usable:
+            continue
+        A, equal = rows.At.T, len(rows.b) - rows.equalities
+        c = -np.eye(A.shape[1])[kernel.T]
+        program = LinearProgram(c, A[:equal], rows.b[:equal], A[equal:], rows.b[equal:])
+        found = maximize(program)
+        # ties go to the first choice: rounding must not decide between equal ones
+        if isinstance(found, Optimum) and found.value > best + kernel.SAME_OFFSET:
+            x, best = nearest_optimum(program, found, GIVEN_UP), found.value
+            kernel.take(table, attempts, a, choice, x, best, placed)
+    return best
 
 
 def point_regions(placement: Placement) -> Regions:
@@ -428,8 +500,8 @@ def _aimed(
         facet.inset(at) >= -ON_EDGE for facet, at in zip(facets, positions, strict=True)
     ):
         return None
-    normals = np.array([facet.normal for facet in facets])
-    forces = balanced_forces(normals, np.sign(inward)[:, None] * ways)
+    normals, forces = np.array([facet.normal for facet in facets]), np.empty_like(ways)
+    compiled(DISCS).balance(np.sign(inward)[:, None] * ways, normals, forces)
     return replace(planned, positions=positions, forces=forces)
 
 

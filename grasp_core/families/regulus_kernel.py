@@ -36,7 +36,7 @@ program is linear:
 
 The last two keep out the zero force, and lines that meet: those are pencils. The program is solved
 for some slopes of both pairs, on either side of the focus line: compiled code chooses the ones
-whose contacts are nearest to the faces' middles, and `regulus` solves its program again.
+whose contacts are nearest to the faces' middles, and `placing` solves its program again.
 
 A program is first solved without its gap: if p stays beyond the gap anyway, that side was the
 better one. As the cones span (P3), x_i is on the side of its pair's resultant; there the rows (6)

@@ -102,7 +102,7 @@ def _check(order: str, tables: list[Table]) -> None:
     if not order or len(by_name) < len(tables) or not {*POINT} <= {*points}:
         raise ValueError("the header needs a format, and elements vertex (x, y, z) and face, once")
     if len(corners) != 1 or not corners[0].counted:
-        raise ValueError(f"the header needs one list {' or '.join(CORNERS)} of faces")
+        raise ValueError(f"the header needs one list {' or '.join(sorted(CORNERS))} of faces")
     for _, rows, columns in tables:
         names = {column.name for column in columns}
         if rows < 0 or (rows and not columns) or len(names) < len(columns):

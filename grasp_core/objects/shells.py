@@ -52,9 +52,9 @@ class _Body(Solid):
     def turned(self) -> "_Body":
         return _Body(self.vertices, self.triangles[:, ::-1], self.marks)
 
-    def shells(self) -> "list[_Body]":
-        """Split the body into parts that share no edge."""
-        label, parts = Edges.of(self.triangles).parts(), list[_Body]()
+    def parts(self, label: Indices) -> "list[_Body]":
+        """Split the body into the parts that triangles belong to, numbered (t,)."""
+        parts = list[_Body]()
         for part in range(int(label.max()) + 1):
             mine = label == part
             used, local = np.unique(self.triangles[mine], return_inverse=True)
@@ -70,15 +70,16 @@ def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSur
     if whole.volume < 0.0:
         corners = corners[:, ::-1]
         said.append("the mesh was inside out; its triangles were turned")
-    if (count := int(Edges.of(corners).parts().max()) + 1) > most:
+    label = Edges.of(corners).parts()
+    if (count := int(label.max()) + 1) > most:
         raise MeshError(
             MeshRefusal.SEPARATE,
             f"the mesh has {count} parts, more than the limit of {most}; give one solid",
         )
     as_it_is = found.mended(found.points, corners, found.surface.caps, 0.0, said)
-    shells = _Body(found.points, corners, np.arange(len(corners))).shells()
-    if len(shells) == 1:
+    if count == 1:
         return as_it_is
+    shells = _Body(found.points, corners, np.arange(len(corners))).parts(label)
     try:
         kept, dropped, changed = _of_many(shells, abs(whole.volume), largest_part=largest_part)
     except InputError as error:
@@ -189,7 +190,9 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
     if len(bodies) == 1:
         return bodies
     solid, marks = union(bodies, [body.marks for body in bodies])
-    found = _with_cavities(_Body(solid.vertices, solid.triangles, marks).shells(), slack)
+    label = Edges.of(solid.triangles).parts()
+    shells = _Body(solid.vertices, solid.triangles, marks).parts(label)
+    found = _with_cavities(shells, slack)
     if len(found) == len(bodies):
         return bodies
     if max(map(thin_share, found)) > CLEAN:

@@ -88,10 +88,11 @@ class Triangles:
                 continue
             plane, group = first_plane(seed), None
             for _ in range(fits):
+                if group:
+                    plane = self.fitted(group[0])
                 if not len(members := self._grown(seed, plane, fit, free)):
                     break
                 group = members, plane
-                plane = self.fitted(members)
             free[seed] = False
             if group:
                 free[group[0]] = False

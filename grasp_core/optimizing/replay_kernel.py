@@ -74,13 +74,13 @@ def _longer(old: Any) -> Any:
 
 @loop("numpy")
 def _copy(nodes: Nodes, source: int, place: int) -> None:
-    nodes.counts[place] = nodes.counts[source]
-    nodes.fresh[place] = nodes.fresh[source]
+    corners, counts = nodes.corners, nodes.counts  # once: in loops that would take longer
+    counts[place], nodes.fresh[place] = counts[source], nodes.fresh[source]
     nodes.above[place] = nodes.above[source]
     for i in range(FINGERS):
-        for p in range(nodes.counts.shape[2]):
-            count = nodes.counts[source, i, p]
-            nodes.corners[place, i, p, :count] = nodes.corners[source, i, p, :count]
+        for p in range(counts.shape[2]):
+            count = counts[source, i, p]
+            corners[place, i, p, :count] = corners[source, i, p, :count]
 
 
 @loop("numpy")
@@ -208,45 +208,56 @@ def _is_division(nodes: Nodes, deed: int) -> bool:
 @loop("numpy")
 def _answered(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
     """Put one node for each named finger in the last node's place; return False if it is wrong."""
-    node, twin = nodes.top[0] - 1, False
-    for i in range(FINGERS):
-        if (deed >> i) & 1:
-            twin = twin or nodes.fresh[node, i] > 0
-    if not _is_empty(nodes, node):
-        for i in range(FINGERS):
-            if (deed >> i) & 1 or (twin and nodes.fresh[node, i]):
-                continue
-            for p in range(len(pieces.normals)):
-                for v in range(nodes.counts[node, i, p]):
-                    if _support(pieces, p, nodes.corners[node, i, p, v], y) >= t:
-                        return False
+    corners, counts, node = nodes.corners, nodes.counts, nodes.top[0] - 1
+    if not _is_empty(counts[node]) and _do_others(pieces, nodes, deed, y, t):
+        return False
     branch(nodes, deed)
     place = nodes.top[0]
     for i in range(FINGERS):
         if (deed >> i) & 1:
             place -= 1
-            for p in range(len(pieces.normals)):
-                count = nodes.counts[place, i, p]
-                nodes.counts[place, i, p] = _cut(pieces, p, nodes.corners[place, i, p], count, y, t)
+            for p in range(counts.shape[2]):
+                if counts[place, i, p] > 0:
+                    kept = _cut(pieces, p, corners[place, i, p], counts[place, i, p], y, t)
+                    counts[place, i, p] = kept
     return True
 
 
 @loop("numpy")
-def _is_empty(nodes: Nodes, node: int) -> bool:
+def _do_others(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
+    """Return whether a finger of the last node may answer for which no named one stands."""
+    corners, counts, fresh = nodes.corners, nodes.counts, nodes.fresh
+    node, twin = nodes.top[0] - 1, False
+    for i in range(FINGERS):
+        if (deed >> i) & 1:
+            twin = twin or fresh[node, i] > 0
+    for i in range(FINGERS):
+        if (deed >> i) & 1 or (twin and fresh[node, i]):
+            continue
+        for p in range(counts.shape[2]):
+            for v in range(counts[node, i, p]):
+                a, b = corners[node, i, p, v, 0], corners[node, i, p, v, 1]
+                if _support(pieces, p, a, b, y) >= t:
+                    return True
+    return False
+
+
+@loop("numpy")
+def _is_empty(counts: Indices) -> bool:
     """Return whether some finger of a node has nowhere to be."""
     full = 0
     for i in range(FINGERS):
-        full += nodes.counts[node, i].sum() > 0
+        full += counts[i].sum() > 0
     return full < FINGERS
 
 
 @loop("numpy")
-def _support(pieces: Pieces, p: int, at: Array, y: Array) -> float:
+def _support(pieces: Pieces, p: int, a: float, b: float, y: Array) -> float:
     """Return the support of the cone of a contact, from the definition."""
     F, n, o = pieces.frames[p], pieces.normals[p], pieces.origins[p]
-    x0 = o[0] + F[0, 0] * at[0] + F[0, 1] * at[1]
-    x1 = o[1] + F[1, 0] * at[0] + F[1, 1] * at[1]
-    x2 = o[2] + F[2, 0] * at[0] + F[2, 1] * at[1]
+    x0 = o[0] + F[0, 0] * a + F[0, 1] * b
+    x1 = o[1] + F[1, 0] * a + F[1, 1] * b
+    x2 = o[2] + F[2, 0] * a + F[2, 1] * b
     u0 = y[0] + y[4] * x2 - y[5] * x1
     u1 = y[1] + y[5] * x0 - y[3] * x2
     u2 = y[2] + y[3] * x1 - y[4] * x0
@@ -259,9 +270,13 @@ def _support(pieces: Pieces, p: int, at: Array, y: Array) -> float:
 @loop("numpy")
 def _cut(pieces: Pieces, p: int, corners: Array, count: int, y: Array, t: float) -> int:
     """Cut a polygon to where a contact answers, in its place; return how many corners are left."""
-    heights, crossings, out = np.empty(ROOM), np.empty((ROOM, 2)), np.empty((ROOM, 2))
+    heights, reached = np.empty(ROOM), 0
     for k in range(count):
-        heights[k] = _support(pieces, p, corners[k], y)
+        heights[k] = _support(pieces, p, corners[k, 0], corners[k, 1], y)
+        reached += heights[k] >= t
+    if not 0 < reached < count:
+        return reached
+    crossings, out = np.empty((ROOM, 2)), np.empty((ROOM, 2))
     for k in range(count):
         after = (k + 1) % count
         if (heights[k] >= t) and not heights[after] >= t:
@@ -281,9 +296,8 @@ def _follow(
     near, far = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (near + far)
-        for j in range(2):
-            out[j] = low[j] + middle * (high[j] - low[j])
-        if _support(pieces, p, out, y) < t:
+        a, b = low[0] + middle * (high[0] - low[0]), low[1] + middle * (high[1] - low[1])
+        if _support(pieces, p, a, b, y) < t:
             near = middle
         else:
             far = middle

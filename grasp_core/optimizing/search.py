@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -42,6 +42,8 @@ from grasp_core.values import FINGERS
 Nodes: TypeAlias = tuple[Array, Indices, Indices]
 """Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
 any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
+Steps: TypeAlias = tuple[Indices, Indices, Array, Array]
+"""What a tree does, as `CutTree` lists it: deeds, what is asked, twists and lines."""
 POOL = 512
 """Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
 DEEP, FIRST_ROOM = 24, 256
@@ -128,15 +130,6 @@ class Part:
     parts: list["Part"] = field(default_factory=list["Part"])  # these parts
 
 
-class Steps(NamedTuple):
-    """The nodes of a tree as `CutTree` lists them."""
-
-    deeds: Indices
-    asked: Indices
-    twists: Array
-    lines: Array
-
-
 def leave(part: Part) -> None:
     """Leave a part's next node, alone, in as little memory as it takes: thousands may wait."""
     stack, place = part.stack, int(part.stack.top[0]) - 1
@@ -194,7 +187,7 @@ def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
         shifts = np.where(part.tree.deeds[:n] < lines_from, int(twists), int(lines))
         asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
     rows = list(_in_order(trunk, splice))
-    return Steps(
+    return (
         np.concatenate([part.tree.deeds[some] for part, some in rows]),
         np.concatenate([asked[id(part)][some] for part, some in rows]),
         np.concatenate([part.tree.twists[:m] for part, m in zip(every, sizes[:, 1], strict=True)]),
@@ -292,7 +285,7 @@ class Searching:
         best = first_best(-thresholds)
         self.threshold = few_digits((1.0 + 2.0 * ROUNDED_UP) * thresholds[best], ROUNDED_UP)
         none = np.zeros(len(self.first[0]), np.int64)
-        self.steps = Steps(none, none, twists[best : best + 1], np.empty((0, 3)))
+        self.steps = (none, none, twists[best : best + 1], np.empty((0, 3)))
         return twists
 
     def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:

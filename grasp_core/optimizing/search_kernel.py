@@ -294,13 +294,15 @@ def _answering(search: Search, node: int, k: int) -> int:
 @loop("numpy")
 def _estimated(search: Search, node: int, k: int) -> float:
     """Return about what `_measured` does, without cutting."""
-    cost, stays, answers, work = 0.0, False, 0, search.work
-    answering = _answering(search, node, k)
-    for i in range(FINGERS):
-        if (answering >> i) & 1:
-            stays = stays or work.left[i, k] > MOST_LEFT
-            answers += 1
-            cost += np.sqrt(work.left[i, k]) + 1e-9
+    cost, twin, stays, answers = 0.0, False, False, 0
+    fresh, work, t = search.stack.fresh[node], search.work, answer_to(search, k)
+    for i in range(FINGERS):  # as in `_answering`, which would take longer for the whole pool
+        if work.reach[i, k] < t or (fresh[i] and twin):
+            continue
+        twin = twin or fresh[i] > 0
+        stays = stays or work.left[i, k] > MOST_LEFT
+        answers += 1
+        cost += np.sqrt(work.left[i, k]) + 1e-9
     return cost + 1.0 if stays and answers > 1 else cost
 
 

@@ -55,9 +55,13 @@ def support(at: Array, a: float, b: float, friction: float) -> float:
 @loop("numpy")
 def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
     """Fill in what is left of a polygon where the support reaches t; return how many corners."""
-    heights, crossings = np.empty(ROOM), np.empty((ROOM, 2))
+    heights, reached = np.empty(ROOM), 0
     for k in range(count):
         heights[k] = support(at, corners[k, 0], corners[k, 1], friction)
+        reached += heights[k] >= t
+    if reached == 0:
+        return 0
+    crossings = np.empty((ROOM, 2))
     for k in range(count):
         after = (k + 1) % count
         if heights[k] >= t > heights[after]:

@@ -52,12 +52,10 @@ def to_grasp(
     name, faces, order = (found.id, found.faces, ORDER) if on is None else _named(found, on)
     flip = FLIP if on is not None and on.mirrored else UNMIRRORED
     center, radius, placement = body.center_of_mass, body.radius, found.placement
-    unit_positions = frozen_copy(placement.positions[order] * flip)
+    axes = [cone.axis for cone in found.cones]
+    vectors = np.array([placement.positions, found.normals, placement.forces, axes])
+    unit_positions, normals, forces, axes = frozen_copy(vectors[:, order] * flip)
     positions = frozen_copy(center + radius * unit_positions)
-    axes = np.array([cone.axis for cone in found.cones])
-    normals, forces, axes = (
-        frozen_copy(each[order] * flip) for each in (found.normals, placement.forces, axes)
-    )
     foci = placement.foci[::-1] if found.id[0] in PAIRED and order[0] > 1 else placement.foci
     return trusted(
         Grasp,

@@ -240,7 +240,8 @@ def transfer(
             range.
         SolverError: A program's answer failed its check.
     """
-    for body, name in ((old, "the old part"), (new, "the changed part")):
+    for body, name in ((old, "old"), (new, "new")):
+        instance(body, Polyhedron, name, "gc.load_polyhedron reads one from a mesh file")
         check_planar(body, name)
     value_of(Friction, friction, "friction")
     if finger is not None:

@@ -92,7 +92,7 @@ def _hand_reach() -> None:
 
 
 PLANNING = Loops(
-    ("families.discs", "families.regulus", "closure.critical_friction",
+    ("families.placing", "families.regulus", "closure.critical_friction",
      "quality.ferrari_canny"),
     (partial(_planned, "concurrent", "pencil"),),
     # first what the other half needs late

@@ -47,6 +47,7 @@ def test_indices_are_int64():
     assert is_array(np.zeros((2, 3), dtype=np.int64), None, 3, whole=True)
     for kind in (np.int8, np.int32, np.uint8, np.uint64, np.float64, bool):
         assert not is_array(np.zeros(3).astype(kind), 3, whole=True), kind
+    assert not is_array(np.array(["0", "1"]), 2, whole=True)
 
 
 def test_lengths_that_overflow_are_no_units():

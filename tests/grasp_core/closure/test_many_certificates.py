@@ -85,15 +85,13 @@ def test_margins_are_those_of_one_set_whatever_forces_and_twists_are_given():
     )
     forces += 1e-5 * rng.normal(size=forces.shape) * (rng.uniform(size=(SETS, 1, 1)) < 0.5)
     twists = rng.normal(size=(SETS, 6))
+    cones = ContactCones.at(arms, normals, np.full((SETS, 4), 0.6))
     for caution in (1.0, 1.01):
-        mu = np.full(4, 0.6)
-        cones = ContactCones.at(arms, normals, mu)
         lower = proved_margin(cones, forces, caution)
         upper = margin_ceiling(cones, twists, caution)
         for i in range(SETS):
-            cones = ContactCones.at(arms[i], normals[i], mu)
-            one = proved_margin(cones, forces[i], caution)
-            other = margin_ceiling(cones, twists[i], caution)
+            one = proved_margin(cones.only(i), forces[i], caution)
+            other = margin_ceiling(cones.only(i), twists[i], caution)
             assert lower[i] == pytest.approx(one, rel=1e-9, abs=1e-13)
             assert upper[i] == pytest.approx(other, rel=1e-9, abs=1e-13)
             tested += math.isfinite(one)

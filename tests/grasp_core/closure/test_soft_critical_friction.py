@@ -75,8 +75,7 @@ def test_the_interval_proves_both_ends_and_is_narrow():
     narrow = 0
     for _ in range(CASES):
         x, n = random_contacts(rng, 3, 0.5)
-        arms, _, size = unit_size(x)
-        cones = ContactCones.at(arms, n, np.ones(3), np.full(3, 0.2 / size))
+        cones = ContactCones.at(unit_size(x)[0], n, np.ones(3), np.full(3, 0.2))
         found = soft_ends(cones, gc.critical_friction(x, n) or 1.0)
         assert proved(found)
         if 1e-3 < found.upper < math.inf:

@@ -6,10 +6,17 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
-from grasp_core.families import regulus as regulus_grasps
+from grasp_core.families import placing
 from grasp_core.families.placements import face_table, room_for
-from grasp_core.families.placing import AS_LISTED, CONSTRUCTIONS, attempts_of
-from grasp_core.families.regulus import CHOICES, nearly_symmetric, place_best, regulus_bounds
+from grasp_core.families.placing import (
+    AS_LISTED,
+    CHOICES,
+    CONSTRUCTIONS,
+    attempts_of,
+    nearly_symmetric,
+    place_best,
+    regulus_bounds,
+)
 from grasp_core.families.regulus_kernel import LEAST_DEPTH
 from tests.grasp_core.families import reference_programs as programs
 from tests.grasp_core.quadruples import paired_quadruples
@@ -70,7 +77,7 @@ def test_contacts_lie_on_their_faces_within_the_stated_offset(reguli):
         for piece, at in zip(quad, placed.positions, strict=True):
             flat = piece.frame.T @ (at - piece.origin)
             assert (piece.E @ flat <= piece.b + TOLERANCE).all()
-            given_up = regulus_grasps.GIVEN_UP * (1.0 - placed.merit)
+            given_up = placing.GIVEN_UP * (1.0 - placed.merit)
             assert np.abs(flat).max() <= -placed.merit + given_up + TOLERANCE
 
 
@@ -166,8 +173,8 @@ def test_what_compiled_code_gets_wrong_is_found_by_all_programs(monkeypatch, lie
 
     pairs = list(paired_quadruples("random-30-1", math.radians(10.0), 12))
     right = [best_of_all(*pair) for pair in pairs]
-    honest = regulus_grasps.regulus_bounds
-    monkeypatch.setattr(regulus_grasps, "regulus_bounds", lying)
+    honest = placing.regulus_bounds
+    monkeypatch.setattr(placing, "regulus_bounds", lying)
     placed = 0
     for pair, expected in zip(pairs, right, strict=True):
         found = place_regulus(*pair)

@@ -181,8 +181,7 @@ def test_changed_proofs_are_refused(searched):
     proof, loads = found.proof, found.proof.measure.loads
     changes = [
         {"threshold": 0.5 * proof.threshold}, {"twists": 1.5 * proof.twists},
-        {"lines": np.full((1, 3), 1e308)},  # heights above it would be no numbers
-        {"measure": forged(Measure("weight"), name="volume")},
+        {"lines": np.full((1, 3), 1e308)}, {"measure": forged(Measure("weight"), name="volume")},
     ]  # fmt: skip
     if found.measure == "task":
         # smaller loads are resisted in larger multiples
