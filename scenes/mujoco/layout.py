@@ -169,6 +169,11 @@ class Layout(ByValue):
         return pushes.reshape(len(forces), -1) / self.drive.stiffness_n_per_m
 
 
+def surface_of(body: Polyhedron) -> Surface:
+    """Choose what fingertips touch on an object: pads where it is curved, else the object."""
+    return "object" if body.patches is None else "pads"
+
+
 def arrange(
     body: Polyhedron,
     grasp: Grasp | Sequence[Contact],
@@ -193,7 +198,7 @@ def arrange(
     arms = to_digits(arms, body.radius)
     positions = arms + body.center_of_mass
     size = max(grasp_size(positions), LEAST_SIZE * body.radius)
-    on_pads = (body.patches is not None) if surface is None else surface == "pads"
+    on_pads = (surface or surface_of(body)) == "pads"
     touch = PAD_TOUCH * size if on_pads else TOUCH * body.radius
     largest = fingers.max_normal_force_n
     mass = largest * RESPONSE_TIME_S**2 / size

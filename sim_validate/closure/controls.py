@@ -28,6 +28,7 @@ from grasp_core.forces.contact_forces import least_friction_forces
 from grasp_core.kinds import Friction, Many
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
+from scenes.mujoco.fingertips import clashes, fitting_radius
 from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.setup import Agenda, Setup
@@ -72,9 +73,9 @@ def negative_controls(
 ) -> tuple[Control, ...]:
     """Make the negative controls that exist for a grasp, at most one of each kind.
 
-    The kinds are friction below the critical one, fingers removed, a normal flipped, and contacts
-    moved on their faces, out of the grasp's region. All of them are proved
-    open by fingertips as soft as those of the setup.
+    The kinds are friction below the critical one, fingers removed, and contacts moved on their
+    faces, out of the grasp's region, to where fingertips have room. All of them are proved open by
+    fingertips as soft as those of the setup.
     """
     setup = setup or Setup()
     lower = FRICTION_SHARE * grasp.critical_friction
@@ -82,7 +83,6 @@ def negative_controls(
     candidates = (
         low_friction if lower >= LEAST_FRICTION else iter(()),
         _fingers_removed(grasp, friction, setup),
-        _normal_flipped(grasp, friction, setup),
         _contacts_moved(body, grasp, friction, setup, np.random.default_rng(seed)),
     )
     return tuple(found for tries in candidates if (found := next(tries, None)) is not None)
@@ -108,14 +108,6 @@ def _fingers_removed(grasp: Grasp, friction: float, setup: Setup) -> Iterator[Co
         yield from _refuted("fingers_removed", rest, friction, setup)
 
 
-def _normal_flipped(grasp: Grasp, friction: float, setup: Setup) -> Iterator[Control]:
-    """Flip a normal, so that a finger pulls instead of pushing, as a wrong sign in a file would."""
-    for finger, contact in enumerate(grasp.contacts):
-        contacts = list(grasp.contacts)
-        contacts[finger] = replace(contact, normal=-contact.normal)
-        yield from _refuted("normal_flipped", contacts, friction, setup)
-
-
 def _contacts_moved(
     body: Polyhedron, grasp: Grasp, friction: float, setup: Setup, rng: np.random.Generator
 ) -> Iterator[Control]:
@@ -126,7 +118,9 @@ def _contacts_moved(
             piece = choice[int(rng.integers(len(choice)))]
             corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
             moved.append(Contact(middle + TOWARD_CORNER * (corner - middle), contact.normal))
-        yield from _refuted("contacts_moved", moved, friction, setup)
+        positions, normals = stacked(moved)
+        if not clashes(body, positions, normals, fitting_radius(body, positions, normals)):
+            yield from _refuted("contacts_moved", moved, friction, setup)
 
 
 def _refuted(
@@ -206,10 +200,9 @@ def control_case(
     body: Polyhedron, control: Control, setup: Setup
 ) -> tuple[Rig, tuple[ControlLoad, ...]]:
     """Close fingers on a control, and find the loads that it must not hold."""
-    # Other contacts than the grasp's may lack room for its fingertips or lie off the mesh.
-    fingers = replace(setup.fingers, fingertip_radius_m=None)
-    on_pads = replace(setup, fingers=fingers, surface="pads")
-    scene = on_pads.scene(body, control.contacts, control.friction)
+    # other contacts than the grasp's may lack room for its fingertips
+    fitting = replace(setup, fingers=replace(setup.fingers, fingertip_radius_m=None))
+    scene = fitting.scene(body, control.contacts, control.friction)
     idle = _planned(body, control, setup, UNLOADED, np.zeros(6))
     bench = Bench(scene, threads=setup.threads, timeout_s=setup.timeout_s)
     rig = squeezed(bench, setup, idle.load.forces, control.friction, idle.settling)

@@ -80,19 +80,21 @@ def step(
         errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
 
 
-def touched(model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int]) -> tuple[Array, Array]:
-    """Find what each fingertip touches in a state of a scene.
+def touched(
+    model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int], *, one: bool = True
+) -> tuple[Array, Array]:
+    """Find where each fingertip is deepest in what it touches in a state of a scene.
 
     Gives normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a
-    fingertip that has not exactly one contact.
+    fingertip that touches nothing, or has several contacts where only one is right.
     """
     with unlogged():
         mujoco.mj_forward(model, data)
     normals, depths = np.full((len(tips), 3), np.nan), np.full(len(tips), np.nan)
     for finger, tip in enumerate(tips):
         own = [contact for contact in data.contact if tip in contact.geom]
-        if len(own) == 1:
-            (contact,) = own
+        if own and not (one and len(own) > 1):
+            contact = min(own, key=lambda each: each.dist)
             normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
             depths[finger] = -contact.dist
     return normals, depths
@@ -356,6 +358,12 @@ class Bench:
         # what lies between the first and the last may get their friction, too: it touches nothing
         self.touching = slice(touching[0], touching[-1] + 1)
         self.batch: batch.Batch | None = None
+
+    def first_normals(self) -> Array:
+        """Return the normals of the fingertips' deepest contacts before anything moves, (k, 3)."""
+        count = range(len(self.scene.layout.contacts))
+        tips = [self.model.geom(f"finger{finger}").id for finger in count]
+        return touched(self.model, mujoco.MjData(self.model), tips, one=False)[0]
 
     def _trials(self, count: int) -> batch.Batch:
         """Return at least `count` trials at rest at their contacts; they are made only once."""

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from grasp_core.planning.reach import Finger
 from grasp_core.settings import CHOSEN, named
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, build_scene
+from scenes.mujoco.layout import surface_of
 from scenes.settings import FingerSettings, PhysicsSettings, ScaledScene
 from sim_validate.kit.files import read_tables
 from sim_validate.settings import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol
@@ -75,6 +76,10 @@ class Setup(ScaledScene):
                 "hard fingers, whose contacts have friction and no torsion; for soft ones give "
                 "physics.torsion_m"
             )
+
+    def for_body(self, body: Polyhedron) -> Self:
+        """Return the setup with what fingertips touch on an object, if it was left open."""
+        return self if self.surface else replace(self, surface=surface_of(body))
 
     def closure(self, contacts: Grasp | Sequence[Contact], friction: float) -> ClosureCertificate:
         """Decide force closure by fingertips as soft as these."""

@@ -50,7 +50,8 @@ class Pair:
 
     def __str__(self):
         other = [pair for pair in zip(self.own, self.pads, strict=True) if pair[0] != pair[1]]
-        return f"{self.name} {self.grasp}: critical {self.critical}, predicted {self.predicted:.6g}; outcomes {other}"
+        critical = f"critical {self.critical}, predicted {self.predicted:.6g}"
+        return f"{self.name} {self.grasp}: {critical}; outcomes {other}"
 
 
 def compared(case):
