@@ -17,7 +17,9 @@ The load of first slip is taken from the contact forces. They are (n, t) at rest
 s (a, b) as long as motions are small. The least s that brings a contact to its cone, times the
 share of the load that is applied, is the multiple of the load at which the first contact slips. It
 is taken in the sample before the first contact is on its cone. If none ever is, the least of all
-samples under the full load says how far away slip stayed.
+samples under the full load says how far away slip stayed. A load that is all there when a contact
+slips, as that of a knock, has no share by which it could be measured; then the trial is followed
+again with contacts that stick, and the least of all samples is the multiple.
 
 An object that leaves a table rocks on its last edge and rings, so that a contact may touch its cone
 for some milliseconds, slide by micrometres, and hold. Such a touch is no slip: a row of samples on
@@ -142,9 +144,11 @@ class HeldBench:
         trials = self._begun(drives, start, friction)
         return self._stepped(trials, drives, lost or [(self.lost_m, math.inf)] * len(drives))
 
-    def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
+    def settled(
+        self, drive: Drive, start: Array | None = None, friction: Array | None = None
+    ) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
-        (motion,) = self.run([drive], start)
+        (motion,) = self.run([drive], start, friction)
         return motion, motion.states[-1]
 
     def touched(self, reached: Array) -> tuple[Array, Array]:
@@ -352,6 +356,18 @@ def outcome(
         slipped=slipped,
         first_slip=min(multiple, 1.0) if slipped else multiple,
     )
+
+
+def sticking_multiple(
+    motion: HeldMotion, layout: HeldLayout, drive: Drive, friction: Array, begun: int
+) -> float:
+    """Return the multiple of the load at which contacts that stick would reach their cones."""
+    found = seen(motion, layout)
+    pushing, _ = _on_cone(found, friction, begun)
+    found = replace(found, forces=found.forces[:, pushing])
+    loaded = begun + np.flatnonzero(drive.shares[begun:] >= FULL)
+    multiples = _extrapolated(found, drive.shares, friction[pushing], begun, loaded)
+    return float(multiples.min(initial=np.inf))
 
 
 def slides(found: Seen, layout: HeldLayout, begun: int = 0) -> Array:

@@ -24,6 +24,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
 from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
@@ -43,6 +44,7 @@ from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
 from sim_validate.execution.bench import (
+    FULL,
     IDLE,
     HeldBench,
     HeldMotion,
@@ -53,6 +55,7 @@ from sim_validate.execution.bench import (
     first_trouble,
     motions_joined,
     outcome,
+    sticking_multiple,
 )
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive, parted
@@ -144,6 +147,8 @@ def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[
 
 LOST = 3.0
 """How far an object is from its place when its trial ends, in its radii: no finger reaches it."""
+STICKING = 20.0
+"""Friction of contacts that stick, relative to the true one."""
 DIVERGED = Outcome(math.inf, math.inf, math.inf, dropped=True, slipped=True, first_slip=0.0)
 """What is known of an object that the simulator cannot follow."""
 SPARE = 0.05
@@ -308,23 +313,29 @@ def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> 
     return moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
 
 
-def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:
-    """Simulate trials: some with open fingers, others from a squeezed object or its weight."""
+def run_trials(
+    bench: HeldBench, trials: Sequence[Trial], friction: Array | None = None
+) -> tuple[HeldMotion, ...]:
+    """Simulate trials: some with open fingers, others from a squeezed object or its weight.
+
+    Contacts may have another friction, (k,), once the object is squeezed.
+    """
     _, squeezed = bench.settled(paths.closing())
     found = dict[Trial, HeldMotion]()
     if weighing := [trial for trial in trials if trial.weighing]:
         # The weight comes once for all. Hand and object get the speed that they start with when it
         # has come: uniform motion changes nothing.
         parts = [parted(trial.drive, trial.weighing) for trial in weighing]
-        weight, state = bench.settled(replace(parts[0][0], velocity=np.zeros(3)), squeezed)
-        motions = bench.run([after for _, after in parts], state)
+        still = replace(parts[0][0], velocity=np.zeros(3))
+        weight, state = bench.settled(still, squeezed, friction)
+        motions = bench.run([after for _, after in parts], state, friction)
         for trial, motion in zip(weighing, motions, strict=True):
             found[trial] = motions_joined(weight, motion)
     apart = [trial for trial in trials if trial.apart]
     others = [trial for trial in trials if not (trial.weighing or trial.apart)]
     for own, start in ((apart, None), (others, squeezed)):
         if own:
-            motions = bench.run([trial.drive for trial in own], start)
+            motions = bench.run([trial.drive for trial in own], start, friction)
             found |= dict(zip(own, motions, strict=True))
     return tuple(found[trial] for trial in trials)
 
@@ -334,6 +345,39 @@ def _judged_trials(
     settings: ExecutionSettings,
 ) -> list[ExecutionTrial]:  # fmt: skip
     """Simulate trials and judge them, those that are lost where a contact slips a second time."""
+    return _with_first_slips(bench, trials, _confirmed_trials(bench, trials, predicted, settings))
+
+
+def _with_first_slips(
+    bench: HeldBench, trials: Sequence[Trial], judged: Sequence[ExecutionTrial]
+) -> list[ExecutionTrial]:
+    """Measure at which multiple of its load a contact first slips where all of it comes at once.
+
+    Its share of the load is one when a contact slips, however little of the load's peak that takes.
+    So the trial is followed again with contacts that stick: their forces, beside the cones of the
+    true friction, tell the multiple.
+    """
+    known = list(judged)
+    sudden = [
+        place for place, each in enumerate(judged)
+        if each.fate in {"slipped", "dropped"}
+        and (trials[place].weighing or each.kind == "lift" or each.simulated_first_slip >= FULL)
+    ]  # fmt: skip
+    if sudden:
+        friction = bench.scene.layout.friction
+        stuck = run_trials(bench, [trials[place] for place in sudden], STICKING * friction)
+        for place, motion in zip(sudden, stuck, strict=True):
+            multiple = sticking_multiple(motion, bench.scene.layout, trials[place].drive,
+                                         friction, trials[place].begun)  # fmt: skip
+            known[place] = replace(known[place], simulated_first_slip=min(multiple, 1.0))
+    return known
+
+
+def _confirmed_trials(
+    bench: HeldBench, trials: Sequence[Trial], predicted: Sequence[tuple[float, float]],
+    settings: ExecutionSettings,
+) -> list[ExecutionTrial]:  # fmt: skip
+    """Simulate trials and judge them, and those that are lost after a slip by shorter steps too."""
     motions = run_trials(bench, trials)
     judged = [
         _judged(trial, motion, each, bench, settings)
