@@ -369,7 +369,7 @@ def _on_surface(surface: Surface, row: GraspRow, radius_m: float) -> Iterator[bo
     for point, normal in zip(row.points, row.normals, strict=True):
         if row.control_of is None:
             yield surface.holds(point, normal, ON_SURFACE * radius_m)
-        else:  # some controls have a flipped normal
+        else:
             yield surface.holds(point, None, NEAR_SURFACE * radius_m)
 
 
