@@ -30,8 +30,7 @@ from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_fac
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
-from grasp_core.planning.as_given import to_grasp
-from grasp_core.planning.certify import Candidate, certify_each
+from grasp_core.planning.certify import Candidate, certify_each, to_grasp
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp

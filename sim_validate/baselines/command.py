@@ -15,10 +15,9 @@ from sim_validate.baselines.check import Checked, check, complete, measured, see
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.part import Present, present, testable
 from sim_validate.closure.command import check_noise
-from sim_validate.engine.setup import Agenda, setup_from_file
+from sim_validate.engine.setup import Agenda, setup_from_file, wrenches_from_file
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.planning.wrenches_json import wrenches_from_file
 
 
 def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:

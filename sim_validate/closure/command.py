@@ -25,7 +25,14 @@ from scenes.example_objects import example_object
 from sim_validate.closure.validate import Job, validate, validated
 from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
 from sim_validate.engine.gate import measured_gate, require_faithful
-from sim_validate.engine.setup import Agenda, Setup, setup_from_file, with_planned_radius
+from sim_validate.engine.setup import (
+    Agenda,
+    Setup,
+    setup_from_file,
+    weights,
+    with_planned_radius,
+    wrenches_from_file,
+)
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit import command_flags
 from sim_validate.kit.command_flags import Testing
@@ -35,7 +42,6 @@ from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import alone_in, remove_results, write_arrays
 from sim_validate.kit.processes import available_cores
 from sim_validate.planning.asked_objects import asked_grasps
-from sim_validate.planning.wrenches_json import weights, wrenches_from_file
 from sim_validate.settings import ChosenTrials, Noise
 
 Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, RecordFile]]

@@ -18,10 +18,10 @@ from grasp_core.arrays import Array
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import METHODS
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.plan_search import carried
 from grasp_core.planning.planner import plan
 from grasp_core.planning.request import methods_for
 from grasp_core.planning.result import Moved, Plan
-from grasp_core.planning.selection import carried
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types
@@ -194,7 +194,7 @@ def _task(command: command_flags.Plan) -> Array | None:
         raise FlagsError("--measure task and --wrenches FILE go together: give both, or neither")
     if command.wrenches is None:
         return None
-    from sim_validate.planning.wrenches_json import wrenches_from_file
+    from sim_validate.engine.setup import wrenches_from_file
 
     return np.array([each.wrench for each in wrenches_from_file(command.wrenches)])
 

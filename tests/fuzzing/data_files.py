@@ -26,14 +26,13 @@ from sim_validate.datasets.open_dataset import (
 )
 from sim_validate.datasets.units import given_from_json
 from sim_validate.datasets.workers import UnitRecord
-from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.command_flags import Run
 from sim_validate.kit.files import tables_of_toml
 from sim_validate.kit.flag_values import flags_from, flags_of
 from sim_validate.planning.regions import Regions
-from sim_validate.planning.wrenches_json import wrenches_from_json
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text
 from tests.sim_validate.execution.executed import executions

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.planning import selection
+from grasp_core.planning import plan_search as selection
 from scenes.example_objects import example_object
 
 

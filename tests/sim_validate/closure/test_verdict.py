@@ -61,8 +61,8 @@ def _repeated(document):
     ("change", "said"),
     [
         (lambda each: each["verdicts"][0].update(held=False), r"verdicts\[0\].held: false contrad"),
-        (lambda each: each["verdicts"][0].update(outcome="slipped"), 'outcome: "slipped" contra'),
-        (_slipped, 'verdicts\\[0\\].outcome: "held" contradicts'),
+        (lambda each: each["verdicts"][0].update(outcome="slipped"), "outcome: 'slipped' contra"),
+        (_slipped, r"verdicts\[0\].outcome: 'held' contradicts"),
         (_control, r"controls\[0\].held: true contradicts"),
         (_repeated, "robustness.held: 1 contradicts"),
         (

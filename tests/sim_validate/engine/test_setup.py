@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.engine.setup import Agenda, NamedWrench, Setup, physics_from_file, setup_from_file
-from sim_validate.planning.wrenches_json import weights, wrenches_from_file
+from sim_validate.engine.setup import (
+    Agenda,
+    NamedWrench,
+    Setup,
+    physics_from_file,
+    setup_from_file,
+    weights,
+    wrenches_from_file,
+)
 
 
 def test_a_file_changes_what_it_names_and_nothing_else(tmp_path):
