@@ -2,9 +2,9 @@
 
 The palm is fixed in the world. Links, joints and fingertips are where the hand has them; each link
 is a body on a hinge, turned as in the pose, so that all hinges stand at zero. Fingertips are the
-balls that the analysis knows, and touch what fingertips on slides do (see `closure_scene`). Shapes of links pass through the object: the pose is known to be clear of
-it, and trials move it by micrometres. A link whose mass is not known has a small one, which gravity
-does not pull.
+balls that the analysis knows, and touch what fingertips on slides do (see `closure_scene`). Shapes
+of links pass through the object: the pose is known to be clear of it, and trials move it by
+micrometres. A link whose mass is not known has a small one, which gravity does not pull.
 
 Servos turn the joints: one of stiffness k_q is told to go to the angle u = tau / k_q beyond that of
 the pose, which makes it apply the torque tau as long as the joint stands still, and never more than

@@ -346,14 +346,14 @@ def _blow_up(case: Case) -> Check:
 
 GAP_LIMIT = 1e-9
 """Largest difference of a position or angle between the two solvers, in grasp sizes: a
-ten-thousandth of the finest threshold. Usual solvers differ by 2e-10 at most, on a millimetre at
-friction 0.02, and else by 1e-15. Solvers that are known to slip falsely differ by 1.6e-9 and more.
+ten-thousandth of the finest threshold. Usual solvers differ by 8e-12 at most, on a millimetre at
+friction 0.05, and else by 1e-15. Solvers that are known to slip falsely differ by 1.6e-9 and more.
 """
-LOW_GAP_LIMIT = 1e-7
-"""Largest difference between the two solvers at low friction, in grasp sizes: a hundredth of the
-finest threshold. Usual solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes
-of that size were seen to let go far above their critical friction, implicit integrators among them,
-differ by 4e-5."""
+LOW, LOW_GAP_LIMIT = 0.05, 1e-7
+"""Largest difference between the two solvers below a low friction, in grasp sizes: a hundredth of
+the finest threshold. Usual solvers differ by 2e-8 at most, on a millimetre. Solvers under which
+boxes of that size were seen to let go far above their critical friction, implicit integrators among
+them, differ by 4e-5."""
 SHARE = 0.8
 """Load on the tetrahedron, relative to the largest load that it resists."""
 LIGHT = 1e-3
@@ -374,7 +374,7 @@ def solver_gaps(case: Case) -> tuple[Check, Check]:
     low = [(_released(each, LEAST_OFFSET),) for each in (case, exact)]
     name = "motion that a solver to the last digit changes"
     return (
-        Check(name, _gap(*here), 0.0, GAP_LIMIT),
+        Check(name, _gap(*here), 0.0, GAP_LIMIT if case.friction >= LOW else LOW_GAP_LIMIT),
         Check(f"{name}, at friction {LEAST_OFFSET:g}", _gap(*low), 0.0, LOW_GAP_LIMIT),
     )
 
@@ -549,5 +549,6 @@ def measured_gate(
 ) -> Gate:
     """Check the simulator on the known cases of closure trials."""
     fingers = replace(setup.fingers, fingertip_radius_m=None, approach=None)
-    setup = replace(setup, fingers=fingers, threads=1, timeout_s=math.inf)
+    surface = setup.surface or "object"  # as on the known cases
+    setup = replace(setup, fingers=fingers, surface=surface, threads=1, timeout_s=math.inf)
     return measured(Case(setup, friction, two_digits(radius_m)))

@@ -120,9 +120,10 @@ CASES = (
         "scenes",
         (
             "plan l-bracket --limit 2 --jobs 1 --out .",
-            "scene grasps.json --out pads",
+            "scene grasps.json --out own",
+            "scene grasps.json --surface pads --out pads",
             "plan wedge --limit 1 --jobs 1 --out wedge",
-            "scene wedge/grasps.json --surface mesh --torsion-m 0.003 --out wedge/mesh",
+            "scene wedge/grasps.json --torsion-m 0.003 --out wedge/soft",
             "scene grasps.json --mass-kg 0.3 --out held",
             "plan mug --limit 1 --jobs 1 --out curved",
             "scene curved/grasps.json --mass-kg 0.3 --out curved/held",
@@ -133,7 +134,7 @@ CASES = (
         (
             "plan wedge --limit 1 --jobs 1 --out .",
             "validate grasps.json --repeats 5 --noise.shift 0.02 --noise.friction 0.1 --limits ramp"
-            " --random-wrenches 2 --weight-n 2 --torsion-m 0.002 --surface mesh --traces --jobs 1"
+            " --random-wrenches 2 --weight-n 2 --torsion-m 0.002 --traces --jobs 1"
             " --out .",
             "baseline record grasps.json -o wedge.baseline.json --limit 1 --jobs 1",
         ),

@@ -187,18 +187,18 @@ def test_limits_do_not_depend_on_how_fingers_are_built(fingers):
         pytest.param("prism", "free", marks=MORE),
     ],
 )
-def test_pads_are_where_the_surface_of_the_mesh_is(name, family):
-    """The same limits and critical friction when fingertips touch a convex object's own mesh."""
+def test_pads_are_where_the_surface_of_the_object_is(name, family):
+    """The same limits when fingertips touch pads, in place of the object itself."""
     agenda = replace(WITHOUT_CONTROLS, limits="ramp")
     tested = 0
     body, (grasp, *_) = grasps(name, 0.5, 1, (family,))
-    pads, mesh = (
+    pads, own = (
         sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(surface=surface))
-        for surface in ("pads", "mesh")
+        for surface in ("pads", "object")
     )
     assert pads.good
-    assert mesh.good
-    for one, other in zip(pads.wrenches, mesh.wrenches, strict=True):
+    assert own.good
+    for one, other in zip(pads.wrenches, own.wrenches, strict=True):
         assert one.let_go_at.share == pytest.approx(other.let_go_at.share, abs=2e-3)
         tested += 1
     assert tested == 13

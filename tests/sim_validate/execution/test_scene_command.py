@@ -90,7 +90,7 @@ def test_a_grasp_that_no_squeeze_holds_has_no_scene(wedge, tmp_path, capsys):
 
 
 REFUSED = {
-    "--mass-kg 1 --surface mesh": "for scenes with scaled masses",
+    "--mass-kg 1 --surface pads": "for scenes with scaled masses",
     "--tip-stiffness-n-per-m 1000": "give --mass-kg or --density-kg-m3 too",
 }
 

@@ -17,7 +17,7 @@ EVERYDAY = (
     ("pads", "physics", {"solver": "CG"}, GATE),
     ("pads", "physics", {"tolerance": 1e-4}, GATE),
     ("pads", "hold", {"hold_threshold": 1e-6}, GATE),
-    ("mesh", "physics", {"ccd_iterations": 1}, GATE),
+    ("object", "physics", {"ccd_iterations": 1}, GATE),
     ("pads", "hold", {"control_load": 1e-6}, RANGE),
     ("pads", "hold", {"least_normal_share": 0.5}, RANGE),
     ("pads", "hold", {"least_excess": 1e-8}, RANGE),
@@ -28,7 +28,7 @@ SLOW = (
     ("pads", "physics", {"timestep": 0.01}, RANGE),
     ("pads", "physics", {"solref": [0.02, 1.0]}, GATE),
     ("pads", "physics", {"wind": [10.0, 0.0, 0.0], "density": 1000.0}, GATE),
-    ("mesh", "physics", {"margin": 1e-3}, GATE),
+    ("object", "physics", {"margin": 1e-3}, GATE),
     ("pads", "fingers", {"fingertip_mass_kg": 1e6}, GATE),
     ("pads", "fingers", {"stiffness_n_per_m": 10.0}, GATE),
     ("pads", "hold", {"gap_threshold": 1.0}, GATE),
@@ -44,8 +44,8 @@ REST = (
     ("pads", "physics", {"tolerance": 1e-8}, GATE),
     ("pads", "physics", {"solref": [0.1, 1.0]}, GATE),
     ("pads", "physics", {"margin": 1e-3}, GATE),
-    ("mesh", "physics", {"ccd_iterations": 5}, GATE),
-    ("mesh", "physics", {"ccd_tolerance": 0.01}, GATE),
+    ("object", "physics", {"ccd_iterations": 5}, GATE),
+    ("object", "physics", {"ccd_tolerance": 0.01}, GATE),
     ("pads", "fingers", {"fingertip_mass_kg": 1e-6}, GATE),
     ("pads", "fingers", {"stiffness_n_per_m": 1e6}, GATE),
     ("pads", "hold", {"total_threshold": 1e-6}, GATE),
@@ -55,7 +55,7 @@ REST = (
 )
 AT_SMALL_SIZE = (
     ("pads", "physics", {"tolerance": 1e-12}, GATE),
-    ("mesh", "physics", {"ccd_tolerance": 1e-3}, GATE),
+    ("object", "physics", {"ccd_tolerance": 1e-3}, GATE),
     ("pads", "physics", {"integrator": "implicit"}, GATE),
     ("pads", "physics", {"integrator": "implicitfast"}, GATE),
 )
@@ -118,7 +118,7 @@ def test_what_is_too_coarse_for_a_small_object_is_refused_there(surface, table, 
 )
 def test_settings_that_are_right_are_accepted(table, numbers):
     for radius_m in (TINY, USUAL, 1.0):
-        assert refusal("pads", table, numbers, radius_m) is None
+        assert refusal("object", table, numbers, radius_m) is None
 
 
 BRACKET_TABLES = (

@@ -6,6 +6,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.settings import PhysicsSettings
+from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import measured_gate, require_faithful, require_touch
 from sim_validate.engine.setup import Setup
 from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
@@ -47,7 +48,7 @@ EVERYDAY = (
 def test_the_usual_settings_are_faithful_and_every_figure_is_measured():
     gate = require_faithful(Setup())
     assert gate.passed
-    assert len(gate.checks) == 19
+    assert len(gate.checks) == 21
     for check in gate.checks:
         assert check.least <= check.value < check.largest
         assert str(check).endswith("ok")
@@ -63,21 +64,23 @@ def test_broken_settings_are_refused_with_the_figures(name):
     assert "OUT OF TOLERANCE" in str(caught.value)
 
 
-def test_a_mesh_is_measured_as_well_as_pads():
-    gate = require_faithful(Setup(surface="mesh"))
-    assert len(gate.checks) == 2 * 19 + 2
-    assert sum(check.name.startswith("on a mesh: ") for check in gate.checks) == 19 + 2
+def test_what_fingertips_touch_is_what_is_measured():
+    """On the object, how fingertips touch its faces is measured too."""
+    assert len(require_faithful(Setup(surface="pads")).checks) == 19
+    own = require_faithful(Setup(surface="object"))
+    assert len(own.checks) == 19 + 2
+    assert require_faithful(Setup()).checks == own.checks
 
 
-def test_contacts_that_a_mesh_does_not_give_are_not_blamed_on_the_grasp():
+def test_contacts_that_the_simulator_does_not_find_are_not_blamed_on_the_grasp():
     """A ball of many facets takes more iterations than the known cases do."""
     body = scenes.example_object("random-200-1")
     contacts = [gc.Contact(face.centroid, face.normal) for face in body.faces[:12]]
-    require_touch(body, contacts, Setup(surface="mesh"))
-    few = Setup(surface="mesh", physics=replace(GOOD, ccd_iterations=5))
-    with pytest.raises(gc.UnfaithfulError, match=r"does not touch the mesh.*ccd_iterations"):
-        require_touch(body, contacts, few)
-    require_touch(body, contacts, replace(few, surface="pads"))
+    few = Setup(surface="object", physics=replace(GOOD, ccd_iterations=5))
+    require_touch(Bench(Setup(surface="object").scene(body, contacts, 0.5)))
+    with pytest.raises(gc.UnfaithfulError, match=r"does not touch the object.*ccd_iterations"):
+        require_touch(Bench(few.scene(body, contacts, 0.5)))
+    require_touch(Bench(replace(few, surface="pads").scene(body, contacts, 0.5)))
 
 
 def test_nothing_is_validated_with_broken_settings():
