@@ -112,7 +112,11 @@ class Shape:
     def _with_nan(self, value: Any) -> Array:
         """Return a copy whose entries may be NaN, for which lists have None."""
         listed: Any = value.tolist() if hasattr(value, "tolist") else value
-        array = np.array(listed, dtype=np.float64) if _is_rows(listed) else real_array(value, "")
+        try:
+            array = np.array(listed, dtype=np.float64) if _is_rows(listed) else None
+        except ValueError:  # its rows differ in length
+            array = None
+        array = real_array(value, "") if array is None else array
         frozen(np.nan_to_num(array), self._lengths, "")
         array.setflags(write=False)
         return array

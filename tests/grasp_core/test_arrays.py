@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.arrays import frozen, is_array, to_digits
+from grasp_core.arrays import Shape, frozen, is_array, to_digits
+from grasp_core.kinds import UnfitError
 from scenes.example_objects import example_object
 from tests.tampering.changes import forged
 
@@ -48,6 +49,12 @@ def test_indices_are_int64():
     for kind in (np.int8, np.int32, np.uint8, np.uint64, np.float64, bool):
         assert not is_array(np.zeros(3).astype(kind), 3, whole=True), kind
     assert not is_array(np.array(["0", "1"]), 2, whole=True)
+
+
+@pytest.mark.parametrize("rows", [[[], 1.0], [[1.0], [1.0, 2.0]], [1.0, [None]]])
+def test_rows_of_different_lengths_are_unfit(rows):
+    with pytest.raises(UnfitError):
+        Shape(None, nan=True).take(rows)
 
 
 def test_lengths_that_overflow_are_no_units():
