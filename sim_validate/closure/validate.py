@@ -248,8 +248,9 @@ def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
 
 def verdict_of(job: Job) -> Verdict:
     """Validate one grasp."""
-    body, grasp, friction, setup = job.body, job.grasp, job.friction, job.setup.for_body(job.body)
+    body, grasp, friction = job.body, job.grasp, job.friction
     check_on_faces(body, grasp)
+    setup = job.setup.for_body(body)
     value_of(Friction, friction, "friction")
     critical = setup.critical_friction(grasp)
     closed = friction > critical

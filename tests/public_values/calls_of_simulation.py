@@ -28,7 +28,7 @@ CALLS = [
     Call("scenes.build_scene", of_grasp(), {
         "grasp": VALUE | {"contacts of objects": [object()] * 4, "empty": (), "one": "grasp"},
         "fingers": optional(VALUE) | {"too large": scenes.FingerSettings(fingertip_radius_m=1.0)},
-        "surface": WORD,
+        "surface": optional(WORD),
     }),
     Call("scenes.write_scene", lambda: {"scene": scene(), "path": "no/such/folder/a.xml"},
          succeeds_in="tests/scenes/mujoco/test_closure_scene.py"),
@@ -135,7 +135,7 @@ CALLS = [
     )),
     Call("sv.Setup", dict, {
         **dict.fromkeys(("fingers", "physics", "hold", "limit", "friction"), VALUE),
-        "surface": WORD,
+        "surface": optional(WORD),
         "timeout_s": unless(POSITIVE, "infinite", "tiny", "huge"),
     }),
 ]  # fmt: skip
