@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 60_321,
     "modules of packages": 269,
-    "lines of tests": 48_884,
+    "lines of tests": 48_885,
     "lines of docs": 7_189,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -26,7 +26,7 @@ RISES = (
     "lines of docs, 6,508 to 6,530: how a setting is declared, what each required package does",
     "lines of docs, 6,530 to 7,174: the tables of files are made from the classes of records",
     "lines of tests, 48,022 to 48,724: damaged copies of each kind of file; fields",
-    "lines of tests, 48,724 to 48,884: the programs of the families as the paper has them",
+    "lines of tests, 48,724 to 48,885: the programs of the families as the paper has them",
     "lines of packages, 60,317 to 60,321: rows of different lengths in files are refused",
     "lines of docs, 7,165 to 7,189: the way of an object and of a grasp, drawn",
 )
