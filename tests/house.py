@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 60_321,
+    "lines of packages": 60_323,
     "modules of packages": 269,
     "lines of tests": 48_885,
     "lines of docs": 7_189,
@@ -27,7 +27,7 @@ RISES = (
     "lines of docs, 6,530 to 7,174: the tables of files are made from the classes of records",
     "lines of tests, 48,022 to 48,724: damaged copies of each kind of file; fields",
     "lines of tests, 48,724 to 48,885: the programs of the families as the paper has them",
-    "lines of packages, 60,317 to 60,321: rows of different lengths in files are refused",
+    "lines of packages, 60,317 to 60,323: rows of different lengths in files are refused; tilts are compiled",
     "lines of docs, 7,165 to 7,189: the way of an object and of a grasp, drawn",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""

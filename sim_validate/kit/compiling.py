@@ -16,6 +16,7 @@ import numpy as np
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import is_kept
+from grasp_core.cones.tilting import toward
 from grasp_core.kinds import Family
 from grasp_core.planning.planner import plan
 from grasp_core.processes import local_processes
@@ -100,6 +101,7 @@ PLANNING = Loops(
         partial(least_distance, CONTACTS[0][:3], -np.ones((1, 3))),
         partial(force_closure, *CONTACTS, FRICTION), partial(critical_friction, *CONTACTS),
         partial(_planned, "regulus"), partial(ferrari_canny, *CONTACTS, FRICTION, torque_scale=1.0),
+        partial(toward, np.zeros((1, 3)), *np.array(CONTACTS)[:, None], np.full((1, 4), FRICTION)),
     ),
 )  # fmt: skip
 """What compiles the loops that plans need."""
