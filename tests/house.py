@@ -27,7 +27,7 @@ RISES = (
     "lines of docs, 6,530 to 7,174: the tables of files are made from the classes of records",
     "lines of tests, 48,022 to 48,724: damaged copies of each kind of file; fields",
     "lines of tests, 48,724 to 48,885: the programs of the families as the paper has them",
-    "lines of packages, 60,317 to 60,323: rows of different lengths in files are refused; tilts are compiled",
+    "lines of packages, 60,317 to 60,323: uneven rows in files are refused; tilts are compiled",
     "lines of docs, 7,165 to 7,189: the way of an object and of a grasp, drawn",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
