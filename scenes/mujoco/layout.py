@@ -48,6 +48,9 @@ PAD_DEPTH = 0.1
 FLAT = 1e-6
 """Share of the largest moment of inertia that is added to all three. Coplanar contacts give moments
 at the very limit of what a body can have, and rounding must not pass that limit."""
+NEARBY = 4.0
+"""Distance from contacts up to which an object that is not convex has a surface to be touched, in
+radii of fingertips. Trials end long before an object has moved as far."""
 PAD_TOUCH = 1e-9
 """Least depth of fingertips in pads at the start, in grasp sizes. At depth zero, rounding would
 decide which fingertips press in the first step, and the impact of the others one step later can
@@ -200,6 +203,7 @@ def arrange(
     size = max(grasp_size(positions), LEAST_SIZE * body.radius)
     on_pads = (surface or surface_of(body)) == "pads"
     touch = PAD_TOUCH * size if on_pads else TOUCH * body.radius
+    drive = _drive(body, positions, normals, fingers, size, touch)
     largest = fingers.max_normal_force_n
     mass = largest * RESPONSE_TIME_S**2 / size
     return Layout(
@@ -218,12 +222,12 @@ def arrange(
             for face in (face_under(body, contact) for contact in contacts)
         ),
         friction=friction,
-        drive=_drive(body, positions, normals, fingers, size, touch),
+        drive=drive,
         squeeze=SQUEEZE * largest * _pushes(positions, normals, friction, softness),
         approach=to_digits(-RETREAT * size * _ways_in(grasp, normals, fingers)),
         softness=softness,
         on_pads=on_pads,
-        solids=() if on_pads else touched_solids(body, arms, size),
+        solids=() if on_pads else touched_solids(body, arms, NEARBY * drive.radius_m),
     )
 
 
