@@ -46,7 +46,7 @@ TOWARD = (0.5, 0.9)
 """Angles up to which axes may lean to meet in a point, in friction angles."""
 MOVES = 60
 SLIGHT = 1e-6
-"""The same as in `tilting_kernel`."""
+"""Size below which improvements and directions decide nothing, as in `tilting_kernel`."""
 BESIDE = 0.1
 """Sine of the angle between two axes above which one can serve to find a direction across the
 other."""

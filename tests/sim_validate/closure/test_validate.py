@@ -188,7 +188,7 @@ def test_limits_do_not_depend_on_how_fingers_are_built(fingers):
     ],
 )
 def test_pads_are_where_the_surface_of_the_object_is(name, family):
-    """The same limits when fingertips touch pads, in place of the object itself."""
+    """Limits are the same when fingertips touch pads, in place of the object itself."""
     agenda = replace(WITHOUT_CONTROLS, limits="ramp")
     tested = 0
     body, (grasp, *_) = grasps(name, 0.5, 1, (family,))
