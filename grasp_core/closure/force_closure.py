@@ -64,7 +64,7 @@ from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.proofs import ContactCones, margin_ceiling, proved_margin
 from grasp_core.declared import Declared, trusted
 from grasp_core.errors import UndecidedError
-from grasp_core.kinds import LARGEST, Range
+from grasp_core.kinds import LARGEST
 from grasp_core.values import Contact, Grasp
 
 UNSAFE = 1e-6
@@ -76,7 +76,7 @@ SUMMED = 1e-9
 """Error that closing forces may have: in the sum of their normal parts, which is 1, and in their
 wrench at unit size, which is zero."""
 FAR_BELOW = -1e6
-"""Margin below which minus infinity is reported: hardly any forces balance."""
+"""Least margin that is reported: hardly any forces balance, or none at all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -85,12 +85,12 @@ class ClosureCertificate(Declared):
 
     closed: bool
     """Whether the contacts are in force closure."""
-    margin: Annotated[float, Range(most=math.inf)]
+    margin: float
     """Proved bound of the optimum t of the margin program, dimensionless, unchanged by moving and
     scaling. If closed, the optimum is no less. If not, it is no more than a negative margin, while
     zero says only that there is no closure: contacts may balance deep inside their cones, and yet
     leave the object free. `force_closure` gives the optimum to some 1e-9 where contacts and
-    friction are not nearly degenerate; a margin below -1e6 is reported as minus infinity."""
+    friction are not nearly degenerate; a margin below -1e6 is reported as -1e6."""
     positions: Points
     """Contact points, (k, 3) [m]."""
     normals: UnitVectors
@@ -312,6 +312,5 @@ def _lower_bound(cones: ContactCones, forces: Array, caution: float) -> Array:
 
 
 def _upper_bound(cones: ContactCones, twist: Array, caution: float) -> Array:
-    """Bound margins by twists; minus infinity is reported far below zero."""
-    ceilings = margin_ceiling(cones, twist, caution)
-    return np.where(ceilings <= FAR_BELOW, -math.inf, ceilings)
+    """Bound margins by twists, from `FAR_BELOW` on."""
+    return np.maximum(margin_ceiling(cones, twist, caution), FAR_BELOW)

@@ -124,7 +124,7 @@ def closure(c):
     if c.margin == 0.0:  # nothing but the lack of closure
         bounded = not full or optimum <= slack
     else:
-        bounded = optimum <= c.margin + slack or (c.margin == -math.inf and optimum <= -0.9e6)
+        bounded = optimum <= c.margin + slack or (c.margin == -1e6 and optimum <= -0.9e6)
     return bool(
         c.forces is None and c.torques is None and c.margin <= 0.0 and bounded
         and separates(c.separating_wrench, x, n, mu, mu_t)

@@ -1,9 +1,12 @@
+import json
 import math
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.files.json_text import text_of
+from grasp_core.files.records import from_record, record_of
 from tests.judges import (
     TETRA_CENTERS,
     TETRA_NORMALS,
@@ -116,6 +119,17 @@ def test_contacts_on_one_line_are_never_closed():
     assert not certificate.closed
     assert certificate.verify()
     assert gc.critical_friction(positions, normals) == math.inf
+
+
+def test_contacts_from_one_side_have_a_margin_that_a_file_can_hold():
+    normals = np.tile([0.0, 0.0, -1.0], (3, 1))
+    found = gc.force_closure(np.eye(3), normals, 0.3)
+    assert not found.closed
+    assert found.verify()
+    assert found.margin == -1e6
+    kept = from_record(gc.ClosureCertificate, json.loads(text_of(record_of(found))))
+    assert kept.verify()
+    assert kept.margin == found.margin
 
 
 def test_friction_may_differ_between_contacts():
