@@ -1,13 +1,15 @@
-"""Predicted against simulated, with teeth: `python -m tests.benchmarks.fidelity [--quick]`.
+"""Predicted against simulated, with teeth: `python -m tests.benchmarks.fidelity [OBJECT ..]`.
 
-`--torsion SHARE` tries some hundred grasps with soft fingertips instead, whose torsional
-coefficient is that share of the object's radius, and finds limits by repeated holds: soft contacts
-yield a little before they turn, which a ramp may read as the limit.
+`--quick` tries few grasps. `--torsion SHARE` tries some hundred grasps with soft fingertips
+instead, whose torsional coefficient is that share of the object's radius, and finds limits by
+repeated holds: soft contacts yield a little before they turn, which a ramp may read as the limit.
+Objects are built-in ones, or shapes of `tests.grasp_core.long_shapes` such as "bar with holes".
 
 Grasps of all families on several objects, friction 0.2 to 0.8: critical friction, largest wrench in
 random directions, holds inside and outside the predicted limit, and negative controls.
 """
 
+import argparse
 import sys
 import time
 from collections import Counter
@@ -34,6 +36,7 @@ from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.kit.processes import available_cores, each
 from tests.benchmarks.objects import FAMILIES
+from tests.grasp_core.long_shapes import SHAPES, shape
 
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "box", "prism",
@@ -77,10 +80,16 @@ class Found:
     controls: list
 
 
+def body_of(name):
+    if name in SHAPES:
+        return gc.Polyhedron.from_mesh(*shape(name), name=name)
+    return scenes.example_object(name)
+
+
 def cases(objects, frictions, each_family, torsion=0.0):
     found = []
     for name, friction, family in product(objects, frictions, FAMILIES):
-        body = scenes.example_object(name)
+        body = body_of(name)
         for grasp in gc.plan(body, friction, families=(family,), limit=each_family).grasps:
             found.append(Case(body, grasp, friction, len(found), torsion))
     return found
@@ -168,6 +177,7 @@ def report(found):
         "false_stable": outside[Outcome.HELD],
         "outside_outcomes": {end.value: count for end, count in outside.items()},
         "controls": len(controls),
+        "grasps_with_two_kinds": sum(len({kind for kind, _, _ in f.controls}) > 1 for f in found),
         "control_kinds": dict(kinds),
         "controls_held": sum(held for _, held, _ in controls),
         "controls_not_let_go": sum(not failed for _, _, failed in controls),
@@ -178,12 +188,17 @@ def report(found):
 
 
 def main():
-    quick = "--quick" in sys.argv[1:]
-    torsion = float(sys.argv[sys.argv.index("--torsion") + 1]) if "--torsion" in sys.argv else 0.0
-    if torsion:
-        chosen = cases(*SOFT, EACH, torsion)
-    else:
-        chosen = cases(*QUICK, 2) if quick else cases(OBJECTS, FRICTIONS, EACH)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("objects", nargs="*", metavar="OBJECT")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--torsion", type=float, default=0.0, metavar="SHARE")
+    options = parser.parse_args()
+    usual, each_family = (OBJECTS, FRICTIONS), EACH
+    if options.torsion:
+        usual = SOFT
+    elif options.quick:
+        usual, each_family = QUICK, 2
+    chosen = cases(options.objects or usual[0], usual[1], each_family, options.torsion)
     begun = time.perf_counter()
     found = list(each(examine, chosen, jobs=available_cores()))
     print(f"examined in {time.perf_counter() - begun:.0f} s")
