@@ -3,7 +3,7 @@
 `--quick` tries few grasps. `--torsion SHARE` tries some hundred grasps with soft fingertips
 instead, whose torsional coefficient is that share of the object's radius, and finds limits by
 repeated holds: soft contacts yield a little before they turn, which a ramp may read as the limit.
-Objects are built-in ones, or shapes of `tests.grasp_core.long_shapes` such as "bar with holes".
+Objects are built-in ones, or "bar with holes".
 
 Grasps of all families on several objects, friction 0.2 to 0.8: critical friction, largest wrench in
 random directions, holds inside and outside the predicted limit, and negative controls.
@@ -36,7 +36,7 @@ from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.kit.processes import available_cores, each
 from tests.benchmarks.objects import FAMILIES
-from tests.grasp_core.long_shapes import SHAPES, shape
+from tests.grasp_core.long_shapes import MM, with_holes
 
 OBJECTS = (
     "tetrahedron", "octahedron", "wedge", "chamfered-box", "double-wedge-bar", "box", "prism",
@@ -81,8 +81,9 @@ class Found:
 
 
 def body_of(name):
-    if name in SHAPES:
-        return gc.Polyhedron.from_mesh(*shape(name), name=name)
+    if name == "bar with holes":
+        made = with_holes((120.0, 40.0, 20.0), 16.0, 3, 8)
+        return gc.Polyhedron.from_mesh(MM * made.vertices, made.faces, name=name)
     return scenes.example_object(name)
 
 
