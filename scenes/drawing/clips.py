@@ -23,7 +23,7 @@ from grasp_core.errors import GraspError, InputError
 from grasp_core.files.text_files import write_parts
 from scenes.drawing.sheets import FINGERS, rgb
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.held_mjcf import HeldScene
+from scenes.mujoco.held_scene import HeldScene
 
 FORMATS = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)

@@ -21,6 +21,15 @@ QUOTE = {'"': "&quot;"}
 """What stands for the sign that ends an attribute."""
 MANY = 50
 """Size of an array above which its text is kept for the next scene."""
+FINGERTIPS, TABLE, SHAPES = 1, 2, 1 << 20
+"""Bits of what fingertips touch, of what a table does, and of what the shapes of links may touch
+besides."""
+ORIGIN = (0.0, 0.0, 0.0)
+FREE = {"pos": ORIGIN, "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
+        "frictionloss": 0.0}  # fmt: skip
+"""Attributes of a joint that moves freely."""
+TIP = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}
+"""Attributes of a fingertip that touches nothing."""
 
 
 def quaternion(rotation: Array) -> Array:
@@ -40,6 +49,24 @@ def quaternion(rotation: Array) -> Array:
     )
     row = rows[first_best(np.diag(rows))]
     return row / math.sqrt(sum(part * part for part in row.tolist()))
+
+
+def rotations(quaternions: Array) -> Array:
+    """Return the rotation matrices of unit quaternions (w, x, y, z), (n, 4), as (n, 3, 3)."""
+    w, x, y, z = quaternions.T
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1),
+        ],
+        axis=1,
+    )
+
+
+def six_of(inertia: Array) -> Array:
+    """Return the numbers of MJCF's `fullinertia`, (6,), of a matrix (3, 3)."""
+    return inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -75,6 +102,27 @@ def add_element(parent: Element, tag: str, attributes: Mapping[str, object]) -> 
 def add_comment(parent: Element, text: str) -> None:
     """Add a comment for people who read the file; MuJoCo does not read it."""
     parent.inside.append(Element("", text.replace("--", "- -")))  # XML ends comments with `--`
+
+
+def placed(position: Array, rotation: Array) -> dict[str, object]:
+    """Return the attributes of a body or shape at a position (3,) [m] with axes (3, 3)."""
+    return {"pos": position, "quat": quaternion(rotation)}
+
+
+def add_servo(
+    actuators: Element, joint: str, stiffness: float, damping: float,
+    limits: tuple[float, float] | None = None, span: tuple[float, float] | None = None,
+) -> None:  # fmt: skip
+    """Add a servo with kp and kv [N/m and N s/m, or N m/rad and N m s/rad].
+
+    Its force [N or N m] and its command [m or rad] may have limits.
+    """
+    servo: dict[str, object] = {"name": joint, "joint": joint, "kp": stiffness, "kv": damping}
+    servo["ctrllimited"] = "false" if span is None else "true"
+    servo["forcelimited"] = "false" if limits is None else "true"
+    servo |= {} if span is None else {"ctrlrange": span}
+    servo |= {} if limits is None else {"forcerange": limits}
+    add_element(actuators, "position", servo)
 
 
 def document(root: Element) -> str:

@@ -46,8 +46,7 @@ from grasp_core.kinds import Friction, Many, Quantity, instance, number, path_of
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
-from scenes.mujoco.held import rotations
-from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.mjcf_text import quaternion, rotations
 from scenes.mujoco.tested import Postures
 
 FREE = 7

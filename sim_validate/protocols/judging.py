@@ -22,7 +22,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.hand_scene import build_hand_scene
+from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.tested import (
     HandServos,
     TestedScene,
@@ -160,7 +160,7 @@ def _ours(
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
     return our_verdict(
         body, stance_of(hand, reach).contacts, friction, forces, setup, lambda: held,
-        held.layout.motors,
+        held.hand.motors,
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from grasp_core.arrays import Array
 from grasp_core.declared import Declared, summary
 from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.tested import Weld
+from scenes.mujoco.chains import Weld
 from scenes.settings import PhysicsSettings
 
 Triple: TypeAlias = tuple[float, float, float]

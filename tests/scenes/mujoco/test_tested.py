@@ -7,14 +7,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.mujoco.tested import (
-    HandServos,
-    Postures,
-    Weld,
-    fingertip_scene,
-    hand_scene,
-    planned_postures,
-)
+from scenes.mujoco.chains import Weld
+from scenes.mujoco.tested import HandServos, Postures, fingertip_scene, hand_scene, planned_postures
 from scenes.settings import FingerSettings, PhysicsSettings
 from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
