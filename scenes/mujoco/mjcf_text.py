@@ -88,7 +88,7 @@ class Element:
 
 def element(tag: str, attributes: Mapping[str, object]) -> Element:
     """Make an element with attributes of any plain kind."""
-    parts = [f' {name}="{text}"' for name, text in as_texts(attributes).items()]
+    parts = [f' {name}="{as_text(value)}"' for name, value in attributes.items()]
     return Element(tag, "".join(parts))
 
 
@@ -140,11 +140,6 @@ def _lines(own: Element, margin: str) -> Iterator[str]:
         for each in own.inside:
             yield from _lines(each, margin + "  ")
         yield f"{margin}</{own.tag}>"
-
-
-def as_texts(attributes: Mapping[str, object]) -> dict[str, str]:
-    """Write the values of attributes, which may be those of several elements."""
-    return {name: as_text(value) for name, value in attributes.items()}
 
 
 def as_text(value: object) -> str:

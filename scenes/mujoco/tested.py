@@ -70,59 +70,6 @@ class TestedScene(SceneText):
     """Columns are the axes of the test's world, along which it pulls, in the scene's, (3, 3)."""
 
 
-def fingertip_scene(
-    body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float, mass_kg: float,
-    physics: PhysicsSettings, fingers: FingerSettings,
-) -> TestedScene:  # fmt: skip
-    """Make the scene of a grasp, or of contacts of any origin."""
-    layout = arrange(body, grasp, friction, replace(fingers, drive="servo"), physics)
-    count, stiffness = len(layout.contacts), layout.drive.stiffness_n_per_m
-    damping = 2.0 * math.sqrt(stiffness * (TIP_MASS_KG + mass_kg / count))
-    holder = replace(
-        layout.holder, tip_mass_kg=TIP_MASS_KG, damping=np.full((count, 3), damping),
-        most_push_n=None,
-    )  # fmt: skip
-    away = min(OPEN_M, OPEN_SIZES * layout.grasp_size_m)
-    opened, squeeze = np.tile([-away, 0.0, 0.0], count), layout.squeeze / SQUEEZE
-    return _held(
-        body, (friction, mass_kg, physics), holder, [FINGERTIPS] * count,
-        pushes_n=squeeze[:, 0], opened=opened, shut=np.zeros_like(opened),
-        squeezing=to_digits(squeeze / stiffness).ravel(),
-        fingers=tuple((name,) for name in holder.tip_names),
-    )  # fmt: skip
-
-
-def _held(
-    body: Polyhedron, test: tuple[float, float, PhysicsSettings], holder: Slides | Chains,
-    bits: Sequence[int], **told: Any,
-) -> TestedScene:  # fmt: skip
-    """Write the scene of a holder whose fingertips touch by bits, and what it is told by name.
-
-    Takes the test's friction, the object's mass [kg], and the simulation's settings.
-    """
-    friction, mass_kg, physics = test
-    found = touched_solids(body, ORIGIN, 2.0 * body.radius)
-    thing = SceneObject(
-        name=body.name,
-        vertices=to_digits(body.vertices - body.center_of_mass),
-        triangles=body.triangles,
-        solids=None if found is None else tuple(to_digits(each) for each in found),
-        radius_m=body.radius,
-        object_kg=mass_kg,
-        inertia_kg_m2=to_digits(mass_kg / body.volume * body.inertia),
-    )
-    rubbing, opened = physics.rubbing(friction), told["opened"]
-    pose = 7 if isinstance(holder, Chains) and holder.weld is not None else 0
-    key = {"qpos": np.concatenate([HOME, opened]), "ctrl": opened[pose:]}
-    moved = {"mpos": opened[:3], "mquat": opened[3:7]} if pose else {}
-    content = SceneContent(
-        comment=COMMENT, held=thing, physics=physics, rubbing=rubbing, holder=holder,
-        tips=[(each, rubbing) for each in bits], bits=FINGERTIPS | SHAPES,
-        keys={"open": key | moved},
-    )  # fmt: skip
-    return TestedScene(scene_text(content), physics, friction, mass_kg, thing.inertia_kg_m2, **told)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class HandServos:
     """What drives a hand in a test, and what it hangs on."""
@@ -164,47 +111,95 @@ class Postures:
     """Columns are the axes along which the test pulls, in the object's frame, (3, 3)."""
 
 
-def planned_postures(
-    hand: Hand, body: Polyhedron, reach: HandReach, friction: float, stiffness_n_m_per_rad: float
-) -> Postures:
-    """Return the postures of a hand that stands in a grasp."""
-    scene = build_hand_scene(hand, body, reach, friction)
-    shut, palm = scene.hand.angles, scene.hand.palm_pose.copy()
-    torques = to_digits(scene.hand.efforts(scene.layout.squeeze_forces[None]))[0]
-    opened = shut if reach.pregrasp is None else reach.pregrasp
-    palm[:3, 3] += body.center_of_mass
-    return Postures(
-        np.tile(palm, (3, 1, 1)), np.array([opened, shut, shut + torques / stiffness_n_m_per_rad]),
-        scene.layout.squeeze[:, 0], scene.hand.limits,
-    )  # fmt: skip
+@dataclass(frozen=True, slots=True, eq=False)
+class TestedObject:
+    """An object as a test has it, whatever holds it."""
 
+    __test__ = False
 
-def hand_scene(
-    hand: Hand, body: Polyhedron, postures: Postures, friction: float, mass_kg: float,
-    physics: PhysicsSettings, servos: HandServos,
-) -> TestedScene:  # fmt: skip
-    """Make the scene of a hand that closes on an object."""
-    palms, free = postures.palms.copy(), servos.weld is not None
-    palms[:, :3, 3] -= body.center_of_mass
-    used = [place for place, finger in enumerate(hand.fingers) if not _covered(finger)]
-    chains = Chains(
-        hand=hand, angles=np.zeros(len(hand.joints)),
-        palm_pose=servos.root if free else palms[1],
-        used_fingers=tuple(used), limits=postures.limits_n_m,
-        servo=servos.stiffness_n_m_per_rad, armature_kg_m2=servos.armature(physics.timestep),
-        damping_n_m_s_per_rad=servos.damping(physics.timestep),
-        rubbing=physics.rubbing(friction), weld=servos.weld,
-        inertials={**hand_inertials(hand), **servos.inertials} if free else {},
-    )  # fmt: skip
-    opened, shut, squeezing = np.hstack([_roots(palms, servos), to_digits(postures.joints)])
-    tips = [hand.fingers[place].tip for place in used]
-    return _held(
-        body, (friction, mass_kg, physics), chains,
-        [FINGERTIPS if tip.corners is None else SHAPES for tip in tips],
-        pushes_n=postures.pushes_n, opened=opened, shut=shut, squeezing=squeezing,
-        fingers=tuple(tuple(link.name for link in finger.links) for finger in hand.fingers),
-        axes=postures.axes,
-    )  # fmt: skip
+    body: Polyhedron
+    friction: float
+    mass_kg: float
+    physics: PhysicsSettings
+
+    def by_fingertips(
+        self, grasp: Grasp | Sequence[Contact], fingers: FingerSettings
+    ) -> TestedScene:
+        """Make the scene of a grasp, or of contacts of any origin."""
+        on_slides = replace(fingers, drive="servo")
+        layout = arrange(self.body, grasp, self.friction, on_slides, self.physics)
+        count, stiffness = len(layout.contacts), layout.drive.stiffness_n_per_m
+        damping = 2.0 * math.sqrt(stiffness * (TIP_MASS_KG + self.mass_kg / count))
+        holder = replace(
+            layout.holder, tip_mass_kg=TIP_MASS_KG, damping=np.full((count, 3), damping),
+            most_push_n=None,
+        )  # fmt: skip
+        away = min(OPEN_M, OPEN_SIZES * layout.grasp_size_m)
+        opened, squeeze = np.tile([-away, 0.0, 0.0], count), layout.squeeze / SQUEEZE
+        return self._held(
+            holder, [FINGERTIPS] * count, pushes_n=squeeze[:, 0], opened=opened,
+            shut=np.zeros_like(opened), squeezing=to_digits(squeeze / stiffness).ravel(),
+            fingers=tuple((name,) for name in holder.tip_names),
+        )  # fmt: skip
+
+    def by_hand(self, hand: Hand, postures: Postures, servos: HandServos) -> TestedScene:
+        """Make the scene of a hand that closes on the object."""
+        palms, free = postures.palms.copy(), servos.weld is not None
+        palms[:, :3, 3] -= self.body.center_of_mass
+        used = [place for place, finger in enumerate(hand.fingers) if not _covered(finger)]
+        step_s, tips = self.physics.timestep, [hand.fingers[place].tip for place in used]
+        chains = Chains(
+            hand=hand, angles=np.zeros(len(hand.joints)),
+            palm_pose=servos.root if free else palms[1], used_fingers=tuple(used),
+            limits=postures.limits_n_m, servo=servos.stiffness_n_m_per_rad,
+            armature_kg_m2=servos.armature(step_s), damping_n_m_s_per_rad=servos.damping(step_s),
+            rubbing=self.physics.rubbing(self.friction), weld=servos.weld,
+            inertials={**hand_inertials(hand), **servos.inertials} if free else {},
+        )  # fmt: skip
+        opened, shut, squeezing = np.hstack([_roots(palms, servos), to_digits(postures.joints)])
+        return self._held(
+            chains, [FINGERTIPS if tip.corners is None else SHAPES for tip in tips],
+            pushes_n=postures.pushes_n, opened=opened, shut=shut, squeezing=squeezing,
+            fingers=tuple(tuple(link.name for link in finger.links) for finger in hand.fingers),
+            axes=postures.axes,
+        )  # fmt: skip
+
+    def postures(self, hand: Hand, reach: HandReach, stiffness_n_m_per_rad: float) -> Postures:
+        """Return the postures of a hand that stands in a grasp."""
+        scene = build_hand_scene(hand, self.body, reach, self.friction)
+        shut, palm = scene.hand.angles, scene.hand.palm_pose.copy()
+        torques = to_digits(scene.hand.efforts(scene.layout.squeeze_forces[None]))[0]
+        opened = shut if reach.pregrasp is None else reach.pregrasp
+        palm[:3, 3] += self.body.center_of_mass
+        joints = np.array([opened, shut, shut + torques / stiffness_n_m_per_rad])
+        pushes = scene.layout.squeeze[:, 0]
+        return Postures(np.tile(palm, (3, 1, 1)), joints, pushes, scene.hand.limits)
+
+    def _held(self, holder: Slides | Chains, bits: Sequence[int], **told: Any) -> TestedScene:
+        """Write the scene of a holder whose fingertips touch by bits, and what it is told."""
+        body, physics = self.body, self.physics
+        found = touched_solids(body, ORIGIN, 2.0 * body.radius)
+        held = SceneObject(
+            name=body.name,
+            vertices=to_digits(body.vertices - body.center_of_mass),
+            triangles=body.triangles,
+            solids=None if found is None else tuple(to_digits(each) for each in found),
+            radius_m=body.radius,
+            object_kg=self.mass_kg,
+            inertia_kg_m2=to_digits(self.mass_kg / body.volume * body.inertia),
+        )
+        rubbing, opened = physics.rubbing(self.friction), told["opened"]
+        pose = 7 if isinstance(holder, Chains) and holder.weld is not None else 0
+        key = {"qpos": np.concatenate([HOME, opened]), "ctrl": opened[pose:]}
+        moved = {"mpos": opened[:3], "mquat": opened[3:7]} if pose else {}
+        content = SceneContent(
+            comment=COMMENT, held=held, physics=physics, rubbing=rubbing, holder=holder,
+            tips=[(each, rubbing) for each in bits], bits=FINGERTIPS | SHAPES,
+            keys={"open": key | moved},
+        )  # fmt: skip
+        return TestedScene(
+            scene_text(content), physics, self.friction, self.mass_kg, held.inertia_kg_m2, **told
+        )
 
 
 def _roots(palms: Array, servos: HandServos) -> Array:
