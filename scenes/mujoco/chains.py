@@ -30,7 +30,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any, Self, TypeAlias
+from typing import Any, Self
 
 import numpy as np
 
@@ -52,6 +52,7 @@ from scenes.mujoco.mjcf_text import (
     SHAPES,
     TIP,
     Element,
+    Parts,
     add_element,
     add_servo,
     placed,
@@ -74,8 +75,6 @@ ROOT, TOLD = "root", "told"
 """Names of the body that a weld holds, and of the one that moves as told."""
 REFINED = 3
 """Newton steps that put fingertips on their faces: from 10 micrometres to rounding."""
-Parts: TypeAlias = Mapping[str, Element]
-"""The sections of a scene, by tag."""
 
 
 def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:

@@ -19,7 +19,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self, get_args
+from typing import TYPE_CHECKING, Any, Self, get_args
 
 import numpy as np
 
@@ -34,12 +34,14 @@ from grasp_core.kinds import Friction, instance, number, one_of, path_of, value_
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.chains import StandingHand
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText, placed
 from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import HARD, FingerSettings, PhysicsSettings, Softness, Surface
+
+if TYPE_CHECKING:
+    from scenes.mujoco.chains import StandingHand
 
 SCALED = (
     "Masses and servos are scaled to suit the grasp: this scene is for tests of force closure. "
@@ -114,7 +116,7 @@ class Layout(SceneObject):
     face."""
     friction: float
     drive: FingerDrive
-    holder: Slides | StandingHand
+    holder: "Slides | StandingHand"
     """Fingertips on slides along the contact frames, or a hand."""
     squeeze: Array
     """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
@@ -228,7 +230,7 @@ def to_text(layout: Layout, physics: PhysicsSettings) -> str:
             rubbing=rubbing,
             holder=holder,
             tips=[(each, rubbing) for each in bits],
-            weightless=isinstance(holder, StandingHand) and holder.weighs,
+            weightless=not isinstance(holder, Slides) and holder.weighs,
             pads=_pads(layout, bits) if layout.on_pads else (),
             keys=_keys(layout) if layout.has_springs else {},
         )

@@ -18,6 +18,7 @@ the larger.
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,11 +30,13 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.chains import StandingHand
 from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText, rotations
 from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import HeldSettings, PhysicsSettings
+
+if TYPE_CHECKING:
+    from scenes.mujoco.chains import StandingHand
 
 PALM_ARMATURE = 1e7
 """Armature of the palm's joints, relative to what the palm carries."""
@@ -118,7 +121,7 @@ class HeldLayout(SceneObject):
     fastest_tip: float
     """Largest rate at which a loose fingertip swings or comes to rest [1/s]."""
     gravity: Array
-    holder: Slides | StandingHand
+    holder: "Slides | StandingHand"
 
     @property
     def tip_names(self) -> tuple[str, ...]:

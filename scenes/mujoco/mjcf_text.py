@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from xml.sax.saxutils import escape
+from typing import TypeAlias
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from grasp_core.declared import ByValue
 from grasp_core.solvers.ties import first_best
 
 COMPILER = {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"}
-QUOTE = {'"': "&quot;"}
-"""What stands for the sign that ends an attribute."""
+ESCAPED = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
+"""What stands in attributes for signs that have a meaning in XML."""
 MANY = 50
 """Size of an array above which its text is kept for the next scene."""
 FINGERTIPS, TABLE, SHAPES = 1, 2, 1 << 20
@@ -86,6 +86,10 @@ class Element:
     inside: "list[Element]" = field(default_factory=list["Element"])
 
 
+Parts: TypeAlias = Mapping[str, Element]
+"""The sections of a scene, by tag."""
+
+
 def element(tag: str, attributes: Mapping[str, object]) -> Element:
     """Make an element with attributes of any plain kind."""
     parts = [f' {name}="{as_text(value)}"' for name, value in attributes.items()]
@@ -145,7 +149,7 @@ def _lines(own: Element, margin: str) -> Iterator[str]:
 def as_text(value: object) -> str:
     """Write a number in full precision, a sequence of them separated by blanks, or words."""
     if isinstance(value, str):
-        return value if value.isalnum() else escape(value, QUOTE)
+        return value.translate(ESCAPED)
     if type(value) in (float, int):  # the most frequent ones, and an array would take longer
         return repr(value)
     numbers: Array | Indices = np.asarray(value)

@@ -20,13 +20,12 @@ until a trial puts it under the object.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.declared import ByValue
-from scenes.mujoco.chains import Chains, Parts
 from scenes.mujoco.mjcf_text import (
     COMPILER,
     FINGERTIPS,
@@ -35,6 +34,7 @@ from scenes.mujoco.mjcf_text import (
     TABLE,
     TIP,
     Element,
+    Parts,
     add_comment,
     add_element,
     add_servo,
@@ -45,6 +45,9 @@ from scenes.mujoco.mjcf_text import (
     six_of,
 )
 from scenes.settings import PhysicsSettings
+
+if TYPE_CHECKING:
+    from scenes.mujoco.chains import Chains
 
 SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator", "keyframe")
 EXACT = {"midphase": "disable", "island": "disable"}
@@ -188,7 +191,7 @@ class SceneContent:
     physics: PhysicsSettings
     rubbing: tuple[float, float, float]
     """Coefficients of the object's surface as in MJCF; of two that touch, the larger counts."""
-    holder: Slides | Chains
+    holder: "Slides | Chains"
     tips: Sequence[tuple[int, tuple[float, float, float]]]
     """Bits of what the holder's fingertips touch, and their coefficients."""
     bits: int = FINGERTIPS
