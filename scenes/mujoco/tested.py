@@ -72,18 +72,18 @@ class TestedScene(SceneText):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandServos:
-    """What drives a hand in a test, and what it hangs on."""
+    """What drives a hand in a test, as its file has it, and what it hangs on."""
 
-    stiffness_n_m_per_rad: float
+    stiffness_n_m_per_rad: float = 5.0
     least_damping_n_m_s_per_rad: float = 0.1
     """Damping of each joint; on a fixed palm that of no overshoot, if it is larger."""
-    weld: Weld | None = None
-    """What holds the hand's root; None for a palm that is fixed."""
     root: Array = field(default_factory=lambda: np.eye(4))
     """Pose of the palm in its root, (4, 4)."""
     inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
     """MJCF's inertials of palm and links by name, where they are known; on a weld others have those
     of their shapes."""
+    weld: Weld | None = None
+    """What holds the hand's root; None for a palm that is fixed."""
 
     def armature(self, step_s: float) -> float:
         """Return the inertia of each joint's motor [kg m^2]; links on a weld have their own."""

@@ -9,6 +9,7 @@ that they let go of some load.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -23,7 +24,7 @@ from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scenes import build_hand_scene
-from scenes.mujoco.tested import HandServos, TestedObject, TestedScene
+from scenes.mujoco.tested import TestedObject, TestedScene
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.rig import Analysis, closed_on
 from sim_validate.engine.setup import Setup
@@ -113,12 +114,9 @@ def judge_hand_by(
     check_body(body)
     value_of(Friction, friction, "friction")
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
-    file = hand_file(hand)
-    stiffness = file.servo_n_m_per_rad if found.own_servos else None
-    servos = HandServos(
-        found.servo_n_m_per_rad if stiffness is None else stiffness,
-        file.damping_n_m_s_per_rad, found.weld, file.root, file.inertials,
-    )  # fmt: skip
+    servos = replace(hand_file(hand), weld=found.weld)
+    if not found.own_servos:
+        servos = replace(servos, stiffness_n_m_per_rad=found.servo_n_m_per_rad)
     tested = _tested(found, body)
     if isinstance(reach, RecordedReach):
         postures = recorded_postures(reach, hand, servos.stiffness_n_m_per_rad)

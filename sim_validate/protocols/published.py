@@ -93,7 +93,7 @@ class PublishedProtocol(Declared):
     servo_n_m_per_rad: float = 5.0
     """Stiffness of the servos of a hand's joints."""
     own_servos: bool = False
-    """Whether the hands that are known as `HandFile` have the stiffness of their files instead."""
+    """Whether hands whose files are known have the stiffness of these instead."""
     weld: Weld | None = None
     """What holds the root of a hand; None where its palm is fixed."""
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)

@@ -100,9 +100,8 @@ def welded(weld):
     """The Allegro hand on a weld at a dodecahedron, as its file has it."""
     body, hand = scaled("dodecahedron", 0.035), gc.load_hand("allegro")
     reach = next(each for each in reaches("allegro", "dodecahedron", 0.035) if each.reached)
-    file = hand_file(hand)
     strong = hand.with_torque_limits(0.7, "a test")
-    servos = HandServos(5.0, 0.1, weld, file.root, file.inertials)
+    servos = replace(hand_file(hand), weld=weld)
     physics = replace(protocol("dexgraspbench").physics, timestep=5e-4)
     tested = TestedObject(body, 0.6, 0.1, physics)
     return tested.by_hand(strong, tested.postures(strong, reach, 5.0), servos)
