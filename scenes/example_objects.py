@@ -98,19 +98,11 @@ def _icosahedron() -> Solid:
 
 def _wedge() -> Solid:
     """Make a rough wedge of six irregular vertices: eight triangular faces, no symmetry."""
-    return hull(
-        0.01
-        * np.array(
-            [
-                [-5.0, -3.5, -2.5],
-                [5.5, -2.5, -3.0],
-                [4.5, 3.0, -2.0],
-                [-4.5, 4.0, -3.0],
-                [-3.5, -0.5, 4.0],
-                [3.0, 0.8, 3.5],
-            ]
-        )
-    )
+    corners = [
+        [-5.0, -3.5, -2.5], [5.5, -2.5, -3.0], [4.5, 3.0, -2.0],
+        [-4.5, 4.0, -3.0], [-3.5, -0.5, 4.0], [3.0, 0.8, 3.5],
+    ]  # fmt: skip
+    return hull(0.01 * np.array(corners))
 
 
 def _chamfered_box() -> Solid:

@@ -23,7 +23,7 @@ from grasp_core.errors import GraspError, InputError
 from grasp_core.files.text_files import write_parts
 from scenes.drawing.sheets import FINGERS, rgb
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.held_mjcf import HeldScene
+from scenes.mujoco.held_scene import HeldScene
 
 FORMATS = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)
@@ -56,10 +56,7 @@ def write_clip(
 ) -> Path:
     """Draw the motion of a scene, joints (n, 7 + 3k), one frame for each sample."""
     layout = scene.layout
-    slides = np.zeros((1, len(layout.contacts), 3))
-    if joints.shape[1] > RIGID:
-        slides = joints[:, RIGID:].reshape(len(joints), len(layout.contacts), 3)
-    tips = layout.tip_centers + np.einsum("kij,nkj->nki", layout.frames, slides)
+    tips = layout.tips(joints[:, RIGID:])
     farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
     shown = max(layout.radius_m, NEARER * farthest)
     return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,

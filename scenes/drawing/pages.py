@@ -37,8 +37,7 @@ from scenes.drawing.painting import Shape, look_of
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, held_by, sheet_of
 from scenes.drawing.sheets import svg_of
 from scenes.drawing.views import Alone, Extent, View
-from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.layout import Layout
+from scenes.mujoco.closure_scene import Layout, Scene
 
 ASSETS = Path(__file__).parent / "assets"
 """Folder of the templates, styles and scripts of single drawings."""

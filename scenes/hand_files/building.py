@@ -19,7 +19,7 @@ from grasp_core.hands.hand import PALM, Hand, HandFinger, Joint, Link, LinkShape
 from grasp_core.hands.kinematics import rotation_about
 from scenes.hand_files.fingers import Chains, chains, followers, joint_name, tip_of
 from scenes.hand_files.model import HandModel, compiled_hand
-from scenes.hand_files.model_text import model_text
+from scenes.hand_files.model_text import model_text, note
 
 AS_BOXES = "shapes other than boxes, capsules and spheres are taken as their boxes"
 CLOSE_BY = 2
@@ -30,43 +30,38 @@ FULL_TURN = np.pi
 
 def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
     """Make the hand that a file describes."""
-    read, name = model_text(path), str(path)
-    model = compiled_hand(read, name)
-    found = chains(model, fingertips, name)
+    read = model_text(path)
+    model = compiled_hand(read)
+    found = chains(model, fingertips)
     tips = [
-        tip_of(model, tip, found.frames[chain[-1]], name)
+        tip_of(model, tip, found.frames[chain[-1]])
         for tip, chain in zip(found.tips, found.joints, strict=True)
     ]
     covers = {tip.geom: cover for tip, (_, cover) in zip(found.tips, tips, strict=True)}
     shapes = _shapes(model, found, covers)
-    rules, ranges, coupled = followers(model, found, name)
+    rules, ranges, coupled = followers(model, found)
     fingers = [
         HandFinger(tip.name, _links(model, found, shapes, chain, ranges), made)
         for tip, chain, (made, _) in zip(found.tips, found.joints, tips, strict=True)
     ]
     own_fingers, couplings, originals = own_chains(fingers, rules)
-    common = sorted(set(originals.values()))
-    shared = [f"links that fingers have in common: {', '.join(common)}"] if common else []
     palm = tuple(shapes.get(-1, ()))
     hand = Hand(
         path.stem, palm, own_fingers, (f"{path.name}; {AS_BOXES}",),
         f"{path.name}; None where it states none",
         couplings=couplings,
-        notes=(*read.notes, *model.notes, *coupled, *shared, *_tips_elsewhere(model, found)),
+        notes=(
+            *read.notes, *model.notes, *coupled,
+            *note("links that fingers have in common", sorted(set(originals.values()))),
+            *note("fingertips without shapes are the nearest shape of their link", [
+                tip.name for tip in found.tips if tip.name not in
+                (model.body_names[tip.body], *model.geom_names, *model.site_names)
+            ]),
+        ),
     )  # fmt: skip
     middle = overlapping_pairs(hand, 0.5 * hand.ranges.sum(axis=1))
     pairs = _excluded(model, found) | (middle & _close_by(hand, originals))
     return replace(hand, ignored_pairs=tuple(sorted(pairs)))
-
-
-def _tips_elsewhere(model: HandModel, found: Chains) -> tuple[str, ...]:
-    names = [
-        tip.name for tip in found.tips
-        if tip.name not in (model.body_names[tip.body], *model.geom_names, *model.site_names)
-    ]  # fmt: skip
-    if not names:
-        return ()
-    return (f"fingertips without shapes are the nearest shape of their link: {', '.join(names)}",)
 
 
 def _named_pair(one: str, other: str) -> tuple[str, str]:

@@ -31,7 +31,7 @@ from grasp_core.hands.couplings import Coupling
 from grasp_core.hands.hand import SAME, Fingertip, LinkShape
 from grasp_core.kinds import shown
 from scenes.hand_files.model import HandModel, JointRule, mesh_points
-from scenes.hand_files.model_text import listed
+from scenes.hand_files.model_text import listed, note
 
 WORLD = 0
 ACROSS = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
@@ -70,9 +70,9 @@ class Chains:
     """Frame of each joint's link, with the axes of its body; -1 is the palm's."""
 
 
-def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
+def chains(model: HandModel, fingertips: tuple[str, ...]) -> Chains:
     """Find the palm and the fingers."""
-    tips = tuple(_tip(model, each, name) for each in fingertips)
+    tips = tuple(_tip(model, each) for each in fingertips)
     paths = [path_of_body(model, tip.body) for tip in tips]
     shared = 0
     while all(len(p) > shared for p in paths) and len({p[shared] for p in paths}) == 1:
@@ -83,19 +83,18 @@ def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
     for tip, chain in zip(tips, joints, strict=True):
         if not chain:
             raise InputError(
-                f"{name}: no joint moves {tip.name} against the others; name one fingertip for "
-                "each finger"
+                f"no joint moves {tip.name} against the others; name one fingertip for each finger"
             )
         for joint in chain:
             if model.joint_kinds[joint] != "hinge":
                 raise InputError(
-                    f"{name}: joint {model.joint_names[joint]} of the finger to {tip.name} must be "
-                    f"a hinge, got {model.joint_kinds[joint]}"
+                    f"joint {model.joint_names[joint]} of the finger to {tip.name} "
+                    f"must be a hinge, got {model.joint_kinds[joint]}"
                 )
     for tip, chain in zip(tips, joints, strict=True):
         if sum(chain[-1] in other for other in joints) > 1:
             raise InputError(
-                f"{name}: fingers may share some joints, but must end with one of their own; "
+                f"fingers may share some joints, but must end with one of their own; "
                 f"{model.joint_names[chain[-1]]} moves {tip.name} and another fingertip"
             )
     frames = {-1: (model.rotations[palm], model.positions[palm])}
@@ -106,7 +105,7 @@ def chains(model: HandModel, fingertips: tuple[str, ...], name: str) -> Chains:
     return Chains(palm, tips, joints, _owners(model, palm, set(frames)), frames)
 
 
-def _tip(model: HandModel, name: str, file: str) -> Tip:
+def _tip(model: HandModel, name: str) -> Tip:
     """Find what a name stands for: a site, else a geom, else a body."""
     if name and name in model.site_names:
         site = model.site_names.index(name)
@@ -118,23 +117,23 @@ def _tip(model: HandModel, name: str, file: str) -> Tip:
         body = model.body_names.index(name)
         own = [g for g in _solid(model) if model.raw.geom_bodyid[g] == body]
         balls = [g for g in own if model.geom_kinds[g] in {"sphere", "capsule"}]
-        geom = (balls or own)[-1] if own else _nearest(model, body, name, file)
+        geom = (balls or own)[-1] if own else _nearest(model, body, name)
         return Tip(name, int(model.raw.geom_bodyid[geom]), geom, None)
     known = [each for each in (*model.site_names, *model.geom_names, *model.body_names) if each]
     raise InputError(
-        f"{file}: there is no site, geom or body {shown(name)}; fingertips are named by these, "
+        f"there is no site, geom or body {shown(name)}; fingertips are named by these, "
         f"such as {', '.join(known[-12:])}"
     )
 
 
-def _nearest(model: HandModel, body: int, name: str, file: str) -> int:
+def _nearest(model: HandModel, body: int, name: str) -> int:
     """Return the geom of a link whose box is nearest to a body of the link that has no geom."""
     links = _owners(model, WORLD, set(range(len(model.raw.jnt_bodyid))))
     own = [g for g in _solid(model) if links[int(model.raw.geom_bodyid[g])] == links[body]]
     if not own:
         raise InputError(
-            f"{file}: fingertip {shown(name)} and the link that it is on have no shape; give it "
-            "one, such as a sphere of the fingertip's radius"
+            f"fingertip {shown(name)} and the link that it is on have no shape; give "
+            "it one, such as a sphere of the fingertip's radius"
         )
 
     def away(g: int) -> float:
@@ -174,9 +173,7 @@ def _owners(model: HandModel, palm: int, used: set[int]) -> tuple[int, ...]:
     return tuple(found)
 
 
-def tip_of(
-    model: HandModel, tip: Tip, frame: Frame, name: str
-) -> tuple[Fingertip, LinkShape | None]:
+def tip_of(model: HandModel, tip: Tip, frame: Frame) -> tuple[Fingertip, LinkShape | None]:
     """Make a fingertip in the frame of its link.
 
     Gives also the box that covers a block, in place of its geom and in the frame of its body.
@@ -193,14 +190,11 @@ def tip_of(
     if tip.site is not None:
         radius = float(model.raw.site_size[tip.site, 0])
         if radius <= 0.0:
-            raise InputError(f"{name}: site {tip.name} must have a size, the ball's radius")
+            raise InputError(f"site {tip.name} must have a size, the ball's radius")
         return ball(model.raw.site_pos[tip.site], radius), None
     geom, joint = int(tip.geom or 0), R.T @ (origin - p)
-    place, turned, kind = (
-        model.raw.geom_pos[geom],
-        model.geom_rotations[geom],
-        model.geom_kinds[geom],
-    )
+    place, turned = model.raw.geom_pos[geom], model.geom_rotations[geom]
+    kind = model.geom_kinds[geom]
     if kind == "sphere":
         return ball(place, float(model.raw.geom_size[geom, 0])), None
     middle = place + turned @ model.raw.geom_aabb[geom, :3]
@@ -236,15 +230,15 @@ def _corners(model: HandModel, geom: int) -> tuple[Array, float]:
 
 
 def followers(
-    model: HandModel, found: Chains, name: str
+    model: HandModel, found: Chains
 ) -> tuple[tuple[Coupling, ...], Array, tuple[str, ...]]:
     """Find which joints follow others: couplings on the way to fingertips, ranges, and notes.
 
     Ranges are those of all joints, (j, 2) [rad], narrowed by what follows them; NaN for none.
     """
     used = {joint for chain in found.joints for joint in chain}
-    _refuse_loops(model, used, name)
-    lines = _lines(model, used, name)
+    _refuse_loops(model, used)
+    lines = _lines(model, used)
     roots = {rule.leader for joint, rule in lines.items() if joint in used and rule.leader >= 0}
     kept = list[JointRule]()
     ranges = model.joint_ranges.copy()
@@ -275,28 +269,34 @@ def followers(
                  rule.offset)
         for rule in sorted(kept)
     )  # fmt: skip
-    return couplings, ranges, _notes(model, used, aside)
+    drawn = "joints that move no fingertip are drawn as the file starts, though they are coupled"
+    tendons = [t.name for t in model.tendons if used & set(t.joints) or not t.joints]
+    notes = (
+        *note(f"{drawn} with joints that do", aside),
+        *note("tendons are left out, as if joints had motors of their own", tendons),
+    )
+    return couplings, ranges, notes
 
 
-def _lines(model: HandModel, used: set[int], name: str) -> dict[int, JointRule]:
+def _lines(model: HandModel, used: set[int]) -> dict[int, JointRule]:
     """Follow each rule to a joint that follows none, or to a constant."""
     rules = {rule.joint: rule for rule in model.joint_rules}
     if len(rules) < len(model.joint_rules):
         listed_twice = [rule.joint for rule in model.joint_rules]
-        _refuse(model, {j for j in rules if listed_twice.count(j) > 1}, name, "follow two others")
+        _refuse(model, {j for j in rules if listed_twice.count(j) > 1}, "follow two others")
     lines = dict[int, JointRule]()
     for joint in rules:
         line, passed = JointRule(joint, joint, 0.0, 1.0), [joint]
         while line.leader in rules:
             rule = rules[line.leader]
             if not rule.is_linear:
-                _refuse(model, {joint} & used and {joint, rule.leader}, name, "are on a curve")
+                _refuse(model, {joint} & used and {joint, rule.leader}, "are on a curve")
                 break
             offset = line.offset + line.ratio * rule.offset
             leader = rule.leader if rule.ratio else -1
             line = JointRule(joint, leader, offset, line.ratio * rule.ratio)
             if leader in passed:
-                _refuse(model, set(passed), name, "follow each other in a circle")
+                _refuse(model, set(passed), "follow each other in a circle")
             passed.append(leader)
         else:
             lines[joint] = line
@@ -308,39 +308,24 @@ def joint_name(model: HandModel, joint: int) -> str:
     return model.joint_names[joint] or f"joint{joint}"
 
 
-def _refuse_loops(model: HandModel, used: set[int], name: str) -> None:
+def _refuse_loops(model: HandModel, used: set[int]) -> None:
     """Refuse what holds bodies or tendons together, where joints of the hand move them."""
     for kind, *bodies in model.loops:
         one, other = (
             {j for j, own in enumerate(model.raw.jnt_bodyid.tolist()) if own in path}
             for path in (path_of_body(model, body) for body in bodies)
         )
-        _refuse(model, (one ^ other) & used, name, f"are in a loop that a {kind} closes")
+        _refuse(model, (one ^ other) & used, f"are in a loop that a {kind} closes")
     for tendon in model.tendons:
         if tendon.is_held and (used & set(tendon.joints) or not tendon.joints):
             joints = set(tendon.joints) or used
-            _refuse(model, joints, name, f"are coupled by the length of tendon {tendon.name}")
+            _refuse(model, joints, f"are coupled by the length of tendon {tendon.name}")
 
 
-def _refuse(model: HandModel, joints: set[int], name: str, why: str) -> None:
+def _refuse(model: HandModel, joints: set[int], why: str) -> None:
     if joints:
         named = [joint_name(model, joint) for joint in sorted(joints - {-1})]
         raise InputError(
-            f"{name}: joints {listed(named)} {why}; a hand's joints must be free or follow one "
+            f"joints {listed(named)} {why}; a hand's joints must be free or follow one "
             "other by offset + ratio * angle: write such a rule in its place, or remove it"
         )
-
-
-def _notes(model: HandModel, used: set[int], aside: list[str]) -> tuple[str, ...]:
-    notes = list[str]()
-    if aside:
-        notes.append(
-            "joints that move no fingertip are drawn as the file starts, though they are coupled "
-            f"with joints that do: {listed(aside)}"
-        )
-    tendons = [t.name for t in model.tendons if used & set(t.joints) or not t.joints]
-    if tendons:
-        notes.append(
-            f"tendons are left out, as if joints had motors of their own: {listed(tendons)}"
-        )
-    return tuple(notes)

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
 from grasp_core.hands.hand import FEWEST_FINGERS, MOST_FINGERS, Hand
 from grasp_core.hands.named_hands import HANDS
 from grasp_core.hands.named_hands import load_hand as built_in_hand
@@ -44,4 +44,5 @@ def load_hand(hand: str | Path, fingertips: Iterable[str] = ()) -> Hand:
             f"of the file), got {len(names)}"
         )
     building: Any = importlib.import_module("scenes.hand_files.building")  # loads MuJoCo
-    return building.hand_from_file(path, names)
+    with about(path):
+        return building.hand_from_file(path, names)

@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
-from scenes.hand_files.model_text import ModelText, listed
+from scenes.hand_files.model_text import ModelText, note
 from scenes.mujoco.silent_mujoco import mujoco, unlogged
 
 EVERY_BIT = 2**31 - 1
@@ -65,7 +65,7 @@ class HandModel(NamedTuple):
     notes: tuple[str, ...]  # sentences about what was compiled otherwise
 
 
-def compiled_hand(text: ModelText, name: str) -> HandModel:
+def compiled_hand(text: ModelText) -> HandModel:
     """Compile a hand's text."""
     try:
         with unlogged(), warnings.catch_warnings():
@@ -76,7 +76,7 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
             model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())[:300]
-        raise InputError(f"{name}: MuJoCo cannot compile the file: {said}") from error
+        raise InputError(f"MuJoCo cannot compile the file: {said}") from error
     data = mujoco.MjData(model)
     data.qpos[:] = model.qpos0
     mujoco.mj_kinematics(model, data)
@@ -86,12 +86,6 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
     bits = np.column_stack([model.geom_contype, model.geom_conaffinity]).astype(np.int64)
     lent = _lent(model, bits)
     bits[np.isin(model.geom_bodyid, lent)] = EVERY_BIT
-    notes = list[str]()
-    if odd:
-        notes.append(f"inertias that no body can have count by their masses alone: {listed(odd)}")
-    if lent:
-        names = listed([model.body(body).name for body in lent])
-        notes.append(f"bodies without shapes that collide do so with all they have: {names}")
     kinds = tuple(mujoco.mjtJoint(int(kind)).name[6:].lower() for kind in model.jnt_type)
     hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
     moving = hinges | (model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE)
@@ -114,7 +108,13 @@ def compiled_hand(text: ModelText, name: str) -> HandModel:
         joint_rules=_joint_rules(model),
         loops=_loops(model),
         tendons=_tendons(model),
-        notes=tuple(notes),
+        notes=(
+            *note("inertias that no body can have count by their masses alone", odd),
+            *note(
+                "bodies without shapes that collide do so with all they have",
+                [model.body(body).name for body in lent],
+            ),
+        ),
     )
 
 

@@ -56,16 +56,14 @@ class ModelText:
 
 def model_text(path: Path) -> ModelText:
     """Read a model's text and the files that it names."""
-    raw = _bytes(path, LARGEST_TEXT, path)
+    raw = _bytes(path, LARGEST_TEXT)
     if b"<!DOCTYPE" in raw or b"<!ENTITY" in raw:
-        raise InputError(f"{path}: a hand's file must not declare entities; remove <!DOCTYPE ...>")
+        raise InputError("a hand's file must not declare entities; remove <!DOCTYPE ...>")
     etree: Any = importlib.import_module("xml.etree.ElementTree")
     try:
         root = etree.fromstring(raw)
     except etree.ParseError as error:
-        raise InputError(
-            f"{path}: expected an MJCF or URDF file, but it is no XML: {error}"
-        ) from error
+        raise InputError(f"expected an MJCF or URDF file, but it is no XML: {error}") from error
     for other in [each for each in root if each.tag in OTHERS and root.tag == "robot"]:
         root.remove(other)
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
@@ -73,19 +71,19 @@ def model_text(path: Path) -> ModelText:
         mimic = joint.find("mimic")
         if mimic is not None and not {kinds.get(mimic.get("joint")), joint.get("type")} <= TURNING:
             raise InputError(
-                f"{path}: joint {joint.get('name')} must follow a joint that moves, got <mimic> "
+                f"joint {joint.get('name')} must follow a joint that moves, got <mimic> "
                 f"of {mimic.get('joint')}; name another joint there, or remove it"
             )
     notes = _with_shapes(root)
     elements = list(root.iter())
     if root.tag not in {"mujoco", "robot"} or len(elements) > MOST_ELEMENTS:
         raise InputError(
-            f"{path}: expected <mujoco> or <robot> with at most {MOST_ELEMENTS} elements, got "
+            f"expected <mujoco> or <robot> with at most {MOST_ELEMENTS} elements, got "
             f"<{str(root.tag)[:40]}> with {len(elements)}"
         )
     for element in elements:
-        _check_element(path, element)
-    return ModelText(*_with_files(path, root, elements, etree), notes)
+        _check_element(element)
+    return ModelText(*_with_files(path.parent, root, elements, etree), notes)
 
 
 def _with_shapes(root: Any) -> tuple[str, ...]:
@@ -101,12 +99,16 @@ def _with_shapes(root: Any) -> tuple[str, ...]:
                 visual.tag = "collision"
         if visuals and not known:
             (bare if link.find("collision") is None else lent).append(link.get("name", "?"))
+    unread = f"whose visual ones are in files other than {', '.join(MESHES)}, touch nothing"
     return (
-        *([f"links without collision shapes collide with their visual ones: {listed(lent)}"]
-          if lent else []),
-        *([f"links without collision shapes, whose visual ones are in files other than "
-           f"{', '.join(MESHES)}, touch nothing: {listed(bare)}"] if bare else []),
-    )  # fmt: skip
+        *note("links without collision shapes collide with their visual ones", lent),
+        *note(f"links without collision shapes, {unread}", bare),
+    )
+
+
+def note(text: str, names: list[str]) -> tuple[str, ...]:
+    """Return a sentence about what has these names; nothing where nothing has."""
+    return (f"{text}: {listed(names)}",) if names else ()
 
 
 def listed(names: list[str]) -> str:
@@ -115,34 +117,34 @@ def listed(names: list[str]) -> str:
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _check_element(path: Path, element: Any) -> None:
+def _check_element(element: Any) -> None:
     """Refuse an element that reads, runs or makes what the file does not hold."""
     if element.tag in REFUSED:
         raise InputError(
-            f"{path}: <{element.tag}> is not read in a hand's file; write out what it stands for"
+            f"<{element.tag}> is not read in a hand's file; write out what it stands for"
         )
     if element.tag == "size":  # how much memory MuJoCo takes
         element.attrib.clear()
     for key in COUNTS if element.tag in COUNTED else ():
         if len(element.get(key, "0")) > len(str(MOST_PIXELS)):
             raise InputError(
-                f"{path}: {key} of <{element.tag}> must be at most {MOST_PIXELS}, got "
+                f"{key} of <{element.tag}> must be at most {MOST_PIXELS}, got "
                 f"{element.get(key)[:40]}"
             )
 
 
 def _with_files(
-    path: Path, root: Any, elements: list[Any], etree: Any
+    folder: Path, root: Any, elements: list[Any], etree: Any
 ) -> tuple[str, dict[str, bytes]]:
     """Read the files that elements name, and give them names of their own."""
-    places = [path.parent, *_places(path, elements)]
+    places = [folder, *_places(folder, elements)]
     files, names, left = dict[str, bytes](), dict[str, str](), LARGEST_FILES
     for element in elements:
         for key in [key for key in element.attrib if key.startswith("file")]:
             given = element.attrib[key]
             if given not in names:
-                found = _found(path, given, places)
-                content = _bytes(found, left, path)
+                found = _found(given, places)
+                content = _bytes(found, left)
                 left -= len(content)
                 # in the compiler's messages it is called as it is, if that name is plain and free
                 free = found.stem.lower() not in {Path(name).stem.lower() for name in files}
@@ -151,14 +153,14 @@ def _with_files(
                 names[given] = found.name if free and plain else own
                 files[names[given]] = content
             if len(names) > MOST_FILES:
-                raise InputError(f"{path}: names more than {MOST_FILES} files")
+                raise InputError(f"names more than {MOST_FILES} files")
             if element.tag in NAMED and root.tag == "mujoco":  # unnamed ones are called so
                 element.attrib.setdefault("name", Path(given).stem)
             element.attrib[key] = names[given]
     return etree.tostring(root, encoding="unicode"), files
 
 
-def _places(path: Path, elements: list[Any]) -> list[Path]:
+def _places(folder: Path, elements: list[Any]) -> list[Path]:
     """Return the folders in which the model says that its files are, and forget them there."""
     found = list[Path]()
     for element in elements:
@@ -166,13 +168,16 @@ def _places(path: Path, elements: list[Any]) -> list[Path]:
             for key in FOLDERS & set(element.attrib):
                 value = element.attrib.pop(key)
                 if key != "strippath":
-                    found.append(path.parent / value)
+                    found.append(folder / value)
     return found
 
 
-def _found(path: Path, given: str, places: list[Path]) -> Path:
-    """Find a named file in the folder of the model, or in the package that the name begins with."""
-    home, package = path.parent.resolve(), PACKAGE.match(given)
+def _found(given: str, places: list[Path]) -> Path:
+    """Find a named file in the folder of the model, or in the package that the name begins with.
+
+    The model's folder is the first of the places.
+    """
+    home, package = places[0].resolve(), PACKAGE.match(given)
     name = given[package.end() :] if package else given
     tried = [(home, place / name) for place in places]
     if package:
@@ -185,10 +190,10 @@ def _found(path: Path, given: str, places: list[Path]) -> Path:
                 return whole
         except (OSError, ValueError, RuntimeError):
             continue
+    around = f", and not in a package {package[1]} around it" if package else ""
     raise InputError(
-        f"{path}: names the file {given[:80]!r}, which is not in the folder of the model"
-        + (f", and not in a package {package[1]} around it" if package else "")
-        + "; put it there"
+        f"names the file {given[:80]!r}, which is not in the folder of the model{around}; put it "
+        "there"
     )
 
 
@@ -218,15 +223,15 @@ def _is_called(folder: Path, package: str) -> bool:
     return said is not None and said[1].decode() == package
 
 
-def _bytes(path: Path, most: int, model: Path) -> bytes:
+def _bytes(path: Path, most: int) -> bytes:
     try:
         with path.open("rb") as file:
             content = file.read(most + 1)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise InputError(f"{path.name} cannot be read: {error.strerror or error}") from error
     if len(content) > most:
         raise InputError(
-            f"{path}: a hand's text may have {LARGEST_TEXT >> 20} MiB and its files "
-            f"{LARGEST_FILES >> 20} MiB together; {model.name} exceeds that"
+            f"a hand's text may have {LARGEST_TEXT >> 20} MiB and its files "
+            f"{LARGEST_FILES >> 20} MiB together; {path.name} exceeds that"
         )
     return content

@@ -21,6 +21,7 @@ from grasp_core.objects.on_faces import (
     nearest_on_triangles,
 )
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.triangles import areas_and_normals
 from grasp_core.values import Contact
 
 TIP_RADIUS = 0.1
@@ -70,8 +71,8 @@ def _met(body: Polyhedron, position: Array, normal: Array, radius: float) -> str
     corners = body.vertices[body.triangles]
     nearest = nearest_on_triangles(corners, center)
     at = int(np.linalg.norm(nearest - center, axis=1).argmin())
-    inward = np.cross(corners[at, 2] - corners[at, 0], corners[at, 1] - corners[at, 0])
-    face = face_under(body, Contact(nearest[at], inward / np.linalg.norm(inward)))
+    _, outward = areas_and_normals(corners[at : at + 1])
+    face = face_under(body, Contact(nearest[at], -outward[0]))
     places = [place for place, each in enumerate(body.faces) if each is face]
     return f"face {places[0]}" if places else "the object"
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from xml.sax.saxutils import escape
+from typing import TypeAlias
 
 import numpy as np
 
@@ -17,10 +17,19 @@ from grasp_core.declared import ByValue
 from grasp_core.solvers.ties import first_best
 
 COMPILER = {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"}
-QUOTE = {'"': "&quot;"}
-"""What stands for the sign that ends an attribute."""
+ESCAPED = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
+"""What stands in attributes for signs that have a meaning in XML."""
 MANY = 50
 """Size of an array above which its text is kept for the next scene."""
+FINGERTIPS, TABLE, SHAPES = 1, 2, 1 << 20
+"""Bits of what fingertips touch, of what a table does, and of what the shapes of links may touch
+besides."""
+ORIGIN = (0.0, 0.0, 0.0)
+FREE = {"pos": ORIGIN, "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
+        "frictionloss": 0.0}  # fmt: skip
+"""Attributes of a joint that moves freely."""
+TIP = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": 0, "rgba": (0.8, 0.25, 0.2, 1.0)}
+"""Attributes of a fingertip that touches nothing."""
 
 
 def quaternion(rotation: Array) -> Array:
@@ -42,6 +51,24 @@ def quaternion(rotation: Array) -> Array:
     return row / math.sqrt(sum(part * part for part in row.tolist()))
 
 
+def rotations(quaternions: Array) -> Array:
+    """Return the rotation matrices of unit quaternions (w, x, y, z), (n, 4), as (n, 3, 3)."""
+    w, x, y, z = quaternions.T
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1),
+        ],
+        axis=1,
+    )
+
+
+def six_of(inertia: Array) -> Array:
+    """Return the numbers of MJCF's `fullinertia`, (6,), of a matrix (3, 3)."""
+    return inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SceneText(ByValue):
     """The text of a MuJoCo model: what scenes of every kind are."""
@@ -59,9 +86,13 @@ class Element:
     inside: "list[Element]" = field(default_factory=list["Element"])
 
 
+Parts: TypeAlias = Mapping[str, Element]
+"""The sections of a scene, by tag."""
+
+
 def element(tag: str, attributes: Mapping[str, object]) -> Element:
     """Make an element with attributes of any plain kind."""
-    parts = [f' {name}="{text}"' for name, text in as_texts(attributes).items()]
+    parts = [f' {name}="{as_text(value)}"' for name, value in attributes.items()]
     return Element(tag, "".join(parts))
 
 
@@ -75,6 +106,27 @@ def add_element(parent: Element, tag: str, attributes: Mapping[str, object]) -> 
 def add_comment(parent: Element, text: str) -> None:
     """Add a comment for people who read the file; MuJoCo does not read it."""
     parent.inside.append(Element("", text.replace("--", "- -")))  # XML ends comments with `--`
+
+
+def placed(position: Array, rotation: Array) -> dict[str, object]:
+    """Return the attributes of a body or shape at a position (3,) [m] with axes (3, 3)."""
+    return {"pos": position, "quat": quaternion(rotation)}
+
+
+def add_servo(
+    actuators: Element, joint: str, stiffness: float, damping: float,
+    limits: tuple[float, float] | None = None, span: tuple[float, float] | None = None,
+) -> None:  # fmt: skip
+    """Add a servo with kp and kv [N/m and N s/m, or N m/rad and N m s/rad].
+
+    Its force [N or N m] and its command [m or rad] may have limits.
+    """
+    servo: dict[str, object] = {"name": joint, "joint": joint, "kp": stiffness, "kv": damping}
+    servo["ctrllimited"] = "false" if span is None else "true"
+    servo["forcelimited"] = "false" if limits is None else "true"
+    servo |= {} if span is None else {"ctrlrange": span}
+    servo |= {} if limits is None else {"forcerange": limits}
+    add_element(actuators, "position", servo)
 
 
 def document(root: Element) -> str:
@@ -94,15 +146,10 @@ def _lines(own: Element, margin: str) -> Iterator[str]:
         yield f"{margin}</{own.tag}>"
 
 
-def as_texts(attributes: Mapping[str, object]) -> dict[str, str]:
-    """Write the values of attributes, which may be those of several elements."""
-    return {name: as_text(value) for name, value in attributes.items()}
-
-
 def as_text(value: object) -> str:
     """Write a number in full precision, a sequence of them separated by blanks, or words."""
     if isinstance(value, str):
-        return value if value.isalnum() else escape(value, QUOTE)
+        return value.translate(ESCAPED)
     if type(value) in (float, int):  # the most frequent ones, and an array would take longer
         return repr(value)
     numbers: Array | Indices = np.asarray(value)

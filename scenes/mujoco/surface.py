@@ -21,12 +21,12 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
+from grasp_core.geometry.polygons import nearest_on_segments
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
+from grasp_core.objects.triangles import areas_and_normals
 
 TOUCHING = 1e-9
 """How far the two may overlap along an axis and count as touching, in object radii."""
-
-
 SLOPE = 0.05
 """Depth of a pyramid per distance of its base's middle from the nearest edge."""
 THIN = 1e-5
@@ -52,7 +52,8 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
         extent = float(np.linalg.norm(corners - middle, axis=1).max())
         if float(np.linalg.norm(near - middle, axis=1).min()) > reach + extent:
             continue
-        width = _least_distance(corners, middle)
+        edges = nearest_on_segments(corners, np.roll(corners, -1, axis=0), middle)
+        width = float(np.linalg.norm(edges - middle, axis=1).min())
         if width > thin:
             depth = SLOPE * width
             near_by = np.array(tree.query_ball_point(middle, extent + depth + widest), np.int64)
@@ -69,20 +70,6 @@ def _flat_pieces(body: Polyhedron) -> Iterator[tuple[Array, Array]]:
         return
     # patches are only a part of a curved surface
     triangles = body.vertices[body.triangles] - body.center_of_mass
-    first = triangles[:, 0]
-    normals = np.cross(triangles[:, 2] - first, triangles[:, 1] - first)
-    for corners, across in zip(triangles, normals, strict=True):
-        size = float(np.linalg.norm(across))
-        if size > 0.0:
-            yield corners, across / size
-
-
-def _least_distance(corners: Array, middle: Array) -> float:
-    """Return the least distance of the middle from the lines of a polygon's edges [m]."""
-    along = np.roll(corners, -1, axis=0) - corners
-    lengths = np.linalg.norm(along, axis=1)
-    real = lengths > 0.0
-    units = along[real] / lengths[real, None]
-    away = middle - corners[real]
-    away -= np.einsum("ni,ni->n", away, units)[:, None] * units
-    return float(np.linalg.norm(away, axis=1).min())
+    _, outward = areas_and_normals(triangles)
+    pairs = zip(triangles, outward, strict=True)
+    yield from ((corners, -normal) for corners, normal in pairs if normal.any())

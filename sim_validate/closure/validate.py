@@ -38,7 +38,7 @@ from grasp_core.kinds import Count, Friction, function, instance, several, value
 from grasp_core.objects.on_faces import check_body, check_on_faces, within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.closure_scene import Scene, to_text
+from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
 from sim_validate.closure.controls import Control, ControlVerdict, negative_controls, try_control
 from sim_validate.closure.verdict import (
@@ -476,13 +476,10 @@ def noisy_case(
 ) -> tuple[Rig, tuple[PlannedLoad, ...]]:
     """Close fingers on the contacts of a repeat, and plan forces for its loads."""
     planned = setup.scene(body, case.contacts, case.friction)
-    layout = replace(
-        planned.layout,
+    scene = planned.changed(
         object_kg=case.mass * planned.layout.object_kg,
         inertia_kg_m2=case.mass * planned.layout.inertia_kg_m2,
     )
-    text = to_text(layout, planned.physics)
-    scene = replace(planned, xml=text, layout=layout)
     rig = closed_on(scene, setup, case.friction)
     heavy = [(name, case.mass * wrench) for name, wrench in loads]
     analysis = Analysis(body, case.contacts, case.friction, setup, None)

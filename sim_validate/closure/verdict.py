@@ -22,8 +22,7 @@ from grasp_core.kinds import Friction, Many, Measured, OrInfinity, path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from grasp_core.values import Contact
-from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.layout import FingerDrive
+from scenes.mujoco.closure_scene import FingerDrive, Scene
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
 from sim_validate.engine.rig import CriticalFriction, SimulatedLimit

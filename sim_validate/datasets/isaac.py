@@ -24,8 +24,8 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
+from scenes.mujoco.closure_scene import arrange
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.layout import arrange
 from scenes.settings import FingerSettings
 from sim_validate.datasets.config import SHORT, Name, SplitName, quoted
 from sim_validate.datasets.open_dataset import Selection, mesh_path, select, stored_body

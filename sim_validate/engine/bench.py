@@ -419,7 +419,7 @@ class Bench:
         layout = self.scene.layout
         wrenches = np.array([schedule.wrenches for schedule in schedules])
         wrenches[..., 3:] -= cross(layout.center, wrenches[..., :3])
-        # rounded like the scene's numbers (see `layout.arrange`)
+        # rounded like the scene's numbers (see `closure_scene.arrange`)
         for trial in range(len(schedules)):
             for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:]):
                 part[...] = to_digits(part)

@@ -48,8 +48,7 @@ from grasp_core.quality.wrench_limits import (
     weakest_from,
 )
 from grasp_core.values import Contact
-from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.layout import SQUEEZE, Layout
+from scenes.mujoco.closure_scene import SQUEEZE, Layout, Scene
 from scenes.settings import HARD, Softness
 from sim_validate.engine.bench import Bench, Load, Motion, Schedule
 from sim_validate.engine.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup

@@ -30,8 +30,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.settings import CHOSEN, named
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.closure_scene import Scene, build_scene
-from scenes.mujoco.layout import surface_of
+from scenes.mujoco.closure_scene import Scene, build_scene, surface_of
 from scenes.settings import FingerSettings, PhysicsSettings, ScaledScene
 from sim_validate.kit.files import read_tables
 from sim_validate.settings import ChosenTrials, FrictionProtocol, HoldProtocol, LimitProtocol

@@ -67,7 +67,7 @@ from grasp_core.declared import Declared
 from grasp_core.figures import Shown
 from grasp_core.kinds import Measured
 from grasp_core.objects.on_faces import within
-from scenes.mujoco.layout import Layout, grasp_size
+from scenes.mujoco.closure_scene import Layout, grasp_size
 from sim_validate.engine.bench import Health, Mask, Motion, Schedule
 from sim_validate.settings import HoldProtocol
 

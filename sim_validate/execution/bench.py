@@ -41,9 +41,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.errors import InputError
 from grasp_core.execution.first_slip import slip_steps
-from scenes.mujoco.held import HeldLayout, hinged, rotations
-from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, palm_armature
-from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, hinged, palm_armature
+from scenes.mujoco.mjcf_text import quaternion, rotations
 from sim_validate.engine.bench import Health, batch, compiled, mujoco, stepped, touched
 from sim_validate.execution.paths import WHOLE, Drive, Table
 

@@ -37,9 +37,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held import hinged, rotations
-from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, build_held_scene, held_physics
-from scenes.mujoco.mjcf_text import quaternion
+from scenes.mujoco.held_scene import SAMPLE_S, HeldScene, build_held_scene, held_physics, hinged
+from scenes.mujoco.mjcf_text import quaternion, rotations
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths

@@ -50,9 +50,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held import HeldLayout
-from scenes.mujoco.held_mjcf import AWAY, SAMPLE_S, HeldScene, build_held_scene, held_physics
-from scenes.mujoco.scene_parts import TOUCH
+from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, build_held_scene, held_physics
+from scenes.mujoco.scene_text import AWAY, TOUCH
 from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
 from sim_validate.engine.gate import (
     DEPTH,

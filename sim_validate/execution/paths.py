@@ -23,7 +23,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from scenes.mujoco.held_mjcf import SAMPLE_S
+from scenes.mujoco.held_scene import SAMPLE_S
 from sim_validate.engine import bench
 from sim_validate.engine.bench import smooth
 

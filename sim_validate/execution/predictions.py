@@ -58,8 +58,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
-from scenes.mujoco.held import HeldLayout, gravity_of
-from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene
+from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, gravity_of
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive
 from sim_validate.execution.trials import Trial, trials_of

@@ -45,9 +45,9 @@ from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.sheets import solid_angles
 from grasp_core.solvers.ties import first_best, largest_first
-from scenes.mujoco.held import HeldLayout, rotations
-from scenes.mujoco.mjcf_text import quaternion
-from scenes.mujoco.scene_parts import TOUCH
+from scenes.mujoco.held_scene import HeldLayout
+from scenes.mujoco.mjcf_text import quaternion, rotations
+from scenes.mujoco.scene_text import TOUCH
 from sim_validate.execution import paths
 from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome, seen, slides
 from sim_validate.execution.paths import Drive, Pose, Table, joined
@@ -227,7 +227,7 @@ def trials_of(
 
 
 def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> Trial | Skipped:
-    rest = resting(body, *layout.above_table)
+    rest = resting(body, *layout.holder.above_table)
     if rest is None:
         return Skipped(
             "lift", "a fingertip is in the way of the table on every face that the object rests on"

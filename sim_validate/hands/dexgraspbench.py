@@ -46,9 +46,8 @@ from grasp_core.kinds import Friction, Many, Quantity, instance, number, path_of
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
-from scenes.mujoco.held import rotations
-from scenes.mujoco.mjcf_text import quaternion
-from scenes.mujoco.tested import Postures
+from scenes.mujoco.mjcf_text import quaternion, rotations
+from scenes.mujoco.tested import HandServos, Postures
 
 FREE = 7
 """Numbers of a pose: position and quaternion."""
@@ -251,18 +250,6 @@ def write_dex_record(record: DexRecord, path: str | Path) -> Path:
 Row: TypeAlias = tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HandFile:
-    """What a file of a hand says about its root, servos and masses."""
-
-    servo_n_m_per_rad: float = 5.0
-    damping_n_m_s_per_rad: float = 0.1
-    root: Array = field(default_factory=lambda: np.eye(4))
-    """Pose of the palm in the world of the file, (4, 4)."""
-    inertials: Mapping[str, Mapping[str, object]] = field(default_factory=dict[str, Any])
-    """MJCF's inertials of palm and links by name; empty where the file has none."""
-
-
 LINKS = ("base", "proximal", "medial", "distal")
 ALLEGRO: tuple[Row, ...] = (
     (351.4, -8.986, -3.957, -40.27, 447.7, 261.1, 283.1, 0.023, -1.612, -26.37),
@@ -307,12 +294,12 @@ def _inertials(
 
 
 HAND_FILES = {
-    "allegro": HandFile(
+    "allegro": HandServos(
         5.0, 0.1,
         np.array([[0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]], np.float64),
         _inertials(ALLEGRO, ("first", "middle", "ring"), LINKS),
     ),
-    "leap": HandFile(
+    "leap": HandServos(
         3.0, 0.04,
         np.array([[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0.1], [0, 0, 0, 1]], np.float64),
         _inertials(LEAP, ("index", "middle", "ring"), LEAP_THUMB),
@@ -322,9 +309,9 @@ HAND_FILES = {
 HAND_FILES["allegro-urdf"] = HAND_FILES["allegro"]
 
 
-def hand_file(hand: Hand) -> HandFile:
+def hand_file(hand: Hand) -> HandServos:
     """Return what the file of a hand says; for others than the built-in ones, the usual values."""
-    return HAND_FILES.get(hand.name, HandFile())
+    return HAND_FILES.get(hand.name, HandServos())
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -367,7 +354,8 @@ def dex_record(
     """
     stance = stance_of(uncoupled(hand, "a record of DexGraspBench"), reach)
     value_of(Quantity, push_n, "push_n")
-    servo = hand_file(hand).servo_n_m_per_rad if servo_n_m_per_rad is None else servo_n_m_per_rad
+    own = hand_file(hand).stiffness_n_m_per_rad
+    servo = own if servo_n_m_per_rad is None else servo_n_m_per_rad
     value_of(Quantity, servo, "servo_n_m_per_rad")
     value_of(str, object_path, "object_path")
     strong = hand.with_torque_limits(STRONG_N_M, "none: only levers are asked for")

@@ -27,7 +27,7 @@ the two fingers along a load oppose it, by their servos of stiffness k:
 
 Executions are the trials of `execute` on the same chains of joints with servos. The squeeze is the
 best one for fingertips on the springs that the servos amount to, within the torques of the motors
-(see `scenes.mujoco.held_hand`). Servos are told its torques once, and nothing is replanned. Palm
+(see `scenes.mujoco.hand_scenes`). Servos are told its torques once, and nothing is replanned. Palm
 and links touch the object where it comes to them.
 """
 
@@ -58,9 +58,16 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.quality.wrench_limits import WrenchLimit, limit_of
 from scenes.example_objects import example_object
-from scenes.mujoco.hand_scene import HandScene, build_hand_scene, hand_physics, limited
-from scenes.mujoco.held_hand import finger_springs, held_hand_scene, servo_stiffness, strong_motors
-from scenes.mujoco.held_mjcf import HeldScene
+from scenes.mujoco.hand_scenes import (
+    HandScene,
+    build_hand_scene,
+    finger_springs,
+    hand_physics,
+    held_hand_scene,
+    servo_stiffness,
+    strong_motors,
+)
+from scenes.mujoco.held_scene import HeldScene
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import HoldsWrenches, WrenchVerdict
@@ -242,7 +249,7 @@ def _limits(
         "against one finger": (np.eye(6)[0], (1.0 + 2.0 * friction) * press),
     }
     rig = closed_on(scene, setup, friction)
-    resisted = Analysis(body, reach.contacts or (), friction, setup, scene.layout.motors).resisted
+    resisted = Analysis(body, reach.contacts or (), friction, setup, scene.hand.motors).resisted
     loads = [
         Load(size * wrench, limit_of(resisted, wrench).forces) for wrench, size in exact.values()
     ]
@@ -255,7 +262,7 @@ def _limits(
 
 
 def _displaced(scene: HandScene, setup: Setup) -> Check:
-    smooth = limited(scene, scene.layout.motors.limits, SLIPPERY)
+    smooth = scene.limited(scene.hand.motors.limits, SLIPPERY)
     layout = smooth.layout
     # without the grasp's own friction forces, which slippery contacts do not carry
     forces = np.einsum("kij,kj->ki", layout.frames * np.array([1.0, 0.0, 0.0]), layout.squeeze)
@@ -263,7 +270,7 @@ def _displaced(scene: HandScene, setup: Setup) -> Check:
     rig = squeezed(Bench(smooth), patient, forces, SLIPPERY)
     size = GENTLE * TORQUE / HEIGHT
     (poses,) = rig.joints(rig.holds([Load(size * np.eye(6)[0], forces)]))
-    exact = size * HEIGHT**2 / (2.0 * layout.servo_n_m_per_rad)
+    exact = size * HEIGHT**2 / (2.0 * smooth.hand.servo)
     return Check(
         "displacement by the servos, over the exact one", float(poses[-1, 0]) / exact, *SOFTER
     )
@@ -385,12 +392,12 @@ def validate_hand(
     checks = (*gate.checks, *require_faithful_hands(setup, friction))
     layout, high = scene.layout, setup.hold.settling_friction * friction
     rig = closed_on(scene, setup, layout.friction, high)
-    case = HandCase(body, contacts, layout.friction, setup, layout.motors)
+    case = HandCase(body, contacts, layout.friction, setup, scene.hand.motors)
     loads = case.planned(rig.idle, agenda)
     wrenches, tried = held_wrenches(rig, loads, agenda), tuple[HandControlVerdict, ...]()
     if agenda.controls:
         weakest = next(planned for planned in loads if planned.name == WEAKEST)
-        names = tuple(joint.name for joint in layout.hand.joints)
+        names = tuple(joint.name for joint in scene.hand.hand.joints)
         tried = tuple(
             HandControlVerdict(control, _held(scene, setup, high, control, weakest.limit))
             for control in hand_controls(case, weakest, names)
@@ -405,7 +412,7 @@ def _held(
     scene: HandScene, setup: Setup, high: float, control: HandControl, limit: Load
 ) -> HoldVerdict:
     """Hold what a control must let go of, after the high friction of the grasp itself."""
-    weak = limited(scene, control.limits, control.friction)
+    weak = scene.limited(control.limits, control.friction)
     rig = closed_on(weak, setup, weak.layout.friction, high)
     (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
     return judge(trace, scene.layout, setup.hold)

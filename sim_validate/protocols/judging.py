@@ -9,6 +9,7 @@ that they let go of some load.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -22,14 +23,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.hand_scene import build_hand_scene
-from scenes.mujoco.tested import (
-    HandServos,
-    TestedScene,
-    fingertip_scene,
-    hand_scene,
-    planned_postures,
-)
+from scenes.mujoco.hand_scenes import build_hand_scene
+from scenes.mujoco.tested import TestedObject, TestedScene
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.rig import Analysis, closed_on
 from sim_validate.engine.setup import Setup
@@ -74,9 +69,7 @@ def judge_by(
     contacts = given_contacts(body, grasp)
     given = grasp if isinstance(grasp, Grasp) else contacts
     require_faithful(setup, friction, body.radius)
-    scene = fingertip_scene(
-        body, given, found.friction, found.mass_of(body), found.physics, setup.fingers
-    )
+    scene = _tested(found, body).by_fingertips(given, setup.fingers)
     ours = our_verdict(
         body, contacts, friction, found.forces(scene.mass_kg), setup,
         partial(setup.scene, body, given, friction),
@@ -121,21 +114,21 @@ def judge_hand_by(
     check_body(body)
     value_of(Friction, friction, "friction")
     setup = hand_setup() if setup is None else instance(setup, Setup, "setup")
-    file = hand_file(hand)
-    stiffness = file.servo_n_m_per_rad if found.own_servos else None
-    servos = HandServos(
-        found.servo_n_m_per_rad if stiffness is None else stiffness,
-        file.damping_n_m_s_per_rad, found.weld, file.root, file.inertials,
-    )  # fmt: skip
+    servos = replace(hand_file(hand), weld=found.weld)
+    if not found.own_servos:
+        servos = replace(servos, stiffness_n_m_per_rad=found.servo_n_m_per_rad)
+    tested = _tested(found, body)
     if isinstance(reach, RecordedReach):
         postures = recorded_postures(reach, hand, servos.stiffness_n_m_per_rad)
     else:
-        postures = planned_postures(hand, body, reach, found.friction, servos.stiffness_n_m_per_rad)
-    scene = hand_scene(
-        hand, body, postures, found.friction, found.mass_of(body), found.physics, servos
-    )
+        postures = tested.postures(hand, reach, servos.stiffness_n_m_per_rad)
+    scene = tested.by_hand(hand, postures, servos)
     ours = _ours(hand, body, reach, friction, found.forces(scene.mass_kg), setup)
     return _judged(found, scene, friction, setup, ours, reach.grasp, hand.name)
+
+
+def _tested(protocol: PublishedProtocol, body: Polyhedron) -> TestedObject:
+    return TestedObject(body, protocol.friction, protocol.mass_of(body), protocol.physics)
 
 
 def _judged(
@@ -160,7 +153,7 @@ def _ours(
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
     return our_verdict(
         body, stance_of(hand, reach).contacts, friction, forces, setup, lambda: held,
-        held.layout.motors,
+        held.hand.motors,
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from grasp_core.arrays import Array
 from grasp_core.declared import Declared, summary
 from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.tested import Weld
+from scenes.mujoco.chains import Weld
 from scenes.settings import PhysicsSettings
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -93,7 +93,7 @@ class PublishedProtocol(Declared):
     servo_n_m_per_rad: float = 5.0
     """Stiffness of the servos of a hand's joints."""
     own_servos: bool = False
-    """Whether the hands that are known as `HandFile` have the stiffness of their files instead."""
+    """Whether hands whose files are known have the stiffness of these instead."""
     weld: Weld | None = None
     """What holds the root of a hand; None where its palm is fixed."""
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)

@@ -53,7 +53,9 @@ def around(body, contacts, verdict):
     """False answers just below and above the limits, of how many, as counts."""
     setup, layout = verdict.setup, verdict.scene.layout
     rig, counted = rig_of(verdict.scene, setup), Counter()
-    planned = Analysis(body, contacts, FRICTION, setup, layout.motors).planned(rig.idle, AGENDA)
+    planned = Analysis(body, contacts, FRICTION, setup, verdict.scene.hand.motors).planned(
+        rig.idle, AGENDA
+    )
     limits = [each.limit for each in planned]
     for share, right in ((BELOW, True), (ABOVE, False)):
         traces = rig.hold([part(rig.idle, limit, share) for limit in limits])
@@ -151,7 +153,7 @@ def carried(hand, body, found, way, setup):
     scene = scenes.build_hand_scene(hand, body, found, FRICTION, down=tuple(way))
     rig = rig_of(scene, setup)
     weight = [("weight", np.append(GRAVITY_M_PER_S2 * way, np.zeros(3)))]
-    analysis = Analysis(body, found.contacts, FRICTION, setup, scene.layout.motors)
+    analysis = Analysis(body, found.contacts, FRICTION, setup, scene.hand.motors)
     (load,) = analysis.as_they_are(rig.idle, weight)
     (at,) = ramped_limits(rig, [load.limit])
     share = np.nan if at is None else at.share

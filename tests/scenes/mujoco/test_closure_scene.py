@@ -6,8 +6,8 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.mujoco.layout import PAD_TOUCH, SQUEEZE, arrange, grasp_size
-from scenes.mujoco.scene_parts import TOUCH
+from scenes.mujoco.closure_scene import PAD_TOUCH, SQUEEZE, arrange, grasp_size
+from scenes.mujoco.scene_text import TOUCH
 from scenes.settings import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 
 OBJECTS = ("wedge", "icosahedron", "screwdriver")

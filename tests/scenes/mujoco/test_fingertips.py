@@ -7,8 +7,8 @@ import pytest
 import grasp_core as gc
 import scenes
 from scenes.mujoco import fingertips
+from scenes.mujoco.closure_scene import arrange
 from scenes.mujoco.fingertips import clashes, fitting_radius
-from scenes.mujoco.layout import arrange
 
 
 def sampled_clearance(body, center, rng, count=40_000):

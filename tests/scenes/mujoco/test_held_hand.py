@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.quality.motors import Motors
-from scenes.mujoco.held_hand import finger_springs
+from scenes.mujoco.hand_scenes import finger_springs
 from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.paths import closing
 from tests.sim_validate.hands.executing import standing
@@ -30,10 +30,10 @@ def test_springs_are_those_of_the_servos_by_the_simulators_own_jacobians(hand):
         mujoco.mj_jac(model, data, J, None, layout.contacts[contact], link)
         own = J[:, 12:]  # after the object's and the palm's joints
         springs = layout.axes[contact] * layout.stiffness[contact] @ layout.axes[contact].T
-        wanted = layout.servo_n_m_per_rad * np.linalg.inv(own @ own.T)
+        wanted = layout.holder.servo * np.linalg.inv(own @ own.T)
         assert springs == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).max())
-        alike = layout.inertias[contact] / layout.stiffness[contact]
-        assert alike == pytest.approx(layout.armature_kg_m2 / layout.servo_n_m_per_rad)
+        alike = layout.tip_masses[contact] / layout.stiffness[contact]
+        assert alike == pytest.approx(layout.holder.armature_kg_m2 / layout.holder.servo)
 
 
 @pytest.mark.parametrize("hand", HANDS)
@@ -95,7 +95,7 @@ def test_balls_above_a_table_bound_the_hand(hand):
     model = mujoco.MjModel.from_xml_string(scene.xml)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    middles, radii = scene.layout.above_table
+    middles, radii = scene.layout.holder.above_table
     known = {"object", "table"}
     geoms = [g for g in range(model.ngeom) if model.geom(g).name not in known
              and not model.geom(g).name.startswith("surface")]  # fmt: skip
@@ -123,6 +123,6 @@ def _support(model, data, geom, way):
 def test_motors_of_hands_with_masses_carry_their_links_in_any_orientation():
     reach, hand, scene, _ = standing("leap")
     strong = gc.hand_motors(hand, reach)
-    assert (scene.layout.motors.limits < strong.limits).all()
+    assert (scene.layout.holder.motors.limits < strong.limits).all()
     reach, hand, scene, _ = standing("allegro")
-    assert scene.layout.motors.limits == pytest.approx(gc.hand_motors(hand, reach).limits)
+    assert scene.layout.holder.motors.limits == pytest.approx(gc.hand_motors(hand, reach).limits)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from grasp_core.hands.hand import PALM, Fingertip, Hand, HandFinger, Joint, Link, LinkShape
-from scenes.mujoco.chains_mjcf import hand_inertials
+from scenes.mujoco.chains import hand_inertials
 
 BOX = LinkShape([0.01, 0.0, 0.02], np.eye(3), [0.01, 0.02, 0.03], 0.0)
 CAPSULE = LinkShape(np.zeros(3), np.eye(3), [0.0, 0.0, 0.02], 0.005)

@@ -7,14 +7,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.mujoco.tested import (
-    HandServos,
-    Postures,
-    Weld,
-    fingertip_scene,
-    hand_scene,
-    planned_postures,
-)
+from scenes.mujoco.chains import Weld
+from scenes.mujoco.tested import HandServos, Postures, TestedObject
 from scenes.settings import FingerSettings, PhysicsSettings
 from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
@@ -33,7 +27,7 @@ def loaded(scene):
 
 
 def test_the_object_has_its_mass_and_inertia_and_the_friction_asked_for():
-    scene = fingertip_scene(BODY, GRASP, 0.7, 0.2, PHYSICS, FingerSettings())
+    scene = TestedObject(BODY, 0.7, 0.2, PHYSICS).by_fingertips(GRASP, FingerSettings())
     model, _ = loaded(scene)
     body = model.body("object")
     assert body.mass[0] == pytest.approx(0.2)
@@ -50,7 +44,8 @@ def test_open_fingertips_touch_nothing_and_closed_ones_push_as_told(name):
     """At rest the contact forces are the servos', and their normal parts add up to those told."""
     body = scaled(name, 0.05)
     grasp = gc.plan(body, FRICTION, limit=1).grasps[0]
-    scene = fingertip_scene(body, grasp, FRICTION, 0.2, PhysicsSettings(), FingerSettings())
+    tested = TestedObject(body, FRICTION, 0.2, PhysicsSettings())
+    scene = tested.by_fingertips(grasp, FingerSettings())
     model, data = loaded(scene)
     mujoco.mj_forward(model, data)
     assert data.ncon == 0
@@ -73,8 +68,8 @@ def test_a_hand_starts_open_and_all_its_links_can_touch_the_object():
         each for each in reaches("allegro", "dodecahedron", 0.035) if each.pregrasp is not None
     )
     hand = gc.load_hand("allegro").with_torque_limits(0.7, "a test")
-    postures = planned_postures(hand, body, reach, 0.6, 5.0)
-    scene = hand_scene(hand, body, postures, 0.6, 0.1, PHYSICS, HandServos(5.0))
+    tested = TestedObject(body, 0.6, 0.1, PHYSICS)
+    scene = tested.by_hand(hand, tested.postures(hand, reach, 5.0), HandServos(5.0))
     model, data = loaded(scene)
     mujoco.mj_forward(model, data)
     met = model.geom_bodyid[data.contact.geom]
@@ -105,12 +100,11 @@ def welded(weld):
     """The Allegro hand on a weld at a dodecahedron, as its file has it."""
     body, hand = scaled("dodecahedron", 0.035), gc.load_hand("allegro")
     reach = next(each for each in reaches("allegro", "dodecahedron", 0.035) if each.reached)
-    file = hand_file(hand)
     strong = hand.with_torque_limits(0.7, "a test")
-    postures = planned_postures(strong, body, reach, 0.6, 5.0)
-    servos = HandServos(5.0, 0.1, weld, file.root, file.inertials)
+    servos = replace(hand_file(hand), weld=weld)
     physics = replace(protocol("dexgraspbench").physics, timestep=5e-4)
-    return hand_scene(strong, body, postures, 0.6, 0.1, physics, servos)
+    tested = TestedObject(body, 0.6, 0.1, physics)
+    return tested.by_hand(strong, tested.postures(strong, reach, 5.0), servos)
 
 
 @pytest.mark.parametrize(("seconds", "impedance"), [(0.02, 0.95), (0.05, 0.9)])
@@ -158,7 +152,7 @@ def test_a_hand_recoils_as_its_fingers_move_by_what_its_masses_say():
 def test_shapes_touch_at_one_point_where_the_test_has_it_so():
     off = mujoco.mjtDisableBit.mjDSBL_MULTICCD.value
     assert loaded(welded(Weld()))[0].opt.disableflags & off
-    usual = fingertip_scene(BODY, GRASP, 0.7, 0.2, PHYSICS, FingerSettings())
+    usual = TestedObject(BODY, 0.7, 0.2, PHYSICS).by_fingertips(GRASP, FingerSettings())
     assert not loaded(usual)[0].opt.disableflags & off
 
 
@@ -170,7 +164,8 @@ def test_a_tip_under_a_shape_of_its_link_touches_once_and_another_by_its_ball():
     palm[:, :3, 3] = [0.2, 0.0, 0.0]
     postures = Postures(palm, joints, np.zeros(0))
     servos = HandServos(5.0, weld=Weld())
-    scene = hand_scene(hand, scaled("dodecahedron", 0.035), postures, 0.6, 0.1, PHYSICS, servos)
+    tested = TestedObject(scaled("dodecahedron", 0.035), 0.6, 0.1, PHYSICS)
+    scene = tested.by_hand(hand, postures, servos)
     model, _ = loaded(scene)
     assert model.geom_conaffinity[model.geom("tip_f0").id]
     assert model.jnt_limited[model.joint("f00").id]

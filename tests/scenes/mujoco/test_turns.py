@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from scenes.mujoco.held import hinged, rotations
+from scenes.mujoco.held_scene import hinged
+from scenes.mujoco.mjcf_text import rotations
 
 
 def turn_about(axis, angle):

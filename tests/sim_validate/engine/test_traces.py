@@ -100,7 +100,7 @@ def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):
 
 def test_rigid_fingers_have_no_slides(layout):
     """The scene has no joints for them: seven numbers a row."""
-    rigid = replace(layout, drive=replace(layout.drive, rigid=True))
+    rigid = replace(layout, holder=replace(layout.holder, stiffness=np.zeros((4, 0))))
     away = 1e-4 * layout.frames[0, :, 0]
     (found,) = traces([motion([pose()[:7], pose(away)[:7]])], rigid, [1])
     assert found.gaps_m[0, 0] == pytest.approx(1e-4 - layout.drive.indentation_m)

@@ -6,8 +6,8 @@ import trimesh
 
 from grasp_core.execution.grips import unsqueezed
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held import held_layout
-from scenes.mujoco.scene_parts import TOUCH
+from scenes.mujoco.held_scene import held_layout
+from scenes.mujoco.scene_text import TOUCH
 from scenes.settings import HeldSettings
 from sim_validate.execution import trials
 from sim_validate.execution.trials import ROOM, met, misplacements

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenes.mujoco.held import hinged, rotations
+from scenes.mujoco.held_scene import hinged
+from scenes.mujoco.mjcf_text import rotations
 from sim_validate.engine.bench import Health
 from sim_validate.execution.bench import (
     SLID,

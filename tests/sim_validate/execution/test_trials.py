@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sim_validate as sv
-from scenes.mujoco.held_mjcf import SAMPLE_S
+from scenes.mujoco.held_scene import SAMPLE_S
 from sim_validate.execution.trials import Skipped, trials_of
 from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import G, box_scene

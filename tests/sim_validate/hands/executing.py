@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import grasp_core as gc
-from scenes.mujoco.held_hand import held_hand_scene
+from scenes.mujoco.hand_scenes import held_hand_scene
 from sim_validate.hands.trials import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 

@@ -48,7 +48,7 @@ def test_controls_let_go_and_carry_their_proofs(case):
     normals = np.array([contact.normal for contact in reach.contacts])
     for each in found.controls:
         control = each.control
-        motors = replace(found.scene.layout.motors, limits=control.limits)
+        motors = replace(found.scene.hand.motors, limits=control.limits)
         assert control.proof.upper < 1.0
         assert control.proof.verify(
             positions, normals, control.friction, motors=motors,

@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from scenes.mujoco.mjcf_text import quaternion
-from scenes.mujoco.tested import HandServos, hand_scene
+from scenes.mujoco.tested import TestedObject
 from sim_validate.hands.dexgraspbench import (
     FREE,
     dex_record,
@@ -52,9 +52,10 @@ def judged(changed):
 
 
 def scene(changed, servo=5.0):
-    file, postures = hand_file(HAND), recorded_postures(found(changed), HAND, servo)
-    servos = HandServos(servo, 0.1, TEST.weld, file.root, file.inertials)
-    return hand_scene(HAND, body(), postures, TEST.friction, TEST.mass_kg, TEST.physics, servos)
+    postures = recorded_postures(found(changed), HAND, servo)
+    servos = replace(hand_file(HAND), stiffness_n_m_per_rad=servo, weld=TEST.weld)
+    tested = TestedObject(body(), TEST.friction, TEST.mass_kg, TEST.physics)
+    return tested.by_hand(HAND, postures, servos)
 
 
 def with_open_finger():

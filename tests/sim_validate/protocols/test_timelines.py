@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.mujoco.tested import fingertip_scene
+from scenes.mujoco.tested import TestedObject
 from scenes.settings import FingerSettings
 from sim_validate.protocols.published import Step, protocol
 from sim_validate.protocols.runs import CHUNK, timeline
@@ -15,7 +15,7 @@ from tests.grasp_core.hands.gripping import scaled
 BODY = scaled("dodecahedron", 0.05)
 GRASP = gc.plan(BODY, 0.5, limit=1).grasps[0]
 TEST = protocol("dexgraspbench")
-SCENE = fingertip_scene(BODY, GRASP, 0.6, 0.1, TEST.physics, FingerSettings())
+SCENE = TestedObject(BODY, 0.6, 0.1, TEST.physics).by_fingertips(GRASP, FingerSettings())
 SAMPLE = CHUNK * 0.004
 
 

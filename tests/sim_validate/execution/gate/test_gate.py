@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.mujoco.held import gravity_of
+from scenes.mujoco.held_scene import gravity_of
 from scenes.settings import HeldSettings
 from sim_validate.engine.gate import measured
 from sim_validate.execution.gate import cases_of, require_faithful_execution

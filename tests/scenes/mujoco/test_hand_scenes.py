@@ -8,7 +8,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.kinematics import places
-from scenes.mujoco.hand_scene import squeezing
+from scenes.mujoco.hand_scenes import squeezing
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 WRITTEN = 2e-8
@@ -33,7 +33,7 @@ def stood(hand, down=None):
 @pytest.mark.parametrize("hand", ["allegro", "leap"])
 def test_links_and_tips_are_where_the_hand_has_them(hand):
     held, body, reach, scene, _, data = stood(hand)
-    at = places(held, scene.layout.joints, reach.palm_pose)
+    at = places(held, scene.hand.angles, reach.palm_pose)
     for k, link in enumerate(held.links):
         body_at = data.body(link.name)
         expected = at.link_positions[0, k] - body.center_of_mass
@@ -47,7 +47,7 @@ def test_links_and_tips_are_where_the_hand_has_them(hand):
         touched = tip + held.fingers[finger].tip.radius * there.normal
         assert touched == pytest.approx(there.position - body.center_of_mass, abs=2e-5)
     # the pose is only moved as far as fingertips were off their faces
-    assert np.abs(scene.layout.joints - reach.joints).max() < 1e-3
+    assert np.abs(scene.hand.angles - reach.joints).max() < 1e-3
 
 
 @pytest.mark.parametrize("hand", ["allegro", "leap"])
@@ -70,7 +70,7 @@ def test_commands_turn_into_joint_torques_and_limits_hold(hand):
     forces = np.random.default_rng(0).normal(size=(1, 4, 3))
     data.ctrl[:] = layout.commands(forces)[0]
     mujoco.mj_forward(model, data)
-    torques = layout.motors.levers @ forces.ravel()
+    torques = scene.hand.motors.levers @ forces.ravel()
     assert torques == pytest.approx(data.qfrc_actuator[6:], abs=1e-8)
     data.ctrl[:] = layout.commands(1e3 * forces)[0]
     mujoco.mj_forward(model, data)
@@ -86,14 +86,14 @@ def test_gravity_pulls_at_links_as_the_motors_say_and_not_at_the_object():
     # what holds a body still is the bias force less what compensates gravity
     held = data.qfrc_bias - data.qfrc_gravcomp
     assert held[:6] == pytest.approx(np.zeros(6), abs=1e-12)
-    assert held[6:] == pytest.approx(scene.layout.motors.gravity, abs=HEAVY)
+    assert held[6:] == pytest.approx(scene.hand.motors.gravity, abs=HEAVY)
     assert np.abs(held[6:]).max() > 1e-3
 
 
 def test_a_squeeze_goes_as_far_as_motors_do():
-    layout = stood("leap", DOWN)[3].layout
-    most = squeezing(layout.motors, layout.squeeze_forces)
-    shares = np.abs(layout.motors.torques(most)) / layout.motors.limits
+    scene = stood("leap", DOWN)[3]
+    most = squeezing(scene.hand.motors, scene.layout.squeeze_forces)
+    shares = np.abs(scene.hand.motors.torques(most)) / scene.hand.motors.limits
     assert shares.max() == pytest.approx(1.0)
 
 

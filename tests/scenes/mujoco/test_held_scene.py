@@ -10,9 +10,8 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.forces.contact_forces import even_forces
-from scenes.mujoco.held import gravity_of
-from scenes.mujoco.held_mjcf import PALM, held_physics, palm_armature
-from scenes.mujoco.scene_parts import FINGERTIPS, TABLE
+from scenes.mujoco.held_scene import gravity_of, held_physics, palm_armature
+from scenes.mujoco.scene_text import FINGERTIPS, PALM, TABLE
 
 OBJECTS = ("dodecahedron", "l-bracket")
 MASS = 0.4
