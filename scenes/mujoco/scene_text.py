@@ -59,8 +59,8 @@ TOUCH = 1e-7
 meshes in single precision, which moves surfaces by up to 3e-8. A fingertip that does not touch yet
 would arrive with speed, and one that is much deeper is pushed out, which turns objects that two
 others hold and it hardly presses."""
-TOUCHED = {"conaffinity": 0, "mass": 0.0, "group": 3, "rgba": (0.9, 0.6, 0.2, 0.3)}
-"""Attributes of a solid that fingertips touch; viewers do not show its group unless asked to."""
+TOUCHED = {"conaffinity": 0, "mass": 0.0, "group": 2, "rgba": (0.9, 0.6, 0.2, 0.3)}
+"""Attributes of a solid that fingertips touch, shown as glass of another colour."""
 HOME = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 """Joint position of the object where the scene has put it."""
 AWAY = 100.0
