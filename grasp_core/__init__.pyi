@@ -43,11 +43,11 @@ from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
 from grasp_core.objects.surface import Face as Face
 from grasp_core.objects.surface import Surface as Surface
 from grasp_core.optimizing.best_grasp import BestGrasp as BestGrasp
+from grasp_core.optimizing.best_grasp import QualityCeiling as QualityCeiling
 from grasp_core.optimizing.best_grasp import best_grasp as best_grasp
+from grasp_core.optimizing.best_grasp import quality_ceiling as quality_ceiling
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
 from grasp_core.optimizing.better_contacts import optimize_contacts as optimize_contacts
-from grasp_core.optimizing.ceiling import QualityCeiling as QualityCeiling
-from grasp_core.optimizing.ceiling import quality_ceiling as quality_ceiling
 from grasp_core.planning.planner import iter_grasps as iter_grasps
 from grasp_core.planning.planner import plan as plan
 from grasp_core.planning.reach import Finger as Finger

@@ -13,8 +13,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.objects.face_pieces import inset_piece, unit_pieces
+from grasp_core.optimizing import best_grasp
 from grasp_core.optimizing import better_contacts as best_contacts
-from grasp_core.optimizing import ceiling as quality_ceilings
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.planning.given_contacts import seat
@@ -126,7 +126,7 @@ def test_contacts_are_moved_only_where_they_are_proved_to_be_better(monkeypatch)
 def test_a_ceiling_does_not_depend_on_last_digits(monkeypatch):
     """Corners of the faces shaken, on a cube, where many parts are alike."""
     body, grasp = planned("box", "concurrent")
-    exact, rng = quality_ceilings.grounds_on, np.random.default_rng(3)
+    exact, rng = best_grasp.grounds_on, np.random.default_rng(3)
 
     def ceiling():
         return gc.quality_ceiling(body, grasp.faces, 0.5, gap=0.3, parts=6_000)
@@ -137,7 +137,7 @@ def test_a_ceiling_does_not_depend_on_last_digits(monkeypatch):
         return replace(grounds, corners=corners), places
 
     own = ceiling()
-    monkeypatch.setattr(quality_ceilings, "grounds_on", shaken_grounds)
+    monkeypatch.setattr(best_grasp, "grounds_on", shaken_grounds)
     for _ in range(TRIALS):
         assert ceiling().upper == pytest.approx(own.upper, rel=SAME)
 
