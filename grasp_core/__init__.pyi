@@ -31,9 +31,9 @@ from grasp_core.execution.payload import payload as payload
 from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.hands.hand import Hand as Hand
+from grasp_core.hands.hand import load_hand as load_hand
 from grasp_core.hands.hand_motors import hand_motors as hand_motors
 from grasp_core.hands.hand_motors import hand_payload as hand_payload
-from grasp_core.hands.named_hands import load_hand as load_hand
 from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits

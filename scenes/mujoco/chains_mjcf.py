@@ -19,7 +19,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, to_digits
 from grasp_core.hands.hand import PALM, Hand, Link, LinkShape
-from grasp_core.hands.kinematics import rotation_about
+from grasp_core.hands.hand_arrays import rotation_about
 from scenes.mujoco.mjcf_text import Element, add_element, quaternion
 from scenes.mujoco.scene_parts import FREE, add_servo
 

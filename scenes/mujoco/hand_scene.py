@@ -33,8 +33,8 @@ import numpy as np
 from grasp_core.arrays import Array, rounded, to_digits
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import places, tip_jacobians
 from grasp_core.hands.hand_motors import hand_motors
-from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach, Stance, direction, stance_of, uncoupled
 from grasp_core.kinds import instance
 from grasp_core.objects.on_faces import check_body

@@ -32,8 +32,8 @@ from grasp_core.arrays import Array, cross, rounded, to_digits
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand_arrays import HandPlaces, places
 from grasp_core.hands.hand_motors import HandGrip, hand_motors
-from grasp_core.hands.kinematics import HandPlaces, places
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
