@@ -31,9 +31,9 @@ from grasp_core.execution.payload import payload as payload
 from grasp_core.execution.squeeze_certificate import BestSqueeze as BestSqueeze
 from grasp_core.forces.contact_forces import contact_forces as contact_forces
 from grasp_core.hands.hand import Hand as Hand
+from grasp_core.hands.hand import load_hand as load_hand
 from grasp_core.hands.hand_motors import hand_motors as hand_motors
 from grasp_core.hands.hand_motors import hand_payload as hand_payload
-from grasp_core.hands.named_hands import load_hand as load_hand
 from grasp_core.hands.reach import HandReach as HandReach
 from grasp_core.hands.reach import reach_with as reach_with
 from grasp_core.mesh_files.limits import MeshLimits as MeshLimits
@@ -43,11 +43,11 @@ from grasp_core.objects.polyhedron import load_polyhedron as load_polyhedron
 from grasp_core.objects.surface import Face as Face
 from grasp_core.objects.surface import Surface as Surface
 from grasp_core.optimizing.best_grasp import BestGrasp as BestGrasp
+from grasp_core.optimizing.best_grasp import QualityCeiling as QualityCeiling
 from grasp_core.optimizing.best_grasp import best_grasp as best_grasp
+from grasp_core.optimizing.best_grasp import quality_ceiling as quality_ceiling
 from grasp_core.optimizing.better_contacts import Improvement as Improvement
 from grasp_core.optimizing.better_contacts import optimize_contacts as optimize_contacts
-from grasp_core.optimizing.ceiling import QualityCeiling as QualityCeiling
-from grasp_core.optimizing.ceiling import quality_ceiling as quality_ceiling
 from grasp_core.planning.planner import iter_grasps as iter_grasps
 from grasp_core.planning.planner import plan as plan
 from grasp_core.planning.reach import Finger as Finger

@@ -15,15 +15,12 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import PALM, SAME, Hand
-from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays, places
 from grasp_core.objects.polyhedron import Polyhedron
 
 KERNEL = "grasp_core.hands.collisions_kernel"
-LEAF = 4
-"""Largest number of triangles of a node without children."""
-FAR = 0.02
-"""Distance up to which clearances are measured [m]."""
+LEAF = 4  # largest number of triangles of a node without children
+FAR = 0.02  # distance up to which clearances are measured [m]
 
 
 @lru_cache(maxsize=8)
@@ -95,19 +92,14 @@ def clearances(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class TipGaps:
-    """Where fingertips are nearest to an object, or deepest in it."""
-
-    gaps: Array  # distances of tips from the surface, negative in it, (k,) [m]
-    on_tips: Array  # points of tips' hulls there, middles of balls, (k, 3) [m]
-    on_object: Array  # points of the surface there, (k, 3) [m]
-
-
 def tip_gaps(
     hand: Hand, body: Polyhedron, joints: Array, palm_pose: Array, fingers: Indices
-) -> TipGaps:
-    """Measure how far fingertips are from an object."""
+) -> tuple[Array, Array, Array]:
+    """Measure how far fingertips are from an object, negative in it, (k,) [m].
+
+    Also gives where they are nearest, or deepest: points of tips' hulls, which are the middles of
+    balls, and of the surface, (k, 3) each [m].
+    """
     kernel, tree = compiled(KERNEL), surface_tree(body)
     arrays, turned, middles = _shapes(hand, joints, palm_pose)
     near, other, apart = *np.empty((2, len(fingers), 3)), np.empty(len(fingers))
@@ -117,7 +109,7 @@ def tip_gaps(
             s = arrays.tip_shapes[finger]
             corners, _ = kernel.core_in(arrays, turned[s], middles[s], s)
             apart[k] = kernel.deepest(corners, tree, near[k], other[k])
-    return TipGaps(apart - arrays.tip_roundings[fingers], near, other)
+    return apart - arrays.tip_roundings[fingers], near, other
 
 
 def tip_distances(

@@ -18,8 +18,7 @@ from grasp_core.hands.distances_kernel import (
 )
 from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree
 
-INSIDE = 0.5
-"""Windings of a surface around a point from which the point counts as inside."""
+INSIDE = 0.5  # windings of a surface around a point from which the point counts as inside
 ROUNDING = 1e-9
 """Distance beyond a limit from which a quick bound on a distance decides, and up to which hulls
 overlap [m]."""

@@ -7,25 +7,55 @@ With the angle q of a joint, the link's frame in the frame of the link before it
 
 Shapes for collisions are boxes with rounded edges: all points within `radius` of a box. A radius of
 zero makes it a box, two half-sizes of zero a capsule, three a ball.
+
+Couplings: joints whose angle follows that of another, which alone moves freely. With the number d
+of the joint that joint k follows (k itself where it moves freely), every joint is
+
+    q_k = c_k + r_k q_d,                                                                  (2)
+
+with r_k = 1 and c_k = 0 for a free joint. The angles of a free joint are those at which all joints
+that follow it are in their ranges too. By virtual work the motor of a free joint carries
+
+    tau_d = sum over its followers and itself of r_k tau_k.                               (3)
+
+*Built-in hands* are records of `Hand`: `NAME.json` beside this module holds each, and `record_of`
+writes one. Frames, joints and boxes are those of the sources that they name, to the last digit;
+sources state turns as quaternions, and boxes in millimetres.
+
+Allegro, the right hand of Wonik Robotics, version 3. Numbers of the URDF that SimLab publishes
+(BSD-2-Clause, copyright 2016 SimLab), in the frames of MuJoCo Menagerie's model `wonik_allegro`
+(BSD-2-Clause), whose capsules stand for the fingertips. The fingertip is the ball of radius 12 mm
+at the end of that capsule. Capsules end 2.3 mm (thumb: .7 mm) beyond the balls of the URDF and its
+meshes: `allegro-urdf` ends with those. The URDF states no efforts and Menagerie no torque limits.
+Menagerie states the mass of the palm and a density of links, but no masses of links.
+
+LEAP, the right hand of Carnegie Mellon University. Numbers of MuJoCo Menagerie's model `leap_hand`
+(MIT, copyright 2023 Ananye Agarwal), which comes from dexsuite's URDF. Boxes, masses and centres of
+mass are those of the model. Fingertips are rubber blocks 21 mm wide, 24 mm broad and rounded at the
+end: the hulls of the corners of the model's meshes, given to .1 mm. All points within .1 mm of such
+a hull hold the mesh, and reach at most .18 mm beyond it. A block is covered by the box around its
+corners, whose edges are rounded by 5 mm and by as much as the corners need. The ball of 10.4 mm,
+half a block's width, stands for a block where a tip has to be a ball.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, Shape, UnitVector, frozen_each
+from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen_each
 from grasp_core.declared import Declared, counted, summary
 from grasp_core.errors import InputError
-from grasp_core.files.records import Key
-from grasp_core.hands.couplings import Coupling, Drives, drives
-from grasp_core.kinds import Many, Range, TorqueLimit, value_of
+from grasp_core.files.json_text import object_of
+from grasp_core.files.records import Key, from_record
+from grasp_core.files.text_files import read_text
+from grasp_core.kinds import Many, Range, TorqueLimit, shown, value_of
 
-LARGEST_SIZE = 2.0
-"""Largest length of a hand [m]: a larger one is in other units."""
-MOST_TURN = 2.0 * np.pi
-"""Largest angle of a joint, in either direction [rad]."""
+LARGEST_SIZE = 2.0  # largest length of a hand [m]: a larger one is in other units
+MOST_TURN = 2.0 * np.pi  # largest angle of a joint, in either direction [rad]
 FEWEST_FINGERS, MOST_FINGERS = 3, 5
 MOST_LINKS, MOST_SHAPES, MOST_CORNERS = 40, 400, 200
 """Largest numbers of links and shapes of a hand, and of corners of a fingertip."""
@@ -33,11 +63,13 @@ LEAST_ROUNDING = 5e-5
 """Least rounding of a fingertip [m]: the way from its hull to a surface must be a direction when it
 touches to 10 um."""
 SAME = 1e-9
-"""Length below which two lengths count as equal [m]: the rounding of a file."""
+"""Difference below which two lengths [m], or angles [rad], count as equal: the rounding of a file.
+"""
 RIGID_SLACK = 1e-9
 """How far the rows of a rotation may be from orthonormal: the rounding of ten digits."""
-PALM = "palm"
-"""Name of the palm among the links."""
+LARGEST_RATIO, SMALLEST_RATIO, LARGEST_OFFSET = 100.0, 0.01, 100.0
+"""Sizes of ratios and offsets of couplings, which keep (2) exact to rounding."""
+PALM = "palm"  # name of the palm among the links
 
 
 class _Turn:
@@ -187,6 +219,87 @@ class HandFinger(Declared):
             )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Coupling(Declared):
+    """A joint that follows another: its angle is `offset + ratio * angle of the driver`."""
+
+    joint: str
+    """Name of the joint that follows."""
+    driver: str
+    """Name of the joint that it follows, which follows none itself."""
+    ratio: Annotated[float, Range(least=-LARGEST_RATIO, most=LARGEST_RATIO)]
+    """Change of the angle per change of the driver's angle."""
+    offset: Annotated[
+        float, Range(least=-LARGEST_OFFSET, most=LARGEST_OFFSET), Key("offset_rad")
+    ] = 0.0
+    """Angle where the driver's is zero [rad]."""
+
+    def _check_together(self) -> None:
+        if abs(self.ratio) < SMALLEST_RATIO:
+            raise InputError(
+                f"ratio must be at least {SMALLEST_RATIO:g} or at most -{SMALLEST_RATIO:g}, got "
+                f"{self.ratio:g} for {self.joint}"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drives:
+    """All joints of a hand by (2), and the angles that they can have."""
+
+    drivers: Indices  # the joint that each follows, itself where it is free, (j,)
+    ratios: Array  # (j,)
+    offsets: Array  # (j,) [rad]
+    ranges: Array  # lowest and highest angles, as followers allow, (j, 2) [rad]
+
+    @property
+    def free(self) -> Indices:
+        """Return the numbers of the joints that move freely, (m,)."""
+        return np.flatnonzero(self.drivers == np.arange(len(self.drivers)))
+
+    def obeyed(self, angles: Array) -> Array:
+        """Return angles (n, j) with those of followers put in by (2)."""
+        found = self.offsets + self.ratios * angles[:, self.drivers]
+        return np.clip(found, self.ranges[:, 0], self.ranges[:, 1])
+
+    def carried(self, torques: Array) -> Array:
+        """Return what free joints carry of the torques of all joints (j, ...) by (3), (m, ...)."""
+        found = np.zeros_like(torques)
+        np.add.at(found, self.drivers, (self.ratios * torques.T).T)
+        return found[self.free]
+
+
+def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -> Drives:
+    """Lay couplings out by the numbers of joints."""
+    j = len(names)
+    drivers, ratios, offsets = np.arange(j), np.ones(j), np.zeros(j)
+    for each in couplings:
+        for name in (each.joint, each.driver):
+            if list(names).count(name) != 1:
+                raise InputError(f"couplings must name single joints of the hand, got {name}")
+        k = names.index(each.joint)
+        if drivers[k] != k or each.driver in {other.joint for other in couplings}:
+            raise InputError(
+                f"couplings must let each joint follow one free joint, got {each.joint} after "
+                f"{each.driver}, where one of them follows another joint too"
+            )
+        drivers[k], ratios[k], offsets[k] = names.index(each.driver), each.ratio, each.offset
+    ends = np.sort((ranges - offsets[:, None]) / ratios[:, None], axis=1)
+    found = ranges.copy()
+    for k in np.unique(drivers[drivers != np.arange(j)]).tolist():
+        own = np.flatnonzero(drivers == k).tolist()
+        low, high = float(ends[own, 0].max()), float(ends[own, 1].min())
+        if low > high + SAME:
+            raise InputError(
+                f"ranges must leave an angle to joints that are coupled, got none for "
+                f"{', '.join(names[i] for i in own)}"
+            )
+        kept = np.array([low, max(low, high)])
+        for i in own:
+            moved = np.sort(offsets[i] + ratios[i] * kept)
+            found[i] = np.clip(moved, *ranges[i]) if i != k else kept
+    return Drives(drivers, ratios, offsets, found)
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Hand(Declared):
     """A palm with three to five fingers, and where its numbers come from."""
@@ -277,3 +390,25 @@ class Hand(Declared):
     def __repr__(self) -> str:
         parts = counted(len(self.fingers), "finger"), counted(len(self.joints), "joint")
         return summary("Hand", self.name, *parts)
+
+
+HANDS = ("allegro", "allegro-urdf", "leap")  # the names of the hands
+
+
+def load_hand(name: str) -> Hand:
+    """Return a hand whose numbers are built in.
+
+    Args:
+        name: "allegro", "allegro-urdf" (the same with fingertips as in the maker's URDF) or "leap";
+            `scenes.load_hand` also reads files.
+
+    Raises:
+        InputError: There is no such hand.
+    """
+    if value_of(str, name, "name") not in HANDS:
+        raise InputError(
+            f"name must be that of a built-in hand, {' or '.join(HANDS)}, got {shown(name)}; "
+            "scenes.load_hand(path, fingertips=...) reads files"
+        )
+    found = read_text(Path(__file__).with_name(f"{name}.json"))
+    return from_record(Hand, object_of(found, "hand"))

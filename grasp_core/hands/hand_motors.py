@@ -10,7 +10,7 @@ under the acceleration a of gravity: the principle of virtual work. The first fa
 of the levers L of `Motors`, the second sum its gravity.
 
 Where joints follow others, the motor of the joint that they follow carries their torques too, by
-(2) of `couplings`: `Motors` has one row for each joint that follows none, and what joints that
+(3) of `hand`: `Motors` has one row for each joint that follows none, and what joints that
 follow state as their limits does not count.
 
 Motors that are servos are springs that turn as they give. Finger i touches at x with the force f on
@@ -61,7 +61,7 @@ from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, ca
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.kinematics import HandPlaces, jacobian, places
+from grasp_core.hands.hand_arrays import HandPlaces, jacobian, places
 from grasp_core.hands.reach import HandReach, Stance, direction, stance_of
 from grasp_core.kinds import LARGEST, Quantity, value_of
 from grasp_core.objects.on_faces import check_body

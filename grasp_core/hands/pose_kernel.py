@@ -6,7 +6,7 @@ which something is wrong, and its derivative is taken along the line to the near
     dx = dp + w x (x - c) + sum over the finger's joints of w_k x (x - p_k) dq_k           (1)
 
 for a point x that a link carries, with the palm's move dp, its turn w about the pivot c, the
-contacts' middle. A joint that follows another moves with it by (1) of `couplings`, so that its
+contacts' middle. A joint that follows another moves with it by (2) of `hand`, so that its
 share is the driver's.
 
 Gauss and Newton's steps with Levenberg's damping make the sum of squares small. Unknown are the
@@ -37,29 +37,22 @@ from grasp_core.hands.hand_arrays import HandArrays, Pose, Sums, SurfaceTree, Ta
 
 SCALE_MOVE, SCALE_TURN = 1e6, 2.5e3
 """Squares of the millimetres by which one metre of a move, and one radian, moves a fingertip."""
-LARGEST_MOVE, LARGEST_TURN = 0.02, 0.35
-"""Largest step [m, rad]."""
+LARGEST_MOVE, LARGEST_TURN = 0.02, 0.35  # largest step [m, rad]
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-7, 1e4
 GROWTH, SHRINKING = 4.0, 0.3
 STALLED, PATIENCE = 0.02, 4
 """A start is given up after so many steps in a row that make the cost smaller by less than this."""
 BACK = 2.5e-4
 """How far the plane of a block is moved at once that overlaps the surface [m]."""
-FREE = 1e-9
-"""Sum of squares below which nothing overlaps [mm^2]."""
-MOVES = 6
-"""Unknowns of the palm."""
-OFF, TOUCH, OVERLAP = 0, 1, 2
-"""Places of what `Sums.parts` holds."""
+FREE = 1e-9  # sum of squares below which nothing overlaps [mm^2]
+MOVES = 6  # unknowns of the palm
+OFF, TOUCH, OVERLAP = 0, 1, 2  # places of what `Sums.parts` holds
 MM = 1e3
-EQUAL = 3.0
-"""Weight of touching."""
+EQUAL = 3.0  # weight of touching
 AT_TIP = 1e-6
 """Distance from the middle of a fingertip at which an end of a capsule is that of the tip [m]."""
-ANYWHERE = 10.0
-"""A distance that is longer than any between a hand and an object [m]."""
-ON_SURFACE = 1e-9
-"""Distance at which the way to the nearest point is no direction [m]."""
+ANYWHERE = 10.0  # a distance that is longer than any between a hand and an object [m]
+ON_SURFACE = 1e-9  # distance at which the way to the nearest point is no direction [m]
 
 
 @loop()

@@ -14,14 +14,18 @@ with where they would have to be: first by the distances between them and the an
 ways inwards, which do not depend on the palm's pose, then by the rest that is left when one set of
 points is laid over the other by the best rigid motion (Kabsch). The motion keeps handedness, so an
 order of fingers around the palm that runs the wrong way leaves a large rest.
+
+The pregrasp keeps the palm where it is and moves fingertips away from the surface, along the
+normals as far as the joints allow. The way in is a straight line of the palm with the fingers open.
+Both are checked by exact distances; the line at steps of `TICK`.
 """
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 
 import numpy as np
 
@@ -29,7 +33,7 @@ from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError, UndecidedError
-from grasp_core.frames import POSE, plane_tangents
+from grasp_core.frames import plane_tangents
 from grasp_core.hands.collisions import surface_tree
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import (
@@ -44,12 +48,12 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import largest_first
 from grasp_core.values import FINGERS, Grasp
 
+KERNEL = "grasp_core.hands.pose_kernel"
 NARROW = 1e-4
 """Least inscribed radius of a region that is aimed at; in smaller ones the contact is [m]."""
 SOFT = 2e-3
 """How far corners of a block below the farthest count while a pose is sought [m]."""
-SHORT = 1e-9
-"""Length below which an edge of a region is left out [m]."""
+SHORT = 1e-9  # length below which an edge of a region is left out [m]
 TOUCHING = 1e-5
 """Largest gap or overlap of a fingertip that counts as touching [m]: a tenth of the overlap that
 simulators and makers of hands allow."""
@@ -70,26 +74,19 @@ PULL = 0.03
 MARGIN, LEAST_MARGIN = 5e-4, 1e-4
 """Distances from the edges of regions that are sought, and kept when fingertips are laid down [m].
 """
-POSTURES = 400
-"""Number of postures to choose from."""
-TRIES = 60_000
-"""Number of random joint angles among which they are looked for."""
+POSTURES = 400  # number of postures to choose from
+TRIES = 60_000  # number of random joint angles among which they are looked for
 INNER = (0.1, 0.85)
 """Part of the joints' ranges in which they are looked for: rather open than closed."""
-APART = 0.002
-"""Least distance between links in a posture [m]."""
-WIDEST = 0.075
-"""Largest distance of a fingertip from the middle of all [m]."""
-KEPT = 300
-"""Number of postures with an order of fingers that are laid over the contacts."""
-LENGTH = 0.02
-"""Difference of two distances between fingertips that counts as one [m]."""
-TURN = 0.3
-"""Weight of the angles between ways inwards."""
-ARM = 0.03
-"""Length of the ways inwards where they are laid over each other [m]."""
+APART = 0.002  # least distance between links in a posture [m]
+WIDEST = 0.075  # largest distance of a fingertip from the middle of all [m]
+KEPT = 300  # number of postures with an order of fingers that are laid over the contacts
+LENGTH = 0.02  # difference of two distances between fingertips that counts as one [m]
+TURN = 0.3  # weight of the angles between ways inwards
+ARM = 0.03  # length of the ways inwards where they are laid over each other [m]
 ROUND = 9
-"""Digits after the point to which rests are compared: ties are decided by the order."""
+"""Digits after the point to which rests, and cosines, are compared: ties are decided by the order.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +115,12 @@ class Asked:
     def tree(self) -> SurfaceTree:
         """Return the object's surface."""
         return surface_tree(self.body)
+
+    def pose(self, contacts: int, palm: Array, origin: Array, joints: Array) -> Pose:
+        """Return a pose whose parts are still to be placed."""
+        pose: Pose = compiled(KERNEL).empty_pose(self.arrays, contacts)
+        pose.palm[:], pose.origin[:], pose.q[:] = palm, origin, joints
+        return pose
 
 
 def contact_choices(
@@ -183,16 +186,6 @@ def _edges(polygon: Array, normal: Array) -> Array:
     return np.array([starts, inward])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Start:
-    """Where a search starts."""
-
-    fingers: Indices  # the finger for each contact, (k,)
-    joints: Array  # joint angles, (j,) [rad]
-    rotation: Array  # axes of the palm's frame, (3, 3)
-    position: Array  # its origin, (3,) [m]
-
-
 @lru_cache(maxsize=16)
 def postures(hand: Hand, seed: int) -> tuple[Array, Array]:
     """Choose at most `POSTURES` at random: joint angles, (n, j), and tips' middles, (n, f, 3)."""
@@ -206,11 +199,11 @@ def postures(hand: Hand, seed: int) -> tuple[Array, Array]:
     return angles[kept[:count]], tips[:count]
 
 
-def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: int) -> list[Start]:
-    """Choose where to start from, best first."""
-    (joints, ends), arrays = postures(hand, seed), hand_arrays(hand)
+def starts(asked: Asked, positions: Array, normals: Array) -> Iterator[tuple[Indices, Pose]]:
+    """Choose where to start from, best first: the finger for each contact, (k,), and a pose."""
+    (joints, ends), arrays = postures(asked.hand, asked.seed), asked.arrays
     if not len(joints):
-        return []
+        return
     orders = np.array(list(permutations(range(len(arrays.tip_radii)), len(normals))))
     inward = ends.mean(axis=1, keepdims=True) - ends
     inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-9)
@@ -235,15 +228,14 @@ def starts(hand: Hand, positions: Array, normals: Array, *, seed: int, count: in
     Vt[:, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[:, None]
     turns = np.einsum("nji,nkj->nik", Vt, U)  # lay ours best over theirs
     rests = ((np.einsum("nij,nkj->nki", turns, ours) - theirs) ** 2).sum(axis=(1, 2))
-    best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[:count]
+    best = np.argsort((rests / ARM**2).round(ROUND), kind="stable")[: asked.most_starts]
     places = center - np.einsum("nij,nj->ni", turns, held)
-    return [
-        Start(
-            orders[order[n]].astype(np.int64), joints[which[n]].copy(), _steady(turns[n]),
-            to_digits(places[n], LENGTH),
+    for n in best:
+        turned, place = _steady(turns[n]), to_digits(places[n], LENGTH)
+        yield (
+            orders[order[n]].astype(np.int64),
+            asked.pose(len(normals), turned, place, joints[which[n]]),
         )
-        for n in best
-    ]  # fmt: skip
 
 
 def _steady(turn: Array) -> Array:
@@ -263,12 +255,10 @@ class FoundPose:
     """A pose in which a hand holds an object."""
 
     used: Indices  # indices of the grasp's contacts at which fingers stand, (k,)
-    fingers: Indices  # the finger at each of them, (k,)
-    joints: Array  # joint angles, (j,) [rad]
-    palm_pose: Array  # pose of the palm in the object's frame, (4, 4)
+    aims: Targets  # where they touch, with the finger at each
+    pose: Pose
     certificate: ClosureCertificate  # with the contacts that are reached
     within: tuple[bool, ...]  # whether each contact is in its region, or as planned
-    touching: Array  # points of blocks in the last links' frames, else NaN, (k, 3)
     starts: int = 1  # number of starts that were tried
 
 
@@ -282,43 +272,34 @@ def find_pose(asked: Asked, choices: Sequence[tuple[int, ...]]) -> FoundPose | C
     for chosen in choices:
         used = np.array(chosen, np.int64)
         aims = targets(asked, used, regions=asked.regions)
-        for start in starts(
-            asked.hand, aims.origins, aims.normals, seed=asked.seed, count=asked.most_starts
-        ):
-            ended = _tried(asked, used, aims._replace(fingers=start.fingers), start)
+        for fingers, pose in starts(asked, aims.origins, aims.normals):
+            ended = _tried(asked, used, aims._replace(fingers=fingers), pose)
             if not isinstance(ended, str):
                 return replace(ended, starts=tally.total() + 1)
             tally[ended] += 1
     return tally
 
 
-def _tried(asked: Asked, used: Indices, aims: Targets, start: Start) -> FoundPose | str:
+def _tried(asked: Asked, used: Indices, aims: Targets, pose: Pose) -> FoundPose | str:
     """Move the hand from one start; return a pose, or what is in the way."""
-    kernel = compiled("grasp_core.hands.pose_kernel")
-    pose: Pose = kernel.empty_pose(asked.arrays, len(used))
-    pose.palm[:], pose.origin[:], pose.q[:] = start.rotation, start.position, start.joints
-    sums = kernel.empty_sums(asked.arrays, aims)
-    room = asked.clearance + ROOM
+    kernel = compiled(KERNEL)
+    sums, room = kernel.empty_sums(asked.arrays, aims), asked.clearance + ROOM
     far = Wanted(room, asked.clearance, room, MARGIN, PULL, True, True)
     kernel.settle(asked.arrays, asked.tree, aims, far, pose, sums, MOST_STEPS, GOOD_MM)
     near = far._replace(overlaps=False, margin=LEAST_MARGIN, pull=0.0)
-    laid = None if sums.parts[0] > ROUGH_MM else _laid(asked, aims, near, pose)
-    if laid is None:
+    rest = None if sums.parts[0] > ROUGH_MM else _laid(asked, aims, near, pose)
+    if rest is None:
         low, high = asked.arrays.ranges.T
         at_limit = ((pose.q <= low) | (pose.q >= high)) & (low < high)
         return "limit" if at_limit.any() else "away"
-    targets, points = laid
-    if blocked := blocking(asked, pose, start.fingers):
+    laid, points = rest
+    if blocked := blocking(asked, pose, aims.fingers):
         return blocked
-    certificate = proved_closure(points, targets.normals, asked.friction)
+    certificate = proved_closure(points, laid.normals, asked.friction)
     if certificate is None or not certificate.closed:
         return "open"
-    palm_pose = np.eye(POSE)
-    palm_pose[:3, :3], palm_pose[:3, 3] = pose.palm, pose.origin
-    return FoundPose(
-        used, start.fingers, pose.q, palm_pose, certificate,
-        _are_within(aims, certificate.positions, MARGIN), targets.touching,
-    )  # fmt: skip
+    within = _are_within(aims, certificate.positions, MARGIN)
+    return FoundPose(used, laid, pose, certificate, within)
 
 
 def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Targets, Array] | None:
@@ -326,7 +307,7 @@ def _laid(asked: Asked, aims: Targets, near: Wanted, pose: Pose) -> tuple[Target
 
     Which point of a block touches is only known then, so that its region is asked for again.
     """
-    arrays, kernel = asked.arrays, compiled("grasp_core.hands.pose_kernel")
+    arrays, kernel = asked.arrays, compiled(KERNEL)
     laid = aims._replace(
         origins=np.array(aims.origins), normals=np.array(aims.normals),
         touching=np.array(aims.touching), soft=HARD,
@@ -373,7 +354,7 @@ def blocking(asked: Asked, pose: Pose, fingers: Indices | None = None) -> str:
 def compile_posing(hand: Hand, body: Polyhedron) -> None:
     """Compile what moves a hand until its fingertips touch, on a hand that stands nowhere."""
     arrays, tree = hand_arrays(hand), surface_tree(body)
-    kernel, count = compiled("grasp_core.hands.pose_kernel"), min(len(hand.fingers), FINGERS)
+    kernel, count = compiled(KERNEL), min(len(hand.fingers), FINGERS)
     up, none = np.array([0.0, 0.0, 1.0]), np.empty((0, 3))
     aims = Targets(
         np.arange(count), np.zeros((count, 3)), np.tile(up, (count, 1)), np.zeros((count, 2, 3)),
@@ -385,3 +366,74 @@ def compile_posing(hand: Hand, body: Polyhedron) -> None:
     pose.palm[:], pose.origin[:], pose.q[:] = np.eye(3), 1.0, hand.ranges.mean(axis=1)
     kernel.settle(arrays, tree, aims, wanted, pose, kernel.empty_sums(arrays, aims), 0, 1.0)
     kernel.lay(arrays, tree, aims, pose, np.empty((count, 3)))
+
+
+GAPS_M = (0.015, 0.01, 0.006, 0.003)
+"""Distances of fingertips from the surface that are tried, the largest first [m]."""
+LEAST_GAP = 0.5  # part of such a distance that every fingertip must have
+STEPS = 30
+TICK, LINE = 0.004, 0.06
+"""Distance of the poses that are checked on the way in, and its length [m]."""
+TILT = 0.4
+"""Slope at which some ways in lean from the line from the palm to the contacts' middle."""
+LEAST_ALONG = 0.2
+"""Least cosine of the angle between a way in and the line from the palm to the contacts' middle."""
+
+
+def opened(asked: Asked, found: FoundPose) -> tuple[Array | None, Array | None]:
+    """Return joint angles with open fingers, and the palm's unit way in; None if not found."""
+    planned = targets(asked, found.used, regions=False)._replace(fingers=found.aims.fingers)
+    joints = _open_joints(asked, found, planned)
+    if joints is None:
+        return None, None
+    ahead = found.pose._replace(q=joints)
+    ways = (way for way in _ways(asked, found) if _is_free(asked, planned, ahead, way))
+    return joints, next(ways, None)
+
+
+def _open_joints(asked: Asked, found: FoundPose, planned: Targets) -> Array | None:
+    """Return joint angles at which fingertips are off the surface and nothing overlaps."""
+    arrays, kernel = asked.arrays, compiled(KERNEL)
+    contacts, clear, held = found.certificate, asked.clearance, found.pose
+    wanted = Wanted(clear, clear, clear, 0.0, 0.0, overlaps=True, palm_moves=False)
+    for gap in GAPS_M:
+        aims = planned._replace(
+            origins=contacts.positions - gap * contacts.normals, normals=np.array(contacts.normals),
+            touching=found.aims.touching,
+        )  # fmt: skip
+        pose = asked.pose(len(found.used), held.palm, held.origin, held.q)
+        sums = kernel.empty_sums(arrays, aims)
+        kernel.settle(arrays, asked.tree, aims, wanted, pose, sums, STEPS, 1e3 * 0.1 * gap)
+        kernel.place(arrays, aims, pose)
+        away = np.einsum("ki,ki->k", contacts.positions - pose.fronts, contacts.normals)
+        open_by = away - arrays.tip_roundings[aims.fingers]
+        if open_by.min() >= LEAST_GAP * gap and not blocking(asked, pose):
+            return pose.q
+    return None
+
+
+def _ways(asked: Asked, found: FoundPose) -> Array:
+    """Return unit vectors along which the palm may move in, the likeliest first, (n, 3)."""
+    middle = found.certificate.positions.mean(axis=0)
+    palm = np.array([shape.position for shape in asked.hand.palm] or [np.zeros(3)]).mean(axis=0)
+    R = found.pose.palm
+    ahead = middle - found.pose.origin - R @ palm
+    ahead /= np.linalg.norm(ahead)
+    steps = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+    steps = steps[np.abs(steps).max(axis=1) > 0.0]
+    others = (steps / np.linalg.norm(steps, axis=1, keepdims=True)) @ R.T
+    along = others @ ahead
+    order = np.argsort(-along.round(ROUND), kind="stable")
+    leaning = ahead + TILT * np.vstack([R.T, -R.T])
+    leaning /= np.linalg.norm(leaning, axis=1, keepdims=True)
+    return np.vstack([ahead, leaning, others[order[along[order] > LEAST_ALONG]]])
+
+
+def _is_free(asked: Asked, planned: Targets, held: Pose, way: Array) -> bool:
+    """Return whether an open hand is free at all steps of a straight way in."""
+    for back in np.arange(TICK, LINE + 0.5 * TICK, TICK):
+        pose = asked.pose(len(planned.fingers), held.palm, held.origin - back * way, held.q)
+        compiled(KERNEL).place(asked.arrays, planned, pose)
+        if blocking(asked, pose):
+            return False
+    return True

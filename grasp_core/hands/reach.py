@@ -26,9 +26,8 @@ from grasp_core.figures import Shown
 from grasp_core.files.records import Key, recorded
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
-from grasp_core.hands.kinematics import places
-from grasp_core.hands.opening import opened
-from grasp_core.hands.pose_search import Asked, contact_choices, find_pose
+from grasp_core.hands.hand_arrays import places
+from grasp_core.hands.pose_search import Asked, contact_choices, find_pose, opened
 from grasp_core.kinds import (
     Friction,
     HandClearance,
@@ -200,9 +199,11 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
         reason, said = _why(found)
         return HandReach(hand.name, grasp.id, reason, said, found.total(), clearance_m)
     joints, way = opened(asked, found)
+    palm_pose = np.eye(POSE)
+    palm_pose[:3, :3], palm_pose[:3, 3] = found.pose.palm, found.pose.origin
     return HandReach(
-        hand.name, grasp.id, "", "", found.starts, clearance_m, found.fingers, found.joints,
-        found.palm_pose, found.certificate, found.within, joints, way, found.used,
+        hand.name, grasp.id, "", "", found.starts, clearance_m, found.aims.fingers, found.pose.q,
+        palm_pose, found.certificate, found.within, joints, way, found.used,
     )  # fmt: skip
 
 

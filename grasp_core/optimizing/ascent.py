@@ -36,7 +36,8 @@ The paper leaves open where on their faces the contacts of a grasp are best (sec
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -51,6 +52,7 @@ from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
 from grasp_core.quality.inner_polytope import InnerPolytope
 from grasp_core.quality.measures import (
     CLOSED_GAP,
+    FERRARI_CANNY,
     THIN,
     Measure,
     ResistedLoads,
@@ -78,8 +80,7 @@ STEEPEST = 20.0
 the weights do not tell where the foot moves."""
 FLAT = 1e-9
 """Share of the largest singular value of a simplex below which a singular value counts as zero."""
-STEP_DIGITS = 6
-"""Digits after the point to which a step is rounded."""
+STEP_DIGITS = 6  # digits after the point to which a step is rounded
 LAST_DIGIT = 10.0**-STEP_DIGITS
 """Distance inside the limits at which a step ends, in object radii: rounding may move the end by
 this much."""
@@ -92,8 +93,7 @@ GOOD, GROWTH = 0.5, 1.5
 POOR, SHRINKAGE = 0.2, 0.4
 """Share of the predicted gain below which the trust region shrinks, and the factor by which it
 shrinks."""
-WORTHWHILE = 1e-6
-"""Predicted relative gain below which the climb ends."""
+WORTHWHILE = 1e-6  # predicted relative gain below which the climb ends
 TASK_WORTHWHILE = 1e-4
 """Predicted relative gain below which a climb for a task ends: the smallest gap that may be asked
 for, as each step takes a program for every load."""
@@ -110,7 +110,6 @@ the first ones. They are so many at most, as each is a program more in every ste
 class Height(NamedTuple):
     """How high contacts stand."""
 
-    quality: FerrariCanny
     lower: float
     """Proved lower bound of what they climb for: of the quality, or of a multiple of loads."""
     planes: Callable[[], tuple[Array, Array]] | None
@@ -120,12 +119,9 @@ class Height(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactFaces:
-    """Four convex pieces of faces, with the distances that contacts keep from the edges of each."""
+    """Four convex pieces of faces, as far as contacts may be on them."""
 
     pieces: tuple[FacePiece, ...]
-    limits: tuple[Array, ...]
-    """Offsets of the edges, for each piece: contact i lies where E_i y <= limits[i] in its
-    plane."""
     friction: float
 
     @property
@@ -146,44 +142,33 @@ class ContactFaces:
         friction = np.full(len(y), self.friction)
         return WrenchSet.at(self.positions(y), self.normals, friction).on_grid()
 
-    def climbed(self, y: Array) -> tuple[Array, FerrariCanny]:
-        """Move contacts uphill to a local optimum, (k, 2); return them with their quality."""
+    def height(self, measure: Measure, y: Array) -> Height:
+        """Bound what contacts reach of a measure, and say how it changes near them."""
+        wrenches = self.wrenches(y)
+        if measure.is_usual:
+            found = wrench_set_quality(wrenches, SEARCH_GAP)
+            planes = None if found.polytope is None else partial(self.nearest_planes, found)
+            return Height(found.lower, planes)
+        found = wrench_set_quality(wrenches, CLOSED_GAP)
+        if found.lower <= 0.0:
+            return Height(0.0, None)
+        of_loads = self.planes_of_loads(wrenches, measure)
+        return Height(float(of_loads[0].min()), lambda: of_loads)
 
-        def height(at: Array) -> Height:
-            found = self.quality(at)
-            polytope = found.polytope
-            if polytope is None:
-                return Height(found, found.lower, None)
-            return Height(found, found.lower, lambda: self.nearest_planes(found, polytope))
+    def climb(self, y: Array, measure: Measure = FERRARI_CANNY) -> tuple[Array, Height]:
+        """Move contacts uphill to a local optimum of the quality or of a task's loads, (k, 2).
 
-        end, found = self.climb(y, height, WORTHWHILE)
-        return end, found.quality
-
-    def climbed_for_task(self, measure: Measure, y: Array) -> Array:
-        """Move contacts in force closure uphill to a local optimum of a task's loads, (k, 2)."""
-
-        def height(at: Array) -> Height:
-            wrenches = self.wrenches(at)
-            quality = wrench_set_quality(wrenches, CLOSED_GAP)
-            if quality.lower <= 0.0:
-                return Height(quality, 0.0, None)
-            planes = self.planes_of_loads(wrenches, measure)
-            return Height(quality, float(planes[0].min()), lambda: planes)
-
-        return self.climb(y, height, TASK_WORTHWHILE)[0]
-
-    def climb(
-        self, y: Array, height: Callable[[Array], Height], worthwhile: float
-    ) -> tuple[Array, Height]:
-        """Take steps uphill in a trust region as long as they are predicted to be worthwhile."""
-        found, reach = height(y), FIRST_REACH
+        Steps are taken as long as they are predicted to be worthwhile.
+        """
+        worthwhile = WORTHWHILE if measure.is_usual else TASK_WORTHWHILE
+        found, reach = self.height(measure, y), FIRST_REACH
         for _ in range(MOST_STEPS):
             if found.planes is None or reach < LEAST_REACH:
                 break
             step, predicted = self.step(y, found.lower, found.planes(), reach)
             if predicted <= worthwhile * found.lower:
                 break
-            trial = height(y + step)
+            trial = self.height(measure, y + step)
             gained = (trial.lower - found.lower) / predicted
             if trial.lower > surpassing(found.lower):
                 y, found = y + step, trial
@@ -198,11 +183,11 @@ class ContactFaces:
         n = y.size
         rows = [np.hstack([-slopes, np.ones((len(slopes), 1))])]
         room = [distances - lower]
-        for i, (piece, limit) in enumerate(zip(self.pieces, self.limits, strict=True)):
-            inside = np.zeros((len(limit), n + 1))
+        for i, piece in enumerate(self.pieces):
+            inside = np.zeros((len(piece.b), n + 1))
             inside[:, 2 * i : 2 * i + 2] = piece.E
             rows.append(inside)
-            room.append(limit - piece.E @ y[i] - LAST_DIGIT)
+            room.append(piece.b - piece.E @ y[i] - LAST_DIGIT)
         rows += [np.eye(n + 1)[:n], -np.eye(n + 1)[:n]]
         room.append(np.full(2 * n, reach))
         program = LinearProgram(np.eye(n + 1)[n], np.vstack(rows), np.hstack(room) / reach)
@@ -212,8 +197,9 @@ class ContactFaces:
         x = reach * nearest_optimum(program, best)
         return on_grid(x[:n].reshape(y.shape), STEP_DIGITS), float(x[n])
 
-    def nearest_planes(self, found: FerrariCanny, polytope: InnerPolytope) -> tuple[Array, Array]:
+    def nearest_planes(self, found: FerrariCanny) -> tuple[Array, Array]:
         """Return distances (m,) and, by (1), slopes (m, 2k) of the planes nearest to zero."""
+        polytope = cast("InnerPolytope", found.polytope)
         points = polytope.forces @ found.wrenches.G.T
         height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
         heights: Array = height.min(axis=1)
@@ -248,14 +234,17 @@ class ContactFaces:
         return np.einsum("nki,kij->nkj", turned, planes).reshape(len(forces), -1)
 
 
-def climbs_for_weight(faces: ContactFaces, y: Array) -> Iterator[Array]:
-    """Yield where contacts in force closure come to by climbing for the weight, (k, 2) each."""
+def climbs(faces: ContactFaces, measure: Measure, y: Array) -> Iterator[Array]:
+    """Yield where contacts in force closure come to by climbing for a measure, (k, 2) each."""
+    if measure.name != "weight":
+        yield faces.climb(y, measure)[0]
+        return
     forces = _spread()
     for _ in range(ROUNDS):
         loads = np.hstack([forces, np.zeros_like(forces)])
-        y = faces.climbed_for_task(Measure("task", loads), y)
+        y, _ = faces.climb(y, Measure("task", loads))
         yield y
-        found = resisted_loads(faces.wrenches(y), Measure("weight"), SEARCH_GAP)
+        found = resisted_loads(faces.wrenches(y), measure, SEARCH_GAP)
         forces = np.vstack([forces, _weakest(found)])
 
 
@@ -284,16 +273,13 @@ def _weakest(found: ResistedLoads) -> Array:
     return np.array(kept)
 
 
-POINTS = 3000
-"""Random contacts."""
-SETS = 40_000
-"""Random sets of four of them."""
+POINTS = 3000  # random contacts
+SETS = 40_000  # random sets of four of them
 AT_ONCE = 4000
 RATED, MOST_RATED = 200, 4000
 """Sets whose quality is measured, and how many more are looked at while few are in force closure,
 as at low friction."""
-ROUGH = 0.1
-"""Gap of these qualities, by which sets are ordered."""
+ROUGH = 0.1  # gap of these qualities, by which sets are ordered
 CLIMBED, ALIKE = 16, 3
 """Sets that climb, and how many of them on the same pieces: climbs from several starts on the same
 pieces end in several local optima."""
@@ -355,24 +341,12 @@ def _closed_sets(
 def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Found:
     """Move contacts uphill on their pieces."""
     pieces = tuple(piece_at(searching.grounds, int(p)) for p in on)
-    limits = tuple(piece.b for piece in pieces)
-    faces = ContactFaces(pieces, limits, searching.friction)
-
-    def measured(y: Array) -> Found:
-        return searching.measured(np.array(on), y)
-
-    best = measured(at)
+    best = searching.measured(np.array(on), at)
     if best.quality.lower <= 0.0:
         return best
-    measure = searching.measure
-    if measure.name == "weight":
-        every = climbs_for_weight(faces, at)
-    elif measure.name == "task":
-        every = [faces.climbed_for_task(measure, at)]
-    else:
-        every = [faces.climbed(at)[0]]
-    for moved in every:
-        there = measured(moved)
+    faces = ContactFaces(pieces, searching.friction)
+    for moved in climbs(faces, searching.measure, at):
+        there = searching.measured(np.array(on), moved)
         inside = all(
             float((piece.E @ y - piece.b).max()) <= 0.0
             for piece, y in zip(pieces, moved, strict=True)

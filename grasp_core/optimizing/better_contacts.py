@@ -14,7 +14,7 @@ better.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,12 +115,12 @@ def optimize_contacts(
     else:
         insets = [finger_radius / body.radius] * FINGERS
     clearances = tuple(float(body.radius * inset) for inset in insets)
-    rooms = [inset_piece(*chosen) for chosen in zip(pieces, insets, strict=True)]
-    faces = ContactFaces(pieces, tuple(room.b for room in rooms), friction)
+    rooms = tuple(inset_piece(*chosen) for chosen in zip(pieces, insets, strict=True))
+    faces = ContactFaces(rooms, friction)
     here = [_clear_of_edges(*on) for on in zip(rooms, at, strict=True)]
     rng = np.random.default_rng([seed, *grasp.faces])
-    starts = [np.array(here), *_random_starts(faces, rooms, rng)]
-    ends = [faces.climbed(y) for y in starts]
+    starts = [np.array(here), *_random_starts(faces, rng)]
+    ends = [faces.climb(y) for y in starts]
     for place in largest_first([found.lower for _, found in ends]):
         y, found = ends[place]
         if found.lower <= surpassing(before.lower):
@@ -159,11 +159,11 @@ def _clear_of_edges(room: FacePiece, point: Array) -> Array:
     return y + min(share, 1.0) * (middle - y)
 
 
-def _random_starts(
-    faces: ContactFaces, rooms: Sequence[FacePiece], rng: np.random.Generator
-) -> Iterator[Array]:
+def _random_starts(faces: ContactFaces, rng: np.random.Generator) -> Iterator[Array]:
     trials = [
-        np.array([rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in rooms])
+        np.array(
+            [rng.dirichlet(np.ones(len(room.corners))) @ room.corners for room in faces.pieces]
+        )
         for _ in range(RANDOM_TRIALS)
     ]
     rated = np.array([faces.quality(y, ROUGH).lower for y in trials])

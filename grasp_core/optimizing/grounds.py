@@ -52,23 +52,20 @@ from grasp_core.objects.symmetries import symmetries
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
-ROOM = 24
-"""Room for the corners of a polygon, that of the compiled cuts."""
+ROOM = 24  # room for the corners of a polygon, that of the compiled cuts
 MOST_AT_FIRST = 12
 """Largest number of corners of a piece before any cut; larger ones are divided."""
 MOST_PIECES = 128
 UNIT = 1e-9
 """Largest deviation of normals and frames from orthonormal, and of polygons from convex ones."""
-LARGEST = 2.0
-"""Largest coordinate of a point, in object radii."""
+LARGEST = 2.0  # largest coordinate of a point, in object radii
 SEARCH_DIGITS = 11
 """Digits after the point that a search is given of polygons (see `support_cuts`)."""
 EXACT = 1e-9
 """Largest distance between a piece's corner, or normal, as a map moves it, and another's."""
 WIDENED = 1e-8
 MOST_MAPS = 128
-ALONE = np.eye(3)[None]
-"""The symmetry that every object has, (1, 3, 3)."""
+ALONE = np.eye(3)[None]  # the symmetry that every object has, (1, 3, 3)
 ASIDE = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
 REPLAY = "grasp_core.optimizing.replay_kernel"
@@ -212,9 +209,7 @@ def first_nodes(
     """Return the nodes from which a search starts, one for each orbit of pieces.
 
     Without symmetries there is one, in which every finger may be anywhere, or on its own pieces.
-
-    Takes `maps` (g, 3, 3); `owners` (p,). Gives corners of each finger's polygons, (c, 4, p, 24,
-    2); how many, (c, 4, p); whether fingers are fresh, (c, 4).
+    Gives corners of polygons, (c, 4, p, 24, 2), how many, (c, 4, p), and who is fresh, (c, 4).
     """
     pieces = len(grounds.counts)
     if owners is not None:

@@ -21,8 +21,7 @@ from grasp_core.values import FINGERS
 BY_PIECES, BY_LINE = 16, 32
 """What a node does, added to a finger: it divides its pieces, or its polygon. Below these numbers
 are questions, the sums of 2**i over the fingers i that may answer."""
-HALVINGS = 40
-"""Halvings of an edge towards the point in which it begins to answer."""
+HALVINGS = 40  # halvings of an edge towards the point in which it begins to answer
 AT_FIRST, DEEPEST = 16, 4096
 """Number of nodes for which there is room at first, and the largest number that may wait."""
 
@@ -41,8 +40,7 @@ class Nodes(NamedTuple):
 
     corners: Array  # corners of what is left of each piece, by node and finger, (d, 4, p, ROOM, 2)
     counts: Indices  # how many corners each has, (d, 4, p)
-    fresh: Indices
-    """Whether a finger may still be exchanged with the other fresh ones, (d, 4)."""
+    fresh: Indices  # whether a finger may still be exchanged with the other fresh ones, (d, 4)
     above: Indices  # how many nodes above each count, (d,)
     top: Indices  # how many nodes wait, (1,)
 
@@ -208,8 +206,8 @@ def _is_division(nodes: Nodes, deed: int) -> bool:
 @loop("numpy")
 def _answered(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
     """Put one node for each named finger in the last node's place; return False if it is wrong."""
-    corners, counts, node = nodes.corners, nodes.counts, nodes.top[0] - 1
-    if not _is_empty(counts[node]) and _do_others(pieces, nodes, deed, y, t):
+    corners, counts = nodes.corners, nodes.counts
+    if _do_others(pieces, nodes, deed, y, t):
         return False
     branch(nodes, deed)
     place = nodes.top[0]
@@ -229,6 +227,8 @@ def _do_others(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> b
     corners, counts, fresh = nodes.corners, nodes.counts, nodes.fresh
     node, twin = nodes.top[0] - 1, False
     for i in range(FINGERS):
+        if counts[node, i].sum() == 0:
+            return False  # a finger has nowhere to be
         if (deed >> i) & 1:
             twin = twin or fresh[node, i] > 0
     for i in range(FINGERS):
@@ -240,15 +240,6 @@ def _do_others(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> b
                 if _support(pieces, p, a, b, y) >= t:
                     return True
     return False
-
-
-@loop("numpy")
-def _is_empty(counts: Indices) -> bool:
-    """Return whether some finger of a node has nowhere to be."""
-    full = 0
-    for i in range(FINGERS):
-        full += counts[i].sum() > 0
-    return full < FINGERS
 
 
 @loop("numpy")

@@ -17,7 +17,8 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -42,8 +43,6 @@ from grasp_core.values import FINGERS
 Nodes: TypeAlias = tuple[Array, Indices, Indices]
 """Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
 any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
-Steps: TypeAlias = tuple[Indices, Indices, Array, Array]
-"""What a tree does, as `CutTree` lists it: deeds, what is asked, twists and lines."""
 POOL = 512
 """Twists that a search keeps: asking is most of its work, and takes as long as there are twists."""
 DEEP, FIRST_ROOM = 24, 256
@@ -71,18 +70,15 @@ BUDGET = 2000
 MUCH = 1.1
 """Ratio of qualities from which on contacts are a better start for other thresholds, where the
 measure is not the usual one and the first contacts may be poor."""
-ASIDE = 1.4
-"""Factor that keeps loads of round sizes away from powers of two."""
-SETTLED = 1.0 - 1e-6
-"""Share of a threshold below which contacts count as refuted."""
+ASIDE = 1.4  # factor that keeps loads of round sizes away from powers of two
+SETTLED = 1.0 - 1e-6  # share of a threshold below which contacts count as refuted
 EXACT_GAP = 1e-5
 """Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
 that a search may be asked for."""
 COUNT = 384
 """Random twists to begin with, as many as a wave hands on; a quarter of them is moved to where the
 support of all polygons is smaller."""
-FIRST_STEPS = 60
-"""Steps of these descents: they settle within it."""
+FIRST_STEPS = 60  # steps of these descents: they settle within it
 ROUNDED_UP = 1e-6
 """Share by which a threshold is rounded up at least, and less than three times as much."""
 
@@ -164,20 +160,15 @@ def enlarge(part: Part) -> None:
     stack, tree = part.stack, part.tree
     if int(stack.top[0]) + FINGERS >= len(stack.above):
         part.stack = compiled(REPLAY).doubled(stack)
-    sizes = [int(tree.sizes[k]) for k in (0, 0, 1, 2)]
     arrays = [
-        _doubled(array) if size + 1 >= len(array) else array
-        for array, size in zip(tree[:4], sizes, strict=True)
+        np.concatenate([array, np.zeros_like(array)]) if tree.sizes[k] + 1 >= len(array) else array
+        for array, k in zip(tree[:4], (0, 0, 1, 2), strict=True)
     ]
     part.tree = type(tree)(*arrays, tree.sizes)
 
 
-def _doubled(array: Any) -> Any:
-    return np.concatenate([array, np.zeros_like(array)])
-
-
-def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
-    """Put the trees of parts into their places in the trunk's tree, and in each other's."""
+def joined(trunk: Part, parts: Sequence[Part]) -> dict[str, Any]:
+    """Put the trees of parts into their places in the trunk's tree, as arrays of a `CutTree`."""
     splice, lines_from = int(compiled(KERNEL).SPLICE), int(compiled(REPLAY).BY_PIECES)
     every = [trunk, *parts]
     sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
@@ -186,13 +177,13 @@ def joined(trunk: Part, parts: Sequence[Part]) -> Steps:
     for part, (n, _, _), (_, twists, lines) in zip(every, sizes, starts, strict=True):
         shifts = np.where(part.tree.deeds[:n] < lines_from, int(twists), int(lines))
         asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
-    rows = list(_in_order(trunk, splice))
-    return (
-        np.concatenate([part.tree.deeds[some] for part, some in rows]),
-        np.concatenate([asked[id(part)][some] for part, some in rows]),
-        np.concatenate([part.tree.twists[:m] for part, m in zip(every, sizes[:, 1], strict=True)]),
-        np.concatenate([part.tree.lines[:m] for part, m in zip(every, sizes[:, 2], strict=True)]),
-    )
+    rows, trees = list(_in_order(trunk, splice)), list(zip(every, sizes, strict=True))
+    return {
+        "deeds": np.concatenate([part.tree.deeds[some] for part, some in rows]),
+        "asked": np.concatenate([asked[id(part)][some] for part, some in rows]),
+        "twists": np.concatenate([each.tree.twists[:m] for each, (_, m, _) in trees]),
+        "lines": np.concatenate([each.tree.lines[:m] for each, (_, _, m) in trees]),
+    }
 
 
 def _in_order(trunk: Part, splice: int) -> Iterator[tuple[Part, slice]]:
@@ -213,59 +204,34 @@ _Waiting: TypeAlias = tuple[Part, Nodes, Any]
 """A node that waits, with the part that left it and the pool of twists that it begins with."""
 
 
-@dataclass(slots=True, eq=False)
 class Searching:
     """A bound that falls from level to level, with what refutes all above, and twists to ask."""
 
-    grounds: Grounds
-    friction: float
-    jobs: int
-    stop: Stop
-    measure: Measure = FERRARI_CANNY
-    maps: Array = field(default_factory=lambda: ALONE)  # these two are as in `CutTree`
-    owners: Indices | None = None
-    nodes: int = 0  # how many nodes were visited in all levels
-    steps: Steps = field(init=False)  # the tree that refutes the threshold
-    threshold: float = field(init=False)
-    first: Nodes = field(init=False)
-    proved: Slack = field(init=False)
-    searched: Slack = field(init=False)
-    """Searches leave more than proofs, for a replay with other roundings."""
-    pieces: Any = field(init=False)  # these three are as the kernels take them
-    demand: Any = field(init=False)
-    pool: Any = field(init=False)
-
-    def __post_init__(self) -> None:
-        kernel, grounds = compiled(TWISTS), self.grounds
-        self.first = first_nodes(grounds, self.maps, self.owners)
-        self.proved = Slack.of(self.friction, len(self.maps), self.measure)
-        self.searched = Slack.of(self.friction, len(self.maps), self.measure, SEARCHED_BELOW)
+    def __init__(
+        self, grounds: Grounds, friction: float, jobs: int, stop: Stop,
+        measure: Measure = FERRARI_CANNY, maps: Array = ALONE, owners: Indices | None = None,
+    ) -> None:  # fmt: skip
+        self.grounds, self.friction, self.jobs, self.stop = grounds, friction, jobs, stop
+        self.measure, self.maps, self.owners = measure, maps, owners
+        self.nodes = 0  # how many were visited in all levels
+        self.first = first_nodes(grounds, maps, owners)
+        # searches leave more than proofs, for a replay with other roundings
+        self.searched = Slack.of(friction, len(maps), measure, SEARCHED_BELOW)
+        kernel = compiled(TWISTS)
         each = (grounds.normals, grounds.origins, grounds.frames)
         numbers = (on_grid(every, SEARCH_DIGITS) for every in each)
-        self.pieces = compiled(REPLAY).Pieces(*numbers, float(self.friction))
+        self.pieces = compiled(REPLAY).Pieces(*numbers, float(friction))
         kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
-        scale = math.ldexp(1.0, math.frexp(ASIDE * self.measure.size)[1])
-        loads = scale * on_grid(self.measure.loads / scale, SEARCH_DIGITS)
-        self.demand = kernel.Demand(int(kinds[self.measure.name]), loads)
+        scale = math.ldexp(1.0, math.frexp(ASIDE * measure.size)[1])
+        loads = scale * on_grid(measure.loads / scale, SEARCH_DIGITS)
+        self.demand = kernel.Demand(int(kinds[measure.name]), loads)
         self.pool = kernel.Pool(
             np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((len(grounds.counts), 6, POOL)),
             np.zeros(POOL, np.int64), np.full(POOL, -1), np.zeros(1, np.int64),
         )  # fmt: skip
 
-    @property
-    def bound(self) -> float:
-        """Return what no contacts exceed, by the last threshold that was refuted."""
-        return self.threshold + self.proved.raised
-
-    def proof(self) -> CutTree:
-        """Return the proof of the bound."""
-        return CutTree(
-            self.grounds, self.friction, self.maps, self.threshold, *self.steps, self.measure,
-            self.owners,
-        )  # fmt: skip
-
     def begin(self, rng: np.random.Generator) -> Array:
-        """Learn unit twists, (n, 6), that polygons resist little; the best one gives a bound."""
+        """Learn unit twists, (n, 6), that polygons resist little; the best one proves a bound."""
         grounds, loads = self.grounds, self.measure.loads
         on, at = np.repeat(np.arange(len(grounds.counts)), grounds.counts), grounds.polygons()
         corners = on_grid(grounds.places(on, np.vstack(at)), SEARCH_DIGITS)
@@ -273,9 +239,7 @@ class Searching:
         found = np.vstack([-loads, rng.normal(size=(COUNT, 6))])
         found = on_grid(found / np.linalg.norm(found, axis=1, keepdims=True))
         for y in found[: len(loads) + COUNT // 4]:
-            compiled(TWISTS).descend(
-                self.pieces, self.demand, corners, on, len(on), y, FIRST_STEPS, 0.0
-            )
+            compiled(TWISTS).descend(self.pieces, self.demand, corners, on, y, FIRST_STEPS, 0.0)
         self.learn(found)
         twists = np.array(self.pool.twists[: len(found)])
         reached = grounds.supports(on, np.vstack(at), self.friction, twists).max(axis=0)
@@ -283,9 +247,12 @@ class Searching:
         thresholds = self.measure.multiples(supports, self.measure.demands(twists))
         thresholds += self.searched.raised
         best = first_best(-thresholds)
-        self.threshold = few_digits((1.0 + 2.0 * ROUNDED_UP) * thresholds[best], ROUNDED_UP)
+        threshold = few_digits((1.0 + 2.0 * ROUNDED_UP) * thresholds[best], ROUNDED_UP)
         none = np.zeros(len(self.first[0]), np.int64)
-        self.steps = (none, none, twists[best : best + 1], np.empty((0, 3)))
+        self.proof = CutTree(
+            grounds, self.friction, self.maps, threshold, none, none, twists[best : best + 1],
+            np.empty((0, 3)), self.measure, self.owners,
+        )  # fmt: skip
         return twists
 
     def learn(self, twists: Array, pool: Any = None, now: int = 0) -> None:
@@ -296,13 +263,7 @@ class Searching:
 
     def refute(self, bound: float, known: float = math.inf) -> tuple[bool, list[Found]]:
         """Try to lower the bound; return whether that came about, and contacts above the known."""
-        steps, better = self._refuted(bound - self.searched.raised, known)
-        if steps is not None:
-            self.steps, self.threshold = steps, bound - self.proved.raised
-        return steps is not None, better
-
-    def _refuted(self, threshold: float, known: float) -> tuple[Steps | None, list[Found]]:
-        """Return a tree that refutes a threshold, or None, and contacts above what is known."""
+        threshold = bound - self.searched.raised
         corners, counts, fresh = self.first
         trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
@@ -314,52 +275,41 @@ class Searching:
                 better += [found for part in wave for found in part.found]
                 # a wave ends, as each of its parts leaves all that waits after `PART_NODES`
                 if self.nodes > MOST_NODES or not all(part.finished for part in wave):
-                    return None, better
+                    return False, better
                 for part in wave:
                     pool = self.pool if part is trunk else part.pool
                     waiting += [(part, node, pool) for node in part.left]
                     part.left, part.pool = [], None
                 if not waiting:
-                    return joined(trunk, parts), better
+                    refuted, steps = bound - self.proof.slack.raised, joined(trunk, parts)
+                    self.proof = replace(self.proof, threshold=refuted, **steps)
+                    return True, better
                 wave = list[Part]()
                 for _ in range(min(WAVE, len(waiting))):
                     above, node, pool = waiting.popleft()
                     above.parts.append(part_from(node, pool))
                     wave.append(above.parts[-1])
-                self._together(threads, wave, threshold, known)
+                search = partial(self._search, threshold=threshold, known=known, depth=MOST_DEPTH)
+                try:
+                    list(threads.map(search, wave))
+                except BaseException:
+                    self.stop.now()
+                    raise
                 self._hand_on(wave)
                 parts += wave
 
-    def _together(
-        self, threads: ThreadPoolExecutor, wave: Sequence[Part], threshold: float, known: float
-    ) -> None:
-        try:
-            for ended in [
-                threads.submit(self._search, part, threshold, known, MOST_DEPTH) for part in wave
-            ]:
-                ended.result()
-        except BaseException:
-            self.stop.now()
-            raise
-
     def _search(self, part: Part, threshold: float, known: float, depth: int) -> None:
         """Search a part; nodes at a depth are left, and all that wait after `PART_NODES`."""
-        kernel, pieces, demand, found_at = compiled(KERNEL), self.pieces, self.demand, -1
+        kernel, found_at = compiled(KERNEL), -1
         work = kernel.Work(
             np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
             np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64), np.full(1, -1),
         )  # fmt: skip
         while not self.stop():
             search = kernel.Search(
-                pieces,
-                part.stack,
-                part.pool,
-                part.tree,
-                work,
-                threshold,
-                demand,
+                self.pieces, part.stack, part.pool, part.tree, work, threshold, self.demand,
                 self.searched.lowered,
-            )
+            )  # fmt: skip
             before = int(part.tree.sizes[0])
             why = kernel.run(search, BUDGET, depth if before < PART_NODES else -1)
             self.stop.spend(int(part.tree.sizes[0]) - before)

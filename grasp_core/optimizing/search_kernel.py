@@ -27,22 +27,17 @@ from grasp_core.optimizing.twists_kernel import (
 )
 from grasp_core.values import FINGERS
 
-SPLICE = 64
-"""What a node does that is a part of its own."""
-LEAST = 1e-7
-"""Extent of a polygon, in object radii, below which it is not divided."""
+SPLICE = 64  # what a node does that is a part of its own
+LEAST = 1e-7  # extent of a polygon, in object radii, below which it is not divided
 SEVERAL = 2.0
 """Extent that counts for a finger with several pieces, larger than that of any piece."""
-ALL = -1
-"""Says that all fingers have changed."""
-TRIALS = 6
-"""Twists whose cuts are measured before one of them is asked."""
+ALL = -1  # says that all fingers have changed
+TRIALS = 6  # twists whose cuts are measured before one of them is asked
 THIN = 0.03
 """Weight of a polygon's squared extent beside its area, so that thin ones count."""
 MOST_LEFT = 0.9
 """Share of a finger's polygons above which an answer among several makes no headway."""
-SHRUNK = 0.97
-"""Cost of a question with one answer, up to which it is asked."""
+SHRUNK = 0.97  # cost of a question with one answer, up to which it is asked
 BESIDE = 1.5
 """Estimated cost, over the least cost measured, up to which a question is measured."""
 DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
@@ -51,19 +46,16 @@ part of its own, contacts that may reach the threshold, a node too small to be d
 ASKED_ABOVE = 1.05
 """Cost of a question up to which it is asked rather than dividing a polygon, which costs 1.41. It
 was measured: after a division more twists have a single answer."""
-STEPS, CLOSE_STEPS = 40, 120
-"""Steps of descents for a node, and for its middle."""
+STEPS, CLOSE_STEPS = 40, 120  # steps of descents for a node, and for its middle
 
 
 class Tree(NamedTuple):
     """What was done at each node, children after their parents."""
 
     deeds: Indices  # what was done, (n,)
-    asked: Indices
-    """Place of the twist among `twists`, or of the line among `lines`, (n,)."""
+    asked: Indices  # place of the twist among `twists`, or of the line among `lines`, (n,)
     twists: Array  # twists that are named, (m, 6)
-    lines: Array
-    """Lines that divide polygons, or the first piece of the second half, (l, 3)."""
+    lines: Array  # lines that divide polygons, or the first piece of the second half, (l, 3)
     sizes: Indices  # how many nodes, twists and lines there are, (3,)
 
 
@@ -91,8 +83,7 @@ class Search(NamedTuple):
     work: Work
     t: float  # the multiple of the loads that no contacts are to resist
     demand: Demand
-    spare: float
-    """How far below t times a twist's demand a support still counts as an answer."""
+    spare: float  # how far below t times a twist's demand a support still counts as an answer
 
 
 @loop("numpy")
@@ -133,7 +124,11 @@ def divide(search: Search) -> bool:
     if live == 1:
         _bisect(stack, node, chosen, line)
     else:
-        line[0] = _middle_piece(stack, node, chosen, live)
+        seen, place = 0, 0
+        while 2 * (seen + 1) <= live:  # half of the pieces are before it
+            seen += stack.counts[node, chosen, place] > 0
+            place += 1
+        line[0] = place
     deed = chosen + (BY_LINE if live == 1 else BY_PIECES)
     stack.above[node] += 1
     split(stack, deed, line)
@@ -157,16 +152,6 @@ def _largest(stack: Nodes, node: int) -> tuple[int, int, float]:
         if size > largest:
             largest, chosen, several = size, i, live
     return chosen, several, largest
-
-
-@loop("numpy")
-def _middle_piece(stack: Nodes, node: int, i: int, live: int) -> int:
-    """Return the number of a piece with half of a finger's pieces before it."""
-    seen, place = 0, 0
-    while 2 * (seen + 1) <= live:
-        seen += stack.counts[node, i, place] > 0
-        place += 1
-    return place
 
 
 @loop("numpy")
@@ -468,19 +453,15 @@ def _descended(
     now: int,
 ) -> tuple[float, int]:  # fmt: skip
     """Descend from the pool's best twist for contacts at points; learn what is better."""
-    (k, least), pieces, demand = first, search.pieces, search.demand
-    y = search.pool.twists[k].copy()
-    found = descend(pieces, demand, points, on, len(points), y, steps, search.spare)
-    return (found, _learned(search, node, y, now)) if found < least else (least, -1)
-
-
-@loop("numpy")
-def _learned(search: Search, node: int, y: Array, now: int) -> int:
-    """Learn a twist, and return its place in the pool."""
-    place = learn(search.pool, search.pieces, search.demand, y, now)
+    (k, least), pieces, demand, pool = first, search.pieces, search.demand, search.pool
+    y = pool.twists[k].copy()
+    found = descend(pieces, demand, points, on, y, steps, search.spare)
+    if not found < least:
+        return least, -1
+    place = learn(pool, pieces, demand, y, now)
     for i in range(FINGERS):
         look(search, node, i, place, place + 1)
-    return place
+    return found, place
 
 
 @loop("numpy")

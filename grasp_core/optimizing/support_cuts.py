@@ -157,10 +157,11 @@ class CutTree(Declared):
     @property
     def bound(self) -> float:
         """Return the multiple, or the quality [N], that no contacts exceed."""
-        return self.threshold + self._slack.raised
+        return self.threshold + self.slack.raised
 
     @property
-    def _slack(self) -> Slack:
+    def slack(self) -> Slack:
+        """Return what the bound, and the answers to twists, leave for rounding."""
         return Slack.of(self.friction, len(self.maps), self.measure)
 
     def verify(self) -> bool:
@@ -195,7 +196,7 @@ class CutTree(Declared):
         kernel, grounds = compiled(REPLAY), self.grounds
         nodes = first_nodes(grounds, self.maps, self.owners)
         # (4), or the threshold itself
-        answers = self.threshold * self.measure.demands(self.twists) - self._slack.lowered
+        answers = self.threshold * self.measure.demands(self.twists) - self.slack.lowered
         return kernel.replay(
             kernel.Pieces(grounds.normals, grounds.origins, grounds.frames, self.friction),
             *nodes, self.deeds.astype(np.int64), self.asked.astype(np.int64),
@@ -224,11 +225,9 @@ def write_proof(path: Path, proof: CutTree) -> Path:
     arrays: dict[str, Any] = {name: getattr(proof.grounds, name) for name in OF_GROUNDS}
     arrays |= {name: getattr(proof, name) for name in OF_TREE}
     arrays |= {name: arrays[name].astype(kind) for name, kind in SMALL.items()}
-    if proof.measure.is_usual:
-        arrays |= {"schema": USUAL}
-    else:
+    arrays |= {"format": FORMAT, "bound": proof.bound, "schema": USUAL}
+    if not proof.measure.is_usual:
         arrays |= {"schema": OTHER, "measure": proof.measure.name, "loads": proof.measure.loads}
-    arrays |= {"format": FORMAT, "bound": proof.bound}
     stream = io.BytesIO()
     np.savez_compressed(stream, allow_pickle=False, **arrays)
     return write_parts(path, [stream.getvalue()])

@@ -16,8 +16,7 @@ from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
 from grasp_core.optimizing.replay_kernel import Pieces, outline
 
-SLOPES = 6
-"""Numbers that say how a contact of a piece answers a twist, see `slopes`."""
+SLOPES = 6  # numbers that say how a contact of a piece answers a twist, see `slopes`
 CROSSING_STEPS = 4
 """Steps, from both sides, towards the point in which an edge leaves the part that answers."""
 
@@ -128,14 +127,11 @@ def area(corners: Array, count: int) -> float:
 
 
 TWIST = 6
-OVER = 1.0 + 4e-16
-"""Factor that makes rounded unit twists at least one long."""
-SETTLING = 5
-"""Steps without progress after which a descent aims less far."""
+OVER = 1.0 + 4e-16  # factor that makes rounded unit twists at least one long
+SETTLING = 5  # steps without progress after which a descent aims less far
 FIRST_AIM, LAST_AIM = 0.2, 0.004
 """Share of the value that a step aims below the best one, at first and before a descent ends."""
-USUAL, WEIGHT, TASK = 0, 1, 2
-"""Kinds of demands."""
+USUAL, WEIGHT, TASK = 0, 1, 2  # kinds of demands
 SMALL_DEMAND = 1e-2
 """Demand below which descents take this one, and twists with negative support are compared by it.
 """
@@ -152,13 +148,11 @@ class Demand(NamedTuple):
 class Pool(NamedTuple):
     """Twists to ask, with what they ask of each piece."""
 
-    twists: Array
-    """Twists at least one long, with torques over the object's radius, (c, 6)."""
+    twists: Array  # twists at least one long, with torques over the object's radius, (c, 6)
     demands: Array  # how much of the loads each asks for, (c,)
     asked: Array  # the `slopes` of each piece under each twist, (p, 6, c)
     used: Indices  # when each was used last, (c,)
-    names: Indices
-    """Their places among the twists that a tree names, -1 for none, (c,)."""
+    names: Indices  # their places among the twists that a tree names, -1 for none, (c,)
     size: Indices  # how many there are, (1,)
 
 
@@ -227,10 +221,10 @@ def multiple(support: float, asked: float) -> float:
 
 
 @loop("numpy")
-def highest(pieces: Pieces, points: Array, on: Indices, m: int, y: Array, slope: Array) -> float:
+def highest(pieces: Pieces, points: Array, on: Indices, y: Array, slope: Array) -> float:
     """Return the largest support of contacts at points in a direction; fill in its wrench, (6,)."""
     best, first = -np.inf, 0
-    for i in range(m):
+    for i in range(len(points)):
         _, along, across = _velocity(pieces.normals[on[i]], points[i], y)
         found = along + pieces.friction * across
         if found > best:
@@ -261,9 +255,8 @@ def _velocity(n: Array, x: Array, y: Array) -> tuple[tuple[float, float, float],
 
 @loop("numpy")
 def descend(
-    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, steps: int,
-    spare: float,
-) -> float:  # fmt: skip
+    pieces: Pieces, demand: Demand, points: Array, on: Indices, y: Array, steps: int, spare: float
+) -> float:
     """Move a unit twist to where contacts resist less; return the least multiple that one allows.
 
     For other measures than the usual one supports are taken to be larger by `spare` in the end.
@@ -274,7 +267,7 @@ def descend(
     at, best, slope, hardest = y.copy(), np.inf, np.empty(TWIST), np.empty(TWIST)
     aim, idle = FIRST_AIM, 0
     for _ in range(steps):
-        found = _steepest(pieces, demand, points, on, m, at, slope, hardest)
+        found = _steepest(pieces, demand, points, on, at, slope, hardest)
         if found < best:
             idle = 0 if found < best - 0.25 * aim * abs(best) else idle + 1
             best = found
@@ -286,7 +279,7 @@ def descend(
             at[:] = y
             if aim < LAST_AIM:
                 break
-            found = _steepest(pieces, demand, points, on, m, at, slope, hardest)
+            found = _steepest(pieces, demand, points, on, at, slope, hardest)
         along, square = 0.0, 0.0
         for j in range(TWIST):
             along += slope[j] * at[j]
@@ -305,17 +298,17 @@ def descend(
             at[j] /= length
     if demand.kind == USUAL:
         return best
-    found = highest(pieces, points, on, m, y, slope)
+    found = highest(pieces, points, on, y, slope)
     return multiple(found + spare, demanded(demand, y, hardest))
 
 
 @loop("numpy")
 def _steepest(
-    pieces: Pieces, demand: Demand, points: Array, on: Indices, m: int, y: Array, slope: Array,
+    pieces: Pieces, demand: Demand, points: Array, on: Indices, y: Array, slope: Array,
     hardest: Array,
 ) -> float:  # fmt: skip
     """Return the multiple that a twist allows, asked for a little at least; fill in its slope."""
-    found = highest(pieces, points, on, m, y, slope)
+    found = highest(pieces, points, on, y, slope)
     if demand.kind == USUAL:
         return found
     asked = demanded(demand, y, hardest)

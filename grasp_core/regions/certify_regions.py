@@ -1,10 +1,9 @@
 """Finds independent regions for the fingers of a grasp, polygons on its faces, with a proof.
 
 Contacts may be anywhere in their own regions, wherever the others are, and the grasp stays in force
-closure. The search begins with the largest equal discs for which this is proved (`largest_discs`),
-around the contacts or around better centres (`centers`). Then polygons grow around the discs, as
-far as the same proof allows (`growth`). Every proof is checked by `CertifiedRegions.verify` before
-it is returned.
+closure. The search begins with the largest equal discs for which this is proved, around the
+contacts or around better centres. Then polygons grow around the discs, as far as the same proof
+allows (`growth`). Every proof is checked by `CertifiedRegions.verify` before it is returned.
 
 On patches of curved surfaces a contact may be as far off the plane as the surface is. The plane's
 normals are used there, and the friction angle is reduced by the angle between surface and plane.
@@ -32,8 +31,14 @@ from grasp_core.kinds import Friction, MaxCones, Reserve, number, value_of
 from grasp_core.objects.face_pieces import FacePiece, inscribed_radius, piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.regions.growth import better_centers, larger_inside, shared_out
-from grasp_core.regions.largest_discs import Grounds, Proved, largest_discs
+from grasp_core.regions.growth import (
+    Grounds,
+    Proved,
+    better_centers,
+    larger_inside,
+    largest_discs,
+    shared_out,
+)
 from grasp_core.regions.proof import PLACED, CertifiedRegions
 from grasp_core.solvers.ties import coarse, first_best, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
@@ -108,8 +113,7 @@ def certify_regions(
         proved = larger_inside(grounds, moved, proved)
     if proved is None:
         return None
-    discs = grounds.discs(proved.ys, proved.radius)
-    polygons = shared_out(grounds, proved.ys, discs, proved.cover)
+    polygons = shared_out(grounds, proved)
     if min(map(len, polygons)) < 3:  # noqa: PLR2004 - not polygons
         return None
     found = _placed(grounds, proved, polygons, unit)

@@ -22,7 +22,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.regions.largest_discs import AHEAD, Sites
+from grasp_core.regions.growth import AHEAD, Sites
 from grasp_core.regions.proof import LEAF, TWIST
 
 MOTIONS = 6

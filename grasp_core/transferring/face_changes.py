@@ -49,7 +49,7 @@ from grasp_core.kinds import FaceTurn, Vector, number, value_of
 from grasp_core.objects.on_faces import ON_FACE, nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
-from grasp_core.planning.given_contacts import Nearest, facets_of, fan, nearest_like
+from grasp_core.planning.given_contacts import fan
 from grasp_core.transferring.settings import Carrying
 
 SHARE_OF_SIZE = 0.05
@@ -66,10 +66,8 @@ digits stay within it."""
 TURNED = 1e-4
 """Least angle that counts as turned [rad]: six digits turn a face by no more unless it is narrower
 than a hundredth of the part."""
-RESHAPED = 1e-5
-"""Least change of a face's area that counts, relative to its area."""
-MOST_NAMED = 12
-"""Largest number of faces that one line names."""
+RESHAPED = 1e-5  # least change of a face's area that counts, relative to its area
+MOST_NAMED = 12  # largest number of faces that one line names
 MM = 1e3
 
 
@@ -77,12 +75,9 @@ MM = 1e3
 class Likeness:
     """How near, and how little turned, a face must be to take the place of another one."""
 
-    distance: float
-    """Largest distance by which a contact may move [m]."""
-    angle: float
-    """Largest angle between the two normals [rad]."""
-    same: float
-    """Difference of distances that is rounding [m]."""
+    distance: float  # largest distance by which a contact may move [m]
+    angle: float  # largest angle between the two normals [rad]
+    same: float  # difference of distances that is rounding [m]
 
     @property
     def reach(self) -> float:
@@ -100,14 +95,6 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
         math.radians(value_of(FaceTurn, angle_deg, "angle_deg")),
         SAME * old.radius,
     )
-
-
-def place_of(
-    new: Polyhedron, point: Array, normal: Array, rule: Likeness, reach: float
-) -> Nearest | None:
-    """Find the nearest point on a like face of a changed part, within reach; None if none is."""
-    lean = rule.angle + SAME
-    return nearest_like(facets_of(new), point, normal, lean=lean, reach=reach, margin=rule.same)
 
 
 @dataclass(frozen=True, slots=True)

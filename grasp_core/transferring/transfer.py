@@ -51,7 +51,7 @@ from grasp_core.objects.face_pieces import piece_of
 from grasp_core.objects.on_faces import check_on_faces, check_planar
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
 from grasp_core.objects.shells import SMALL
-from grasp_core.planning.given_contacts import Seated, grasp_of
+from grasp_core.planning.given_contacts import Seated, facets_of, grasp_of, nearest_like
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
@@ -63,7 +63,6 @@ from grasp_core.transferring.face_changes import (
     changes_in_words,
     face_changes,
     likeness,
-    place_of,
     turn_of,
 )
 from grasp_core.values import FINGERS, Contact, Grasp, Witness, four
@@ -77,8 +76,7 @@ FRICTION_BAND = 0.05
 """Difference of critical frictions that does not count, as a share of the friction."""
 QUALITY_BAND = 0.05
 """Difference of qualities that does not count, as a share of the old quality."""
-DRAWS = 8
-"""How often internal forces are drawn that may make the lines of a witness skew."""
+DRAWS = 8  # how often internal forces are drawn that may make the lines of a witness skew
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,8 +263,7 @@ class _Judge:
     friction: float
     rule: Likeness
     finger: Finger | None
-    taken: set[str] = field(default_factory=set[str])
-    """Ids of the grasps that were carried over."""
+    taken: set[str] = field(default_factory=set[str])  # ids of the grasps that were carried over
 
     def carried(self, grasp: Grasp) -> CarriedGrasp:
         """Carry a grasp over and judge it on both parts."""
@@ -301,15 +298,16 @@ class _Judge:
         return next(name for name in chain([wanted], later) if name not in self.taken)
 
     def _contact(self, finger: int, face: int, contact: Contact) -> CarriedContact:
-        at, normal = contact.position, contact.normal
-        place = place_of(self.new, at, normal, self.rule, self.rule.reach)
-        near = place or place_of(self.new, at, normal, self.rule, math.inf)
+        rule, normal = self.rule, contact.normal
+        near = nearest_like(
+            facets_of(self.new), contact.position, normal, lean=rule.angle + SAME, reach=math.inf,
+            margin=rule.same,
+        )  # fmt: skip
         if near is None:
             return CarriedContact(finger, face, None, None, math.inf, 0.0)
-        turn = turn_of(normal, near.contact.normal)
-        if place is None:
-            return CarriedContact(finger, face, None, None, near.distance, turn)
-        return CarriedContact(finger, face, place.face, place.contact, place.distance, turn)
+        turn, placed = turn_of(normal, near.contact.normal), near.distance <= rule.reach
+        new_face, place = (near.face, near.contact) if placed else (None, None)
+        return CarriedContact(finger, face, new_face, place, near.distance, turn)
 
     def _lost(self, lost: CarriedContact) -> str:
         near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"

@@ -28,8 +28,7 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
-from grasp_core.hands.hand_arrays import hand_arrays
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import hand_arrays, places
 from grasp_core.hands.reach import HandReach, with_balls
 from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron

@@ -14,9 +14,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.hands.collisions import overlapping_pairs
-from grasp_core.hands.couplings import Coupling
-from grasp_core.hands.hand import PALM, Hand, HandFinger, Joint, Link, LinkShape
-from grasp_core.hands.kinematics import rotation_about
+from grasp_core.hands.hand import PALM, Coupling, Hand, HandFinger, Joint, Link, LinkShape
+from grasp_core.hands.hand_arrays import rotation_about
 from scenes.hand_files.fingers import Chains, chains, followers, joint_name, tip_of
 from scenes.hand_files.model import HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text, note

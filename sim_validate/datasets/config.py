@@ -115,7 +115,7 @@ class Learning(Settings):
 
 
 def _joints_of(hand: str) -> int:
-    from grasp_core.hands.named_hands import load_hand  # slow, and no flag needs it
+    from grasp_core.hands.hand import load_hand  # slow, and no flag needs it
 
     return len(load_hand(hand).joints)
 

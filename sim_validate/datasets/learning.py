@@ -36,7 +36,7 @@ from grasp_core.errors import (
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
 from grasp_core.geometry.polygons import plane_frame
-from grasp_core.hands.named_hands import load_hand
+from grasp_core.hands.hand import load_hand
 from grasp_core.hands.reach import reach_with
 from grasp_core.kinds import LARGEST_FRICTION
 from grasp_core.objects.on_faces import within

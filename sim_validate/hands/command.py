@@ -18,10 +18,8 @@ from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
 from grasp_core.files.records import RecordFile, record_of
-from grasp_core.hands.couplings import Coupling
-from grasp_core.hands.hand import Hand
+from grasp_core.hands.hand import HANDS, Coupling, Hand
 from grasp_core.hands.hand_motors import hand_payload
-from grasp_core.hands.named_hands import HANDS
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan

@@ -39,8 +39,8 @@ from grasp_core.files.records import Key, from_record, keys, record_of
 from grasp_core.files.text_files import read_bytes, write_parts, write_text
 from grasp_core.hands.collisions import tip_gaps
 from grasp_core.hands.hand import PALM, Hand
+from grasp_core.hands.hand_arrays import places, tip_jacobians
 from grasp_core.hands.hand_motors import chains, hand_motors
-from grasp_core.hands.kinematics import places, tip_jacobians
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
 from grasp_core.kinds import Friction, Many, Quantity, instance, number, path_of, value_of
 from grasp_core.objects.on_faces import check_body, face_under
@@ -474,11 +474,11 @@ def _touched(
     hand: Hand, body: Polyhedron, joints: Array, palm: Array, touch_m: float
 ) -> tuple[list[int], tuple[Contact, ...]]:
     """Find the fingers that touch, and where."""
-    found = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
-    fingers, contacts = np.flatnonzero(np.abs(found.gaps) <= touch_m).tolist(), list[Contact]()
+    gaps, on_tips, on_object = tip_gaps(hand, body, joints, palm, np.arange(len(hand.fingers)))
+    fingers, contacts = np.flatnonzero(np.abs(gaps) <= touch_m).tolist(), list[Contact]()
     for finger in fingers:
-        point = found.on_object[finger]
-        way = point - found.on_tips[finger]
+        point = on_object[finger]
+        way = point - on_tips[finger]
         away = Contact(point, way / float(np.linalg.norm(way)))
         face = face_under(body, away)
         contacts.append(away if face is None else Contact(point, np.array(face.normal)))

@@ -68,7 +68,7 @@ def _clearance() -> None:
 
 def _hand_checks() -> None:
     from grasp_core.hands.collisions import clearances
-    from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.hand import load_hand
     from grasp_core.hands.pose_search import postures
 
     hand, body = load_hand("allegro"), example_object("tetrahedron")
@@ -77,14 +77,14 @@ def _hand_checks() -> None:
 
 
 def _hand_posing() -> None:
-    from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.hand import load_hand
     from grasp_core.hands.pose_search import compile_posing
 
     compile_posing(load_hand("allegro"), example_object("tetrahedron"))
 
 
 def _hand_reach() -> None:
-    from grasp_core.hands.named_hands import load_hand
+    from grasp_core.hands.hand import load_hand
     from grasp_core.hands.reach import reach_with
 
     body = example_object("tetrahedron")

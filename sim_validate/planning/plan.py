@@ -99,8 +99,8 @@ def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
 def _improve(
     body: Polyhedron, planning: command_flags.Planning, grasp: Grasp
 ) -> tuple[Grasp, Moved]:
+    from grasp_core.optimizing.best_grasp import quality_ceiling
     from grasp_core.optimizing.better_contacts import optimize_contacts
-    from grasp_core.optimizing.ceiling import quality_ceiling
 
     found = optimize_contacts(
         body, grasp, planning.friction, finger_radius=planning.finger_radius_m, seed=planning.seed

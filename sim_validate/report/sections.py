@@ -11,7 +11,7 @@ import numpy as np
 from grasp_core.declared import counted
 from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
-from grasp_core.hands.named_hands import HANDS
+from grasp_core.hands.hand import HANDS
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
 from scenes.drawing.pages import number

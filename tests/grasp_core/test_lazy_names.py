@@ -55,7 +55,7 @@ def test_a_wrong_name_is_an_attribute_error(package):
 
 def test_modules_of_a_package_are_imported_as_ever():
     code = "from grasp_core import plan; from grasp_core.solvers import lp; "
-    code += "import grasp_core.optimizing.ceiling as qc; "
+    code += "import grasp_core.optimizing.best_grasp as qc; "
     code += "import grasp_core as gc; print(lp.__name__, gc.quality_ceiling is qc.quality_ceiling)"
     answer = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False

@@ -9,7 +9,7 @@ from typing import get_args, get_origin
 import pytest
 
 import grasp_core as gc
-from grasp_core.hands.named_hands import HANDS
+from grasp_core.hands.hand import HANDS
 from grasp_core.kinds import takes
 from scenes.settings import PhysicsSettings
 from sim_validate.datasets.config import HandName

@@ -8,7 +8,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link, LinkShape
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import places
 from grasp_core.objects.polyhedron import Polyhedron
 
 FRICTION = 0.5

@@ -9,7 +9,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
-from grasp_core.hands.couplings import Coupling
+from grasp_core.hands.hand import Coupling
 from tests.grasp_core.hands.gripping import (
     FRICTION,
     grasps,

@@ -10,8 +10,7 @@ import scenes
 from grasp_core.compiled import compiled
 from grasp_core.hands.collisions import FAR, surface_tree
 from grasp_core.hands.collisions import KERNEL as HANDS
-from grasp_core.hands.hand_arrays import hand_arrays
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import hand_arrays, places
 from tests.judges import random_rotation
 
 KERNEL = "grasp_core.hands.distances_kernel"

@@ -5,8 +5,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.execution.grips import Grip
+from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.hand_motors import chains
-from grasp_core.hands.kinematics import places
 from grasp_core.hands.reach import stance_of
 from tests.sim_validate.hands.executing import standing
 from tests.tampering.changes import forged

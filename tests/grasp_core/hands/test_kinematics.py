@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.hands.kinematics import places, tip_jacobians
+from grasp_core.hands.hand_arrays import places, tip_jacobians
 from tests.grasp_core.hands.gripping import plain_hand
 
 HANDS = ["allegro", "leap"]

@@ -11,8 +11,8 @@ import trimesh
 import grasp_core as gc
 from grasp_core.hands.collisions import FAR, clearances, tip_distances, tip_gaps
 from grasp_core.hands.hand import Hand, HandFinger
-from grasp_core.hands.kinematics import places
-from grasp_core.hands.pose_search import TOUCHING, starts
+from grasp_core.hands.hand_arrays import places
+from grasp_core.hands.pose_search import TOUCHING, Asked, starts
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
 from tests.hand_models import hand_mjcf, numbers
 
@@ -264,18 +264,18 @@ def test_a_block_that_is_moved_into_the_object_is_said_to_be_deep_in_it():
         if not each.reached:
             continue
         seen += 1
-        at = tip_gaps(hand, body, each.joints, each.palm_pose, each.fingers)
-        assert at.gaps == pytest.approx(np.zeros(4), abs=TOUCHING)
-        assert at.on_object == pytest.approx(np.array([c.position for c in each.contacts]))
+        gaps, _, touched = tip_gaps(hand, body, each.joints, each.palm_pose, each.fingers)
+        assert gaps == pytest.approx(np.zeros(4), abs=TOUCHING)
+        assert touched == pytest.approx(np.array([c.position for c in each.contacts]))
         for k, contact in enumerate(each.contacts):
             pose = each.palm_pose.copy()
             pose[:3, 3] += 1e-3 * contact.normal
-            inside = tip_gaps(hand, body, each.joints, pose, each.fingers)
+            inside, _, _ = tip_gaps(hand, body, each.joints, pose, each.fingers)
             # a corner beside an edge is less deep below the other face
-            assert -1e-3 - 2.0 * TOUCHING <= inside.gaps[k] <= -4e-4
+            assert -1e-3 - 2.0 * TOUCHING <= inside[k] <= -4e-4
             moved = clearances(hand, body, each.joints, pose, each.fingers)
             assert moved.tips < -5e-5
-            off = tip_distances(hand, each.joints, each.palm_pose, each.fingers, at.on_object)
+            off = tip_distances(hand, each.joints, each.palm_pose, each.fingers, touched)
             assert off == pytest.approx(np.zeros(4), abs=TOUCHING)
     assert seen >= 3
 
@@ -321,10 +321,11 @@ def test_a_search_starts_alike_where_contacts_differ_by_rounding(name):
     hand, rng = gc.load_hand(name), np.random.default_rng(0)
     for grasp in grasps("dodecahedron", 0.035):
         moved = grasp.positions * (1.0 + 1e-15 * rng.standard_normal((4, 3)))
-        ways = [starts(hand, points, grasp.normals, seed=0, count=20)
-                for points in (grasp.positions, moved)]  # fmt: skip
-        for one, other in zip(*ways, strict=True):
-            for part in ("fingers", "joints", "rotation", "position"):
+        asked = Asked(hand, None, grasp, 0.5, None, -np.inf, 0.0, True, 0, 20)
+        ways = [starts(asked, points, grasp.normals) for points in (grasp.positions, moved)]
+        for (fingers, one), (same, other) in zip(*ways, strict=True):
+            np.testing.assert_array_equal(fingers, same)
+            for part in ("q", "palm", "origin"):
                 np.testing.assert_array_equal(getattr(one, part), getattr(other, part))
-            np.testing.assert_allclose(one.rotation @ one.rotation.T, np.eye(3), atol=1e-15)
-            assert np.linalg.det(one.rotation) > 0.0
+            np.testing.assert_allclose(one.palm @ one.palm.T, np.eye(3), atol=1e-15)
+            assert np.linalg.det(one.palm) > 0.0

@@ -73,7 +73,7 @@ def test_twists_that_ask_for_nothing_leave_room_for_rounding():
         proof, deeds=np.zeros(1, int), asked=np.zeros(1, int), twists=at[None], maps=np.eye(3)[None]
     )
     assert not ask.verify()
-    answers = ask.threshold * ask.measure.demands(ask.twists) - ask._slack.lowered
+    answers = ask.threshold * ask.measure.demands(ask.twists) - ask.slack.lowered
     assert answers == pytest.approx([-(1.0 + FRICTION) * ROUNDING], rel=1e-12)
     assert ask.bound == ask.threshold
 

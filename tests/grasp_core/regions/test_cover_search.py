@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-import grasp_core.regions.largest_discs as search
+import grasp_core.regions.growth as search
 from grasp_core.closure.contacts import contact_frames
-from grasp_core.regions.largest_discs import Sites
+from grasp_core.regions.growth import Sites
 from grasp_core.regions.proof import SLACK
 from tests.judges import TETRA_NORMALS, random_rotation
 

@@ -13,16 +13,15 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.objects.face_pieces import inset_piece, unit_pieces
+from grasp_core.optimizing import best_grasp
 from grasp_core.optimizing import better_contacts as best_contacts
-from grasp_core.optimizing import ceiling as quality_ceilings
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.planning.given_contacts import seat
 from grasp_core.quality import wrench_limits
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.records.contacts_json import ContactSet
-from grasp_core.regions.growth import larger_inside
-from grasp_core.regions.largest_discs import Grounds, Proved, Sites, search_cover
+from grasp_core.regions.growth import Grounds, Proved, Sites, larger_inside, search_cover
 from scenes.example_objects import example_object
 from sim_validate.planning import analyze as analysis
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
@@ -92,18 +91,17 @@ def test_covers_of_symmetric_contacts_share_all_bits(corners):
 def test_a_climb_does_not_depend_on_last_digits(name):
     """From contacts of the grasp, which is symmetric on these objects."""
     body, grasp = planned(name, "concurrent")
-    pieces = pieces_under(body, grasp)
-    rooms = [inset_piece(piece, 0.05) for piece in pieces]
+    rooms = tuple(inset_piece(piece, 0.05) for piece in pieces_under(body, grasp))
     points = (grasp.positions - body.center_of_mass) / body.radius
-    y = np.array([p.frame.T @ (at - p.origin) for p, at in zip(pieces, points, strict=True)])
-    faces = ContactFaces(pieces, tuple(room.b for room in rooms), 0.5)
+    y = np.array([p.frame.T @ (at - p.origin) for p, at in zip(rooms, points, strict=True)])
+    faces = ContactFaces(rooms, 0.5)
     rng = np.random.default_rng(2)
     starts = [0.9 * y, 0.5 * y]
     for start in starts:
-        end, quality = faces.climbed(start)
+        end, quality = faces.climb(start)
         assert np.abs(end - start).max() > 1e-3
         for _ in range(2):
-            again, found = faces.climbed(shaken(rng, start))
+            again, found = faces.climb(shaken(rng, start))
             np.testing.assert_allclose(again, end, atol=SAME)
             assert found.lower == pytest.approx(quality.lower, rel=SAME)
 
@@ -128,7 +126,7 @@ def test_contacts_are_moved_only_where_they_are_proved_to_be_better(monkeypatch)
 def test_a_ceiling_does_not_depend_on_last_digits(monkeypatch):
     """Corners of the faces shaken, on a cube, where many parts are alike."""
     body, grasp = planned("box", "concurrent")
-    exact, rng = quality_ceilings.grounds_on, np.random.default_rng(3)
+    exact, rng = best_grasp.grounds_on, np.random.default_rng(3)
 
     def ceiling():
         return gc.quality_ceiling(body, grasp.faces, 0.5, gap=0.3, parts=6_000)
@@ -139,7 +137,7 @@ def test_a_ceiling_does_not_depend_on_last_digits(monkeypatch):
         return replace(grounds, corners=corners), places
 
     own = ceiling()
-    monkeypatch.setattr(quality_ceilings, "grounds_on", shaken_grounds)
+    monkeypatch.setattr(best_grasp, "grounds_on", shaken_grounds)
     for _ in range(TRIALS):
         assert ceiling().upper == pytest.approx(own.upper, rel=SAME)
 

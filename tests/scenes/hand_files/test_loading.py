@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
-from grasp_core.hands.kinematics import places, tip_jacobians
+from grasp_core.hands.hand_arrays import places, tip_jacobians
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.hand_models import hand_mjcf
 from tests.scenes.hand_files.grippers import gripper, written

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import places
 from tests.scenes.hand_files.grippers import gripper, loaded
 from tests.scenes.meshes import box_obj
 

@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import places
 from scenes.mujoco.hand_scenes import squeezing
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 

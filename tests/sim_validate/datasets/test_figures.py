@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import stacked
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import places
 from grasp_core.objects.on_faces import nearest_on_triangles
 from sim_validate.datasets.verify import verify
 from tests.sim_validate.datasets.configs import BODIES, rows_of

@@ -9,7 +9,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.errors import InputError
-from grasp_core.hands.kinematics import places
+from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.reach import stance_of
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.hands.dexgraspbench import (
