@@ -33,6 +33,7 @@ from sim_validate.datasets.config import (
     quoted,
 )
 from sim_validate.datasets.open_dataset import (
+    CONFIG,
     MANIFEST,
     QUARANTINE,
     LeftOut,
@@ -66,7 +67,6 @@ TWIN = "the same object as"
 """First words of the reason why an object with the same mesh as another has no rows."""
 CONTACTS = "contacts.json"
 """Name of the file with the given contacts, if there are any; its normals point into the object."""
-CONFIG = "config.toml"
 EXTRAS = ("meshes", "scenes")
 """Folders of the files that units make besides their rows."""
 OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)

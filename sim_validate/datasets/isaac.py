@@ -27,8 +27,8 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.layout import arrange
 from scenes.settings import FingerSettings
-from sim_validate.datasets.config import SHORT, Name, SplitName, quoted
-from sim_validate.datasets.open_dataset import Selection, mesh_path, select, stored_body
+from sim_validate.datasets.config import CREDITS, SHORT, Name, SplitName, quoted
+from sim_validate.datasets.open_dataset import Dataset, mesh_path, select
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow
 from sim_validate.kit.files import whole_folder
@@ -78,8 +78,8 @@ def export(
     return Exported(files, rows)
 
 
-def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) -> dict[Name, int]:
-    facts, total = chosen.facts(), chosen.counts()["objects"]
+def _write(chosen: Dataset, folder: Path, report: Callable[[int, int], None]) -> dict[Name, int]:
+    facts, total = _facts(chosen), chosen.manifest.count("objects", chosen.split)
     objects = grasps = 0
     for object_id, body, rows in _grasped_objects(chosen):
         of_object = sorted(rows, key=lambda row: row.friction)
@@ -93,10 +93,9 @@ def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) 
     return {"objects": objects, "grasps": grasps}
 
 
-def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[GraspRow]]]:
+def _grasped_objects(chosen: Dataset) -> Iterator[tuple[str, Polyhedron, list[GraspRow]]]:
     """Yield the id of each object that has grasps, the object, and their rows."""
     names = {row.object_id: row.source_name for row in chosen.rows(ObjectRow)}
-    faces = chosen.config().faces
     planned = (row for row in chosen.rows(GraspRow, force_closed=True) if row.label in GRASPS)
     for object_id, rows in groupby(planned, key=lambda row: row.object_id):
         if object_id not in names:
@@ -104,7 +103,20 @@ def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[
                 f"{chosen.folder}: the object {object_id} has grasps, but its row is missing in "
                 "the table of objects; see `graspproof dataset verify`"
             )
-        yield object_id, stored_body(chosen.folder, object_id, names[object_id], faces), list(rows)
+        yield object_id, chosen.body(object_id, names[object_id]), list(rows)
+
+
+def _facts(chosen: Dataset) -> dict[str, str]:
+    """Versions and settings that made the dataset, and statements on its origin, by name."""
+    config, manifest = chosen.config, chosen.manifest
+    stated = {name: str(getattr(config, name)) for name in CREDITS}
+    return {
+        **{name: text for name, text in stated.items() if text},
+        "split": chosen.split or "all",
+        "schema": str(manifest.SCHEMA),
+        "config_sha256": manifest.config_sha256,
+        **{f"version_{name}": text for name, text in sorted(manifest.versions.items())},
+    }
 
 
 def _new_path(folder: Path, name: str) -> Path:

@@ -17,6 +17,8 @@ from grasp_core.declared import Declared, rules, types
 from grasp_core.errors import InputError
 from grasp_core.files.records import FLAT
 from grasp_core.kinds import Family, Friction, Number, Range, Seed
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets.columns import (
@@ -28,7 +30,7 @@ from sim_validate.datasets.columns import (
     cells_of,
     columns_of,
 )
-from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName
+from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName, id_beginning
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 
@@ -293,6 +295,11 @@ class GraspRow(Declared):
         """The contacts that are there."""
         return tuple(map(Contact, self.points, self.normals))
 
+    def held_on(self, body: Polyhedron) -> Polyhedron:
+        """Return the object; on curved surfaces contacts not planned have faces of their own."""
+        other = self.label in (GIVEN, VARIED)
+        return seat(body, self.points, self.normals).body if other else body
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TrialRow(Declared):
@@ -351,6 +358,16 @@ class Rows:
     def of(self, name: Name) -> tuple[Row, ...]:
         """Return the rows of a table."""
         return getattr(self, name)
+
+    def of_unit(self, row: ObjectRow, friction: float) -> "Rows":
+        """Return the rows of one object at one friction."""
+        beginning = id_beginning(row.object_id, friction)
+        return Rows(
+            tuple(each for each in self.objects if each.object_id == row.object_id),
+            tuple(each for each in self.grasps if each.grasp_id.startswith(beginning)),
+            tuple(each for each in self.trials if each.grasp_id.startswith(beginning)),
+            tuple(each for each in self.executions if each.grasp_id.startswith(beginning)),
+        )
 
     def cells(self, name: Name, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
         """Return the cells of the rows of a table."""

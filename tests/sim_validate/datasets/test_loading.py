@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim_validate
-from sim_validate.datasets.open_dataset import by_object, select
+from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.parquet import parquet_bytes, read_columns, read_table
 from sim_validate.datasets.rows import TABLES
 
@@ -121,10 +121,11 @@ def test_graspproof_loads_it_as_the_card_says(beside):
 @pytest.mark.parametrize("split", SPLITS)
 def test_every_row_is_met_once_with_its_object(folder, split):
     chosen = select(folder, split)
-    groups = list(by_object(chosen))
-    assert len(groups) == chosen.counts()["objects"]
+    groups = list(chosen.by_object())
+    assert len(groups) == chosen.manifest.count("objects", split)
     for name in TABLES:
-        assert sum(len(group.of(name)) for group in groups) == chosen.counts()[name] > 0
+        count = chosen.manifest.count(name, split)
+        assert sum(len(group.of(name)) for group in groups) == count > 0
     for group in groups:
         (owner,) = group.objects
         assert {row.object_id for row in group.grasps} == {owner.object_id}

@@ -62,7 +62,7 @@ def leaning(rows):
             "must be unit vectors",
         ),
         ("grasps", lambda rows: rows[0].update(held=not rows[0]["held"]), "held is"),
-        ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "object is missing"),
+        ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "in object_id, has no row"),
         ("grasps", lambda rows: rows[0].update(force_closed=False), "force_closed is"),
         (
             "grasps",
@@ -79,7 +79,7 @@ def leaning(rows):
         ("grasps", leaning, "not with its normals"),
         ("grasps", lambda rows: rows[0].update(split="validation"), "rows of another split"),
         ("trials", lambda rows: rows.pop(), "table of trials"),
-        ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody has no row"),
+        ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody, named in grasp_id"),
         ("trials", lambda rows: rows[0].update(outcome="slipped"), "table of trials"),
     ],
 )
