@@ -22,6 +22,7 @@ from grasp_core.figures import Figure, figures, meanings, unit_of
 from grasp_core.files.records import entries, from_record, keys, record_of
 from grasp_core.kinds import OrInfinity
 from grasp_core.values import FINGERS
+from sim_validate.datasets.config import Name
 
 CellKind: TypeAlias = Literal["text", "bool", "int", "float"]
 Cells: TypeAlias = Mapping[str, Any]
@@ -71,6 +72,8 @@ class Column:
     """Shape of each cell; () for a plain value."""
 
 
+Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
+"""The tables of a dataset, with their columns."""
 Form: TypeAlias = tuple[CellKind, tuple[int, ...]]
 """Type and shape of a column's cells."""
 

@@ -34,7 +34,7 @@ from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from sim_validate.closure.replaying import Recorded, Wanted
-from sim_validate.datasets.columns import RowOf, row_of
+from sim_validate.datasets.columns import RowOf, Tables, row_of
 from sim_validate.datasets.config import (
     KEYS,
     SHORT,
@@ -50,7 +50,6 @@ from sim_validate.datasets.rows import (
     GraspRow,
     ObjectRow,
     Rows,
-    Tables,
     TrialRow,
     dataset_tables,
     groups_asked,

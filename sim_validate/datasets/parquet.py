@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import shown
-from sim_validate.datasets.columns import CellKind, Cells, Column
+from sim_validate.datasets.columns import CellKind, Cells, Column, Tables
 from sim_validate.datasets.config import KEYS, Name
-from sim_validate.datasets.rows import TABLES, Tables
 
 Columns: TypeAlias = dict[str, NDArray[Any]]
 TYPES: Mapping[CellKind, str] = {
@@ -63,14 +62,11 @@ def pyarrow_parquet() -> Any:
     return importlib.import_module("pyarrow.parquet")
 
 
-def parquet_bytes(
-    name: Name, rows: Sequence[Cells], about: Mapping[str, str], tables: Tables = TABLES
-) -> bytes:
+def parquet_bytes(name: Name, rows: Sequence[Cells], tables: Tables) -> bytes:
     """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
     arrow, held = pyarrow(), io.BytesIO()
-    schema = schema_of(tables[name]).with_metadata(dict(sorted(about.items())))
     try:
-        table = arrow.Table.from_pylist(list(rows), schema=schema)
+        table = arrow.Table.from_pylist(list(rows), schema=schema_of(tables[name]))
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
     pyarrow_parquet().write_table(_in_order(table, name), held, **PAGES)
@@ -88,7 +84,7 @@ def _in_order(table: Any, name: Name) -> Any:
     return table.sort_by([(key, "ascending") for key in keys])
 
 
-def each_batch(path: Path, name: Name, tables: Tables = TABLES) -> Iterator[Any]:
+def each_batch(path: Path, name: Name, tables: Tables) -> Iterator[Any]:
     """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
     with _opened(path, name, tables) as file:
         yield from file.iter_batches(GROUP_ROWS)
@@ -141,7 +137,7 @@ def _check_size(path: Path, claimed: Any) -> None:
         )
 
 
-def read_columns(paths: Sequence[Path], name: Name, tables: Tables = TABLES) -> Columns:
+def read_columns(paths: Sequence[Path], name: Name, tables: Tables) -> Columns:
     """Read the columns of a table's files, one after another, as arrays (rows, ..).
 
     Null is NaN in columns of floats, and -1 in columns of whole numbers. Text is an object, with

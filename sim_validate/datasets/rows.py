@@ -26,6 +26,7 @@ from sim_validate.datasets.columns import (
     Column,
     FiguresOf,
     Known,
+    Tables,
     Within,
     cells_of,
     columns_of,
@@ -343,7 +344,6 @@ ROWS: Mapping[Name, type[Any]] = {
     "objects": ObjectRow, "grasps": GraspRow, "trials": TrialRow, "executions": ExecutionRow,
 }  # fmt: skip
 """The class of each table's rows."""
-Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,7 +100,7 @@ class Staging:
         """Keep the rows and files of a finished unit."""
         kinds = dataset_tables(unit.config.groups)
         tables = {
-            _file(name): parquet_bytes(name, made.rows.cells(name, columns), {}, kinds)
+            _file(name): parquet_bytes(name, made.rows.cells(name, columns), kinds)
             for name, columns in kinds.items()
         }
         others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}

@@ -65,7 +65,7 @@ def _table(data: bytes) -> Any:
     with tempfile.NamedTemporaryFile(dir=MEMORY if MEMORY.is_dir() else None) as file:
         file.write(data)
         file.flush()
-        return read_columns([Path(file.name)], "objects")
+        return read_columns([Path(file.name)], "objects", TABLES)
 
 
 def _same_table(data: bytes, found: Any) -> None:
@@ -79,5 +79,5 @@ def _same_table(data: bytes, found: Any) -> None:
 TARGETS = (
     Target("proof", lambda data: regions_of(arrays_of(data, SHAPES)), lambda: [npz(**_proof())],
            _same_proof, "npz"),
-    Target("table", _table, lambda: [parquet_bytes("objects", _rows(), {})], _same_table),
+    Target("table", _table, lambda: [parquet_bytes("objects", _rows(), TABLES)], _same_table),
 )  # fmt: skip

@@ -21,7 +21,7 @@ def forged(folder, name, change):
         break
     else:
         raise LookupError(f"no row of {name} is as the change wants it")
-    data = parquet_bytes(name, rows, {}, read_manifest(folder).tables)
+    data = parquet_bytes(name, rows, read_manifest(folder).tables)
     path.write_bytes(data)
     manifest, name = read_manifest(folder), path.relative_to(folder).as_posix()
     others = [each for each in manifest.files if each.path != name]

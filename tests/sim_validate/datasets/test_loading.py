@@ -74,8 +74,8 @@ def test_truth_values_are_bool_or_floats_that_refuse_to_be_negated(beside, tmp_p
     (path,) = sorted(Path(beside).glob("data/grasps/train-*.parquet"))
     rows = read_table(path, "grasps", TABLES).to_pylist()
     unknown = tmp_path / "grasps.parquet"
-    unknown.write_bytes(parquet_bytes("grasps", [rows[0] | {"held": None}, *rows[1:]], {}))
-    found = read_columns([unknown], "grasps")["held"]
+    unknown.write_bytes(parquet_bytes("grasps", [rows[0] | {"held": None}, *rows[1:]], TABLES))
+    found = read_columns([unknown], "grasps", TABLES)["held"]
     assert found.dtype == np.float64
     assert np.isnan(found).sum() == 1
     assert (found == True).sum() + (found == False).sum() == len(rows) - 1  # noqa: E712
