@@ -6,7 +6,7 @@ baseline; faces are called by their numbers on the planned part, of which ids ar
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +19,6 @@ from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
 from grasp_core.transferring.face_changes import (
-    FaceChange,
     added_faces,
     changes_in_words,
     face_changes,
@@ -38,21 +37,7 @@ from sim_validate.baselines.baseline import Baseline, RecordedPart
 
 TABLE = "changed_part"
 CARRY = IfChanged()
-
-
-@dataclass(frozen=True, slots=True)
-class Moves:
-    """How the faces of a part moved between two of its shapes."""
-
-    faces: tuple[FaceChange, ...] = ()
-    """What became of each face of the earlier shape; none if both shapes are the same."""
-    added: tuple[int, ...] = ()
-    """Faces of the later shape that succeed no earlier one."""
-    numbers: Mapping[int, int] | None = None
-    """Numbers on the planned part of the earlier shape's faces; None if that is the planned part.
-    """
-    since: str = ""
-    """Since when, such as ` since its baseline was written`; empty for planning."""
+NONE_MOVED = "no face moved"
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,9 +129,9 @@ class Present:
     asked: IfChanged = CARRY
     recorded_unit: str | None = None
     """Unit of the mesh file when the baseline was written; None if that is not known."""
-    since: Moves | None = None
-    """How faces moved since the baseline was written on a changed part; None where they are
-    compared with those of the planned part."""
+    since: str | None = None
+    """How faces moved since the baseline was written on a changed part, empty if they did not; None
+    where they are compared with those of the planned part."""
 
     @property
     def planned(self) -> Polyhedron:
@@ -174,12 +159,18 @@ class Present:
     @property
     def change(self) -> str:
         """Say which faces moved and by how much; empty where the part is as it was."""
-        moves = self.moves
-        if self.source.file is None or not (moves.faces or self.rescaled):
+        if self.source.file is None or not (self.faces_moved or self.rescaled):
             return ""
-        words = changes_in_words(moves.faces, moves.added, moves.numbers) if moves.faces else ""
-        said = [self.rescaled, words or "no face moved"]
-        return f"{self.source.file} has changed{moves.since}: {'; '.join(filter(None, said))}"
+        said = "; ".join(filter(None, [self.rescaled, self.faces_moved or NONE_MOVED]))
+        when = " since its baseline was written" if self.since else ""
+        return f"{self.source.file} has changed{when}: {said}"
+
+    @property
+    def faces_moved(self) -> str:
+        """Say which faces moved, since the baseline where it tells, or else since planning."""
+        if self.since is not None or self.carried is None:
+            return self.since or ""
+        return changes_in_words(self.carried.faces, self.carried.added) or NONE_MOVED
 
     @property
     def rescaled(self) -> str:
@@ -212,13 +203,6 @@ class Present:
         if unit is None:
             unit, scale = fitting_lengths(file, self.planned, RECORDED)
         return unit, None if scale == 1.0 else scale
-
-    @property
-    def moves(self) -> Moves:
-        """Return how faces moved, since the baseline where it tells, or else since planning."""
-        if self.since is not None:
-            return self.since
-        return Moves() if self.carried is None else Moves(self.carried.faces, self.carried.added)
 
     @property
     def note(self) -> str:
@@ -263,7 +247,7 @@ class Present:
         if part is None or part.planned_sha256 != planned.content_sha256:
             return found
         if now.content_sha256 == before.object.content_sha256:
-            return replace(found, since=Moves())
+            return replace(found, since="")
         if self.source.file is None or self.asked.refuse:
             return found
         rule = likeness(planned, self.asked.distance_m, self.asked.angle_deg)
@@ -274,8 +258,8 @@ class Present:
             if change.new is not None
         }
         faces = face_changes(then, now, rule)
-        since = Moves(faces, added_faces(faces, now), numbers, " since its baseline was written")
-        return replace(found, since=since)
+        words = changes_in_words(faces, added_faces(faces, now), numbers)
+        return replace(found, since=words or NONE_MOVED)
 
 
 def present(

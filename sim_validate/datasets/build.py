@@ -23,6 +23,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.provenance import arithmetic
 from scenes.drawing.pages import filled
+from sim_validate.datasets.columns import joined, pyarrow, write_files
 from sim_validate.datasets.config import (
     KEYS,
     REFERENCES,
@@ -44,7 +45,6 @@ from sim_validate.datasets.open_dataset import (
     read_manifest,
     write_manifest,
 )
-from sim_validate.datasets.parquet import joined, pyarrow, write_files
 from sim_validate.datasets.rows import ROWS, dataset_tables
 from sim_validate.datasets.units import WorkUnit, given_text, provenance, units_of, units_sha256
 from sim_validate.datasets.workers import Engine, Staging, UnitRecord, drive

@@ -34,7 +34,7 @@ from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from sim_validate.closure.replaying import Recorded, Wanted
-from sim_validate.datasets.columns import RowOf, Tables, row_of
+from sim_validate.datasets.columns import Columns, RowOf, Tables, each_batch, read_columns, row_of
 from sim_validate.datasets.config import (
     KEYS,
     SHORT,
@@ -44,7 +44,6 @@ from sim_validate.datasets.config import (
     SplitName,
     config_from_toml,
 )
-from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.datasets.rows import (
     ROWS,
     GraspRow,

@@ -16,7 +16,6 @@ complete, and a resumed build repeats only the units that were under way.
 """
 
 import errno
-import hashlib
 import os
 import re
 import shutil
@@ -28,26 +27,24 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.records import RecordFile
-from grasp_core.files.text_files import read_bytes
 from grasp_core.kinds import FieldError, shown
+from grasp_core.processes import Processes
+from sim_validate.datasets.columns import parquet_bytes
 from sim_validate.datasets.config import Name, SplitName
-from sim_validate.datasets.parquet import parquet_bytes
+from sim_validate.datasets.open_dataset import Listed, listed
 from sim_validate.datasets.rows import dataset_tables
 from sim_validate.datasets.units import Made, WorkerError, WorkUnit, body_of, made_of, provenance
-from sim_validate.kit.files import path_inside
-from sim_validate.kit.processes import check_interrupted
+from sim_validate.kit.processes import Cluster, check_interrupted
 
 HASH = re.compile(r"[0-9a-f]{64}")
 OTHERS = "others"
 """Subfolder for those files of a unit that are not tables."""
 UNFINISHED = "."
 """First character of the names of temporary folders."""
-MOST_BYTES = 2**31
-"""Largest size of one file of a unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +52,12 @@ class UnitRecord(RecordFile):
     """Record of a finished unit of work: where its rows belong, or why it has none."""
 
     FILE = "unit.json"
-    SCHEMA = 1
+    SCHEMA = 2
 
     object: str
     friction: float
-    files: Mapping[str, str]
-    """SHA-256 of each file, by its path in the unit's folder."""
+    files: tuple[Listed, ...]
+    """Files of the unit's folder."""
     object_id: str | None = None
     """Hash of the object's mesh, in whose table its row is; None if there are no rows."""
     split: SplitName | None = None
@@ -118,10 +115,7 @@ class Staging:
     def done(self, unit: WorkUnit) -> bool:
         """Tell whether a unit is finished or quarantined, and all its files are as written."""
         try:
-            return all(
-                _sha256(read_bytes(path_inside(self._of(unit), name), MOST_BYTES)) == sha256
-                for name, sha256 in self.record(unit).files.items()
-            )
+            return not any(each.fault(self._of(unit)) for each in self.record(unit).files)
         except (OSError, InputError):
             return False
 
@@ -145,17 +139,11 @@ class Staging:
         return self.folder / unit.id
 
     def _put(self, unit: WorkUnit, files: Mapping[str, bytes], **more: Any) -> None:
-        hashes = {name: _sha256(data) for name, data in files.items()}
-        record = UnitRecord(unit.object, unit.friction, hashes, **more)
         made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
         try:
-            for name, data in {**files, record.FILE: record.text().encode()}.items():
-                path = made / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                with path.open("wb") as stream:
-                    stream.write(data)
-                    stream.flush()
-                    os.fsync(stream.fileno())
+            written = tuple(listed(made, _kept(made / name, data)) for name, data in files.items())
+            record = UnitRecord(unit.object, unit.friction, written, **more)
+            _kept(made / record.FILE, record.text().encode())
             made.rename(self._of(unit))
         except OSError:
             shutil.rmtree(made, ignore_errors=True)
@@ -167,10 +155,18 @@ def _file(name: Name) -> str:
     return f"{name}.parquet"
 
 
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+def _kept(path: Path, data: bytes) -> Path:
+    """Write a file so that it outlasts a loss of power."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+    return path
 
 
+Engine: TypeAlias = Processes | Cluster
+"""What computes units of work: processes of this machine, or a Ray or Dask cluster."""
 AHEAD = 3
 """Number of units submitted per worker process, so that no worker waits for the next unit."""
 LOOK_S = 1.0
@@ -225,29 +221,11 @@ def do_task(task: Task) -> None:
             f"{task.staging.folder}: a worker process cannot see this folder; --out must be on a "
             "file system that all processes share"
         )
-    if task.timeout_s is None:
-        task.work(task.unit, task.staging)
-        return
-    signal.setitimer(signal.ITIMER_REAL, task.timeout_s)
+    signal.setitimer(signal.ITIMER_REAL, task.timeout_s or 0.0)  # none for zero
     try:
         task.work(task.unit, task.staging)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-
-
-class Engine(Protocol):
-    """What computes units of work: processes of this machine, or a Ray or Dask cluster."""
-
-    workers: int
-
-    @property
-    def ended(self) -> tuple[str, ...]:
-        """Names of the errors which say that a worker process died while it computed."""
-        ...
-
-    def submit(self, function: Callable[[Task], None], task: Task, /) -> "Future[None]":
-        """Start a task on a worker process."""
-        ...
 
 
 def drive(

@@ -203,7 +203,7 @@ def _same_manifest(data: bytes, found: Manifest) -> None:
 
 LEFT_OUT = {"object": "a.obj", "source_sha256": HASH, "friction": 0.5, "given": ["given-000001"],
             "reason": "no solid"}  # fmt: skip
-UNIT = UnitRecord("a.obj", 0.5, {"grasps.parquet": HASH}, HASH, "train")
+UNIT = UnitRecord("a.obj", 0.5, (Listed("grasps.parquet", 9, HASH),), HASH, "train")
 
 
 def _same_lines(data: bytes, found: Any) -> None:

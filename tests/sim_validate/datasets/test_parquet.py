@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.datasets import parquet
-from sim_validate.datasets.columns import Column
+from sim_validate.datasets import columns as parquet
+from sim_validate.datasets.columns import Column, each_batch, parquet_bytes, read_table
 from sim_validate.datasets.config import KEYS, DatasetConfig
-from sim_validate.datasets.parquet import each_batch, parquet_bytes, read_table
 from sim_validate.datasets.rows import TABLES
 from sim_validate.datasets.units import body_of, made_of, split_of, units_of
 
