@@ -25,13 +25,7 @@ from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.cones.spanning import span_angle
-from grasp_core.errors import (
-    GraspError,
-    InputError,
-    NoForcesError,
-    SolverError,
-    UndecidedError,
-)
+from grasp_core.errors import GraspError, InputError, NoForcesError, SolverError, UndecidedError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
 from grasp_core.geometry.polygons import plane_frame
@@ -43,12 +37,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
-from sim_validate.closure.controls import (
-    LEAST_FRICTION,
-    Control,
-    negative_controls,
-    try_control,
-)
+from sim_validate.closure.controls import LEAST_FRICTION, Control, negative_controls, try_control
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import Cells, figures_in

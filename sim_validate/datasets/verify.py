@@ -41,13 +41,7 @@ from grasp_core.provenance import arithmetic
 from grasp_core.values import FINGERS
 from sim_validate.datasets.build import CONTACTS, TWIN
 from sim_validate.datasets.columns import Cells, agrees, pyarrow
-from sim_validate.datasets.config import (
-    KEYS,
-    NAMES,
-    REFERENCES,
-    SPLITS,
-    Name,
-)
+from sim_validate.datasets.config import KEYS, NAMES, REFERENCES, SPLITS, Name
 from sim_validate.datasets.learning import RATIOS, contact_cells, hand_named, ratio_of, trial_cells
 from sim_validate.datasets.open_dataset import (
     CONFIG,
