@@ -230,12 +230,10 @@ class Present:
 
     def only(self, *names: str) -> "Present":
         """Return only the grasps with these ids, of those that the file has."""
-        if self.carried is None:
-            chosen = tuple(grasp for grasp in self.saved.grasps if grasp.id in names)
-            return replace(self, saved=replace(self.saved, grasps=chosen))
+        chosen = tuple(grasp for grasp in self.saved.grasps if grasp.id in names)
         kept = tuple(each for each in self._moved if each.old.id in names)
-        carried = replace(self.carried, grasps=kept)
-        return replace(self, saved=_tested(self.saved, carried), carried=carried)
+        carried = self.carried and replace(self.carried, grasps=kept)
+        return replace(self, saved=replace(self.saved, grasps=chosen), carried=carried)
 
     def against(self, before: Baseline) -> "Present":
         """Measure how faces moved from where they were when a baseline was written.
@@ -287,7 +285,10 @@ def present(
             "file back; if this is another object's file, name the right one with `object`"
         )
     unit, carried = _carried(saved, path, source.file, asked)
-    return Present(_tested(saved, carried), source, carried, unit, asked)
+    grasps = tuple(
+        replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
+    )
+    return Present(replace(saved, body=carried.new, grasps=grasps), source, carried, unit, asked)
 
 
 def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
@@ -308,13 +309,6 @@ def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str
             f"{file}: this is not the mesh that {path} was planned on, and its grasps cannot be "
             f"carried over: {said}"
         ) from error
-
-
-def _tested(saved: Plan, carried: Transfer) -> Plan:
-    grasps = tuple(
-        replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
-    )
-    return replace(saved, body=carried.new, grasps=grasps)
 
 
 def testable(now: Present, limit: int | None) -> Plan:

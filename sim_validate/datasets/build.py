@@ -103,7 +103,7 @@ def build(
             staging.remove()
             return _as_built(folder, units)
         write_text(folder / CONFIG, config_to_toml(config))
-        staging.clear_unfinished()
+        staging.folder.mkdir(exist_ok=True)
         left = [unit for unit in units if not staging.done(unit)]
         for unit in left:
             staging.forget(unit)

@@ -11,8 +11,8 @@ could differ. A timer of the system ends a process in which a unit takes too lon
 call that never comes back.
 
 Finished units are kept in a staging folder: one subfolder per unit, renamed in one step. A unit
-that was killed leaves only a temporary folder, which the next run removes. So every subfolder is
-complete, and a resumed build repeats only the units that were under way.
+that was killed leaves only a temporary folder, which is removed when it is computed again. So every
+subfolder is complete, and a resumed build repeats only the units that were under way.
 """
 
 import errno
@@ -20,7 +20,6 @@ import os
 import re
 import shutil
 import signal
-import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -38,13 +37,12 @@ from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.open_dataset import Listed, listed
 from sim_validate.datasets.rows import dataset_tables
 from sim_validate.datasets.units import Made, WorkerError, WorkUnit, body_of, made_of, provenance
+from sim_validate.kit.files import whole_folder
 from sim_validate.kit.processes import Cluster, check_interrupted
 
 HASH = re.compile(r"[0-9a-f]{64}")
 OTHERS = "others"
 """Subfolder for those files of a unit that are not tables."""
-UNFINISHED = "."
-"""First character of the names of temporary folders."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +78,6 @@ class Staging:
     """The folder that holds finished units of work until the dataset is complete."""
 
     folder: Path
-
-    def clear_unfinished(self) -> None:
-        """Remove what killed units left; this is safe only when no unit is under way."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        for path in self.folder.iterdir():
-            if path.name.startswith(UNFINISHED):
-                # a worker process of a killed build may still write here
-                shutil.rmtree(path, ignore_errors=True)
 
     def remove(self) -> None:
         """Remove the whole staging folder, once a finished dataset holds its contents."""
@@ -139,14 +129,12 @@ class Staging:
         return self.folder / unit.id
 
     def _put(self, unit: WorkUnit, files: Mapping[str, bytes], **more: Any) -> None:
-        made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
         try:
-            written = tuple(listed(made, _kept(made / name, data)) for name, data in files.items())
-            record = UnitRecord(unit.object, unit.friction, written, **more)
-            _kept(made / record.FILE, record.text().encode())
-            made.rename(self._of(unit))
-        except OSError:
-            shutil.rmtree(made, ignore_errors=True)
+            with whole_folder(self._of(unit)) as made:
+                kept = tuple(listed(made, _kept(made / name, data)) for name, data in files.items())
+                record = UnitRecord(unit.object, unit.friction, kept, **more)
+                _kept(made / record.FILE, record.text().encode())
+        except (OSError, InputError):
             if not self.done(unit):  # otherwise another attempt was faster and wrote the same rows
                 raise
 

@@ -97,8 +97,8 @@ def test_what_a_killed_worker_left_is_removed_and_damaged_units_are_done_again(d
     engine = Here(die)
     with pytest.raises(KilledError):
         build(CONFIG, folder, engine, silent)
-    (folder / "staging" / ".halfway").mkdir()
     shard = next((folder / "staging").glob("*/trials.parquet"))
+    (folder / "staging" / f".{shard.parent.name}.unfinished-0").mkdir()
     shard.write_bytes(shard.read_bytes()[:-8])
     again = Here()
     build(CONFIG, folder, again, silent)
