@@ -30,7 +30,7 @@ from grasp_core.declared import rules, types
 from grasp_core.errors import InputError
 from grasp_core.figures import Figure, figures, meanings, unit_of
 from grasp_core.files.json_text import shown
-from grasp_core.files.records import entries, from_record, keys, record_of
+from grasp_core.files.records import entries, from_record, record_of
 from grasp_core.kinds import OrInfinity
 from grasp_core.values import FINGERS
 from sim_validate.datasets.config import KEYS, Name
@@ -53,10 +53,16 @@ class FiguresOf:
     """The mark of a mapping of figures by name: each figure of a class is a column."""
 
     kind: type
+    told: tuple[str, ...]
+    """Figures that other columns tell."""
     beginning: str = ""
     """First letters of the names of these columns."""
-    told: tuple[str, ...] = ()
-    """Figures that other columns tell."""
+
+    @property
+    def columns(self) -> Mapping[str, Figure]:
+        """The figures that cells can hold, by the names of their columns."""
+        new = (each for each in figures(self.kind) if each.name not in self.told)
+        return {f"{self.beginning}{each.name}": each for each in new if _form(each.kind, {})}
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,26 +162,13 @@ def _form_of_items(parts: tuple[Any, ...]) -> Form | None:
 
 @cache
 def _figures(kind: type) -> Mapping[str, Mapping[str, Figure]]:
-    """Return the figures that mappings of a row class hold: by field, then by name of the column.
-
-    Where the row itself has a field of a figure's name, that field is the column.
-    """
-    own = entries(kind).fields
-    names = {name for each in own for name in _names(each.key, each.flat)}
-    found: dict[str, Mapping[str, Figure]] = {}
-    for each in own:
-        for mark in (rule for rule in rules(each.kind) if isinstance(rule, FiguresOf)):
-            found[each.name] = {
-                f"{mark.beginning}{figure.name}": figure
-                for figure in figures(mark.kind)
-                if figure.name not in mark.told and figure.name not in names
-                and _form(figure.kind, {}) is not None
-            }  # fmt: skip
-    return found
-
-
-def _names(key: str, flat: type | None) -> tuple[str, ...]:
-    return (key,) if flat is None else keys(flat)
+    """Return the figures that mappings of a row class hold: by field, then by column."""
+    return {
+        each.name: mark.columns
+        for each in entries(kind).fields
+        for mark in rules(each.kind)
+        if isinstance(mark, FiguresOf)
+    }
 
 
 def figures_in(kind: type, holder: str, record: object | None) -> Cells:

@@ -20,7 +20,7 @@ from grasp_core.kinds import Family, Friction, Number, Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
-from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import (
     Asked,
     Column,
@@ -51,6 +51,8 @@ CLAIMS = (
     "simulated_first_slip", "executed_trials", "execution_mismatches",
 )  # fmt: skip
 """Cells that only executed grasps have."""
+TOLD = ("load_multiple", "payload_kg", "predicted_first_slip", "simulated_first_slip")
+"""Figures of executions that have columns of their own."""
 Row: TypeAlias = Declared
 ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
 """A vector for each finger, (k, 3); tables have four, null after the last."""
@@ -149,8 +151,7 @@ class GraspRow(Declared):
     mismatches: Number = 0
     """Number of contradictions between simulation and analysis."""
     verdict: Annotated[
-        Mapping[str, Any],
-        FiguresOf(Verdict, told=("id", "predicted_critical_friction")),
+        Mapping[str, Any], FiguresOf(Verdict, ("id", "outcome", "predicted_critical_friction"))
     ] = field(default_factory=dict[str, Any])
     """Figures of the verdict; null for controls."""
 
@@ -178,7 +179,7 @@ class GraspRow(Declared):
     execution_mismatches: Annotated[int | None, Asked(EXECUTED)] = None
     """Number of the execution's own negative controls that did not slip, but must."""
     execution: Annotated[
-        Mapping[str, Any], FiguresOf(Execution, beginning="execution_"), Asked(EXECUTED)
+        Mapping[str, Any], FiguresOf(Execution, TOLD, "execution_"), Asked(EXECUTED)
     ] = field(default_factory=dict[str, Any])
     """Figures of the execution."""
 
@@ -321,10 +322,6 @@ class TrialRow(Declared):
     hold: Annotated[HoldVerdict, FLAT]
     simulated_limit: Known
     """Multiple of the wrench that slips in simulation."""
-    verdict: Annotated[Mapping[str, Any], FiguresOf(WrenchVerdict)] = field(
-        default_factory=dict[str, Any]
-    )
-    """Other figures of the trial; null for controls."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

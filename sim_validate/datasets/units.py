@@ -467,5 +467,4 @@ def _trial_row(grasp_id: str, number: int, tried: WrenchVerdict | ControlTrial) 
         required_friction=tried.required_friction,
         hold=tried.hold,
         simulated_limit=planned and planned.simulated_limit,
-        verdict=figures_in(TrialRow, "verdict", planned),
     )
