@@ -20,7 +20,7 @@ from sim_validate.datasets.config import (
 )
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import splits_in_words
-from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.verify import verify
 from sim_validate.datasets.workers import Engine
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
@@ -75,8 +75,7 @@ def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
 
 def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
     """Check a dataset and list its faults."""
-    sample = Sample(command.share, command.seed) if command.share > 0.0 else None
-    faults = verify(command.dataset, sample)
+    faults = verify(command.dataset, command.share, command.seed)
     for fault in faults[:TABLE_ROWS]:
         reporter.warn(fault)
     say_cut(len(faults), reporter)

@@ -53,7 +53,6 @@ CLAIMS = (
 """Cells that only executed grasps have."""
 TOLD = ("load_multiple", "payload_kg", "predicted_first_slip", "simulated_first_slip")
 """Figures of executions that have columns of their own."""
-Row: TypeAlias = Declared
 ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
 """A vector for each finger, (k, 3); tables have four, null after the last."""
 Lengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
@@ -352,7 +351,7 @@ class Rows:
     trials: tuple[TrialRow, ...] = ()
     executions: tuple[ExecutionRow, ...] = ()
 
-    def of(self, name: Name) -> tuple[Row, ...]:
+    def of(self, name: Name) -> tuple[Any, ...]:
         """Return the rows of a table."""
         return getattr(self, name)
 
@@ -360,7 +359,7 @@ class Rows:
         """Return the rows of one object at one friction."""
         beginning = id_beginning(row.object_id, friction)
         return Rows(
-            tuple(each for each in self.objects if each.object_id == row.object_id),
+            (row,),
             tuple(each for each in self.grasps if each.grasp_id.startswith(beginning)),
             tuple(each for each in self.trials if each.grasp_id.startswith(beginning)),
             tuple(each for each in self.executions if each.grasp_id.startswith(beginning)),

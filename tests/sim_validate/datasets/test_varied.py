@@ -17,7 +17,7 @@ from sim_validate.datasets.config import (
 )
 from sim_validate.datasets.learning import RATIOS, execution_cells, region_exit, variants
 from sim_validate.datasets.units import Making, units_of
-from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.verify import verify
 from sim_validate.engine.setup import Agenda
 from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of
 from tests.sim_validate.datasets.forging import forged
@@ -99,7 +99,7 @@ def test_natural_negatives_are_closed_and_lose_their_object(by_id):
 
 
 def test_a_whole_dataset_has_no_fault_and_comes_out_the_same_again(learned):
-    assert verify(learned, Sample(1.0)) == []
+    assert verify(learned, 1.0) == []
 
 
 @pytest.mark.parametrize(
