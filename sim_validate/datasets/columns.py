@@ -249,17 +249,13 @@ FILE_ROWS = 500_000
 def pyarrow() -> Any:
     """Import pyarrow, the library that reads and writes Parquet."""
     try:
+        importlib.import_module("pyarrow.parquet")
         return importlib.import_module("pyarrow")
     except ImportError as error:
         raise InputError(
             "datasets are Parquet files, which need pyarrow: run pip install 'graspproof[dataset]' "
             "('.[dataset]' in a checkout)"
         ) from error
-
-
-def pyarrow_parquet() -> Any:
-    """Import the part of pyarrow that reads and writes Parquet."""
-    return importlib.import_module("pyarrow.parquet")
 
 
 def parquet_bytes(name: Name, rows: Sequence[Cells], tables: Tables) -> bytes:
@@ -269,7 +265,7 @@ def parquet_bytes(name: Name, rows: Sequence[Cells], tables: Tables) -> bytes:
         table = arrow.Table.from_pylist(list(rows), schema=schema_of(tables[name]))
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
-    pyarrow_parquet().write_table(_in_order(table, name), held, **PAGES)
+    arrow.parquet.write_table(_in_order(table, name), held, **PAGES)
     return held.getvalue()
 
 
@@ -306,9 +302,9 @@ def read_table(path: Path, name: Name, tables: Tables) -> Any:
 @contextmanager
 def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
     """Open a file of one of the tables; any damage is raised as an `InputError`."""
-    arrow, parquet = pyarrow(), pyarrow_parquet()
+    arrow = pyarrow()
     try:
-        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+        with arrow.parquet.ParquetFile(path, page_checksum_verification=True) as file:
             came, wanted = file.schema_arrow, schema_of(tables[name])
             if came.names != wanted.names or came.types != wanted.types:
                 what = "column types" if came.names == wanted.names else "columns"
@@ -417,7 +413,8 @@ def _groups(parts: Iterable[Any], about: Mapping[str, str]) -> Iterator[Any]:
 def _write_file(path: Path, groups: Iterable[Any], schema: Any) -> int:
     """Write groups of rows until the file is full, and return the number of rows."""
     rows = 0
-    with path.open("wb") as stream, pyarrow_parquet().ParquetWriter(stream, schema, **PAGES) as to:
+    writer = pyarrow().parquet.ParquetWriter
+    with path.open("wb") as stream, writer(stream, schema, **PAGES) as to:
         for group in groups:
             to.write_table(group, row_group_size=group.num_rows)
             rows += group.num_rows

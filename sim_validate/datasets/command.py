@@ -29,7 +29,21 @@ from sim_validate.kit.processes import dask_workers, ray_workers
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
-    return _build(_asked(command), command.out, command.work, reporter)
+    first = Path(command.objects[0]) if command.objects else Path()
+    if first.suffix == ".toml":
+        unsaid = (PlannedContent(), Learning())
+        if len(command.objects) > 1 or (command.content, command.learning) != unsaid:
+            raise InputError(
+                f"{first} holds all settings of the dataset: give no other objects and no flags "
+                "but --out beside it"
+            )
+        config = config_from_toml(first)
+        config = replace(config, objects=_listed(config.objects))
+    else:
+        learning = None if command.learning == Learning() else command.learning
+        objects = _listed(command.objects)
+        config = extended(DatasetConfig, command.content, objects=objects, learning=learning)
+    return _build(config, command.out, command.work, reporter)
 
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
@@ -111,27 +125,6 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
         )
 
 
-def _asked(command: dataset_flags.Build) -> DatasetConfig:
-    first = Path(command.objects[0]) if command.objects else Path()
-    if first.suffix == ".toml":
-        unsaid = (PlannedContent(), Learning())
-        if len(command.objects) > 1 or (command.content, command.learning) != unsaid:
-            raise InputError(
-                f"{first} holds all settings of the dataset: give no other objects and no flags "
-                "but --out beside it"
-            )
-        config = config_from_toml(first)
-        return replace(config, objects=_listed(config.objects))
-    learning = None if command.learning == Learning() else command.learning
-    objects = _listed(command.objects)
-    return extended(DatasetConfig, command.content, objects=objects, learning=learning)
-
-
-def is_mesh(path: Path) -> bool:
-    """Tell whether a file of a folder is a mesh: its ending fits, and it is not hidden."""
-    return path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
-
-
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
     found: list[str] = []
     if not names:
@@ -143,7 +136,10 @@ def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
         if not folder.is_dir():
             found.append(name)
             continue
-        meshes = sorted(path for path in folder.iterdir() if is_mesh(path))
+        meshes = sorted(
+            path for path in folder.iterdir()
+            if path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
+        )  # fmt: skip
         if not meshes:
             raise InputError(f"{name}: this folder holds no mesh file ({', '.join(FORMATS)})")
         found += map(str, meshes)

@@ -37,11 +37,11 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
-from sim_validate.closure.controls import LEAST_FRICTION, Control, negative_controls, try_control
+from sim_validate.closure.controls import LEAST_FRICTION, negative_controls, try_control
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import Cells, figures_in
-from sim_validate.datasets.config import CONTROLS, DatasetConfig, Learning
+from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.rows import ExecutionRow, GraspRow
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute, tip_radius
@@ -350,13 +350,9 @@ def validated_with(
     body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, most: int
 ) -> Verdict:
     """Test a grasp in simulation, with no more than some synthetic negative controls."""
-    if most == CONTROLS:
-        return validate(body, grasp, friction, agenda=agenda)
     verdict = validate(body, grasp, friction, agenda=replace(agenda, controls=False))
-    found = list[Control]()
-    if most:
-        found += negative_controls(body, grasp, friction, agenda.seed)
+    found = negative_controls(body, grasp, friction, agenda.seed)
     order = draws(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
-    kept = [found[int(place)] for place in np.sort(order[:most])]
+    kept = (found[int(place)] for place in np.sort(order[:most]))
     controls = tuple(try_control(body, each, agenda, Setup()) for each in kept)
     return replace(verdict, controls=controls, agenda=agenda)

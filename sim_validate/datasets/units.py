@@ -229,27 +229,6 @@ PLANNED = "planned"
 """Kind of the grasps that were planned for their friction."""
 
 
-@dataclass(frozen=True, slots=True)
-class Made:
-    """The rows and files of one unit of work."""
-
-    rows: Rows
-    files: Mapping[str, str]
-    """Texts of the files, by their paths in the dataset's folder."""
-
-
-def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
-    """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows."""
-    making = Making(unit, body)
-    if unit.given:
-        making.judge()
-    else:
-        making.plan()
-    trials, executions = tuple(making.trials), tuple(making.executions)
-    rows = Rows((_object_row(body, unit),), tuple(making.grasps), trials, executions)
-    return Made(rows, making.files)
-
-
 def split_of(object_id: str, seed: int) -> SplitName:
     """Choose the split of an object by its hash, so that adding objects moves no other object."""
     digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
@@ -317,18 +296,35 @@ class _Tried:
         }
 
 
+def made_of(unit: WorkUnit, body: Polyhedron) -> "Making":
+    """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows."""
+    made = Making(unit, body)
+    if unit.given:
+        made.judge()
+    else:
+        made.plan()
+    return made
+
+
 class Making:
-    """The rows and files of a unit of work while they are made."""
+    """The rows and files of a unit of work, before and after they are made."""
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
         self.unit, self.body, self.config = unit, body, unit.config
         self.grasps, self.trials = list[GraspRow](), list[TrialRow]()
         self.executions = list[ExecutionRow]()
+        # texts of the files, by their paths in the dataset's folder
         self.files = {mesh_path(Path(), body.content_sha256).as_posix(): mesh_text(body)}
         self.agenda = Agenda(
             random_wrenches=self.config.random_wrenches, limits=self.config.limits,
             seed=self.config.seed,
         )  # fmt: skip
+
+    @property
+    def rows(self) -> Rows:
+        """The rows of all tables."""
+        own = _object_row(self.body, self.unit)
+        return Rows((own,), tuple(self.grasps), tuple(self.trials), tuple(self.executions))
 
     def plan(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""

@@ -36,7 +36,7 @@ from sim_validate.datasets.columns import parquet_bytes
 from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.open_dataset import Listed, listed
 from sim_validate.datasets.rows import dataset_tables
-from sim_validate.datasets.units import Made, WorkerError, WorkUnit, body_of, made_of, provenance
+from sim_validate.datasets.units import Making, WorkerError, WorkUnit, body_of, made_of, provenance
 from sim_validate.kit.files import whole_folder
 from sim_validate.kit.processes import Cluster, check_interrupted
 
@@ -83,7 +83,7 @@ class Staging:
         """Remove the whole staging folder, once a finished dataset holds its contents."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def write(self, unit: WorkUnit, made: Made) -> None:
+    def write(self, unit: WorkUnit, made: Making) -> None:
         """Keep the rows and files of a finished unit."""
         kinds = dataset_tables(unit.config.groups)
         tables = {
