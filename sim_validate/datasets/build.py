@@ -29,7 +29,6 @@ from sim_validate.datasets.config import (
     REFERENCES,
     SPLITS,
     DatasetConfig,
-    Name,
     config_to_toml,
     quoted,
 )
@@ -267,7 +266,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         split=next(iter(of_grasps), "train"),
         quoted=quoted,
         markdown=_as_markdown,
-        references=_reference,
+        references=REFERENCES,
     )
 
 
@@ -291,13 +290,6 @@ def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
             "sorted_by": " and ".join(f"`{key}`" for key in KEYS[name]),
             "columns": columns,
         }
-
-
-def _reference(table: Name, column: str) -> str:
-    """Say which row of another table a column names; empty if it names none."""
-    if (target := REFERENCES.get((table, column))) is None:
-        return ""
-    return f" Names a row of `{target[0]}` by its `{target[1]}`."
 
 
 def _as_address(text: str) -> str:

@@ -136,9 +136,7 @@ def _form(kind: Any, groups: Mapping[str, int]) -> Form | None:
         return _form(next(part for part in parts if part is not type(None)), groups)
     if origin is tuple:
         return _form_of_items(parts)
-    if origin is Literal:
-        return "text", ()
-    if isinstance(kind, type) and issubclass(kind, Enum | Path):
+    if origin is Literal or (isinstance(kind, type) and issubclass(kind, Enum)):
         return "text", ()
     plain: Mapping[Any, CellKind] = {str: "text", bool: "bool", int: "int", float: "float"}
     return (plain[kind], ()) if kind in plain else None
@@ -171,17 +169,15 @@ def _figures(kind: type) -> Mapping[str, Mapping[str, Figure]]:
     }
 
 
-def figures_in(kind: type, holder: str, record: object | None) -> Cells:
+def figures_in(kind: type, holder: str, record: object) -> Cells:
     """Return the figures of a record by column, for a field of a row class that holds them."""
-    if record is None:
-        return {}
     return {name: _plain(figure.of(record)) for name, figure in _figures(kind)[holder].items()}
 
 
 def _plain(value: Any) -> Any:
     """Return a figure as a cell: of texts how many there are, null for what is not finite."""
-    if isinstance(value, Enum | Path):
-        return str(value.value if isinstance(value, Enum) else value)
+    if isinstance(value, Enum):
+        return value.value
     if isinstance(value, tuple):
         items = cast("tuple[Any, ...]", value)
         texts = all(isinstance(item, str) for item in items)
@@ -193,7 +189,7 @@ def cells_of(row: object, columns: tuple[Column, ...]) -> dict[str, Any]:
     """Return the cells of a row; where it has fewer fingers than a column, the last are null."""
     found = record_of(row)
     for holder in _figures(type(row)):
-        found = {**found.pop(holder), **found}
+        found |= found.pop(holder)
     return {each.name: _filled(found.get(each.name), each) for each in columns}
 
 

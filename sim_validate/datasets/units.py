@@ -351,8 +351,7 @@ class Making:
                 self._judge(given, cells)
             except (InputError, UndecidedError) as error:
                 about = self._about(tuple(map(Contact, given.points, given.normals)))
-                row = GraspRow(**about, **cells, friction=self.unit.friction, note=str(error))
-                self.grasps.append(row)
+                self.grasps.append(GraspRow(**about, **cells, note=str(error)))
 
     def _judge(self, given: GivenGrasp, cells: Cells) -> None:
         """Try a given grasp; one that is not in force closure is a negative control."""
@@ -414,6 +413,7 @@ class Making:
         return {
             "object_id": self.body.content_sha256,
             "split": split_of(self.body.content_sha256, self.config.seed),
+            "friction": self.unit.friction,
             "contacts": len(contacts),
             "contact_points_m": [contact.position for contact in contacts],
             "contact_normals": [contact.normal for contact in contacts],
