@@ -72,25 +72,20 @@ def export(
         raise InputError(
             f"{out}: this folder is inside the dataset to export; give an --out outside of it"
         )
-    with whole_folder(out) as place:
-        rows = _write(chosen, place, report)
-        files = sum(1 for _ in place.iterdir())
-    return Exported(files, rows)
-
-
-def _write(chosen: Dataset, folder: Path, report: Callable[[int, int], None]) -> dict[Name, int]:
     facts, total = _facts(chosen), chosen.manifest.count("objects", chosen.split)
-    objects = grasps = 0
-    for object_id, body, rows in _grasped_objects(chosen):
-        of_object = sorted(rows, key=lambda row: row.friction)
-        for friction, same in groupby(of_object, key=lambda row: row.friction):
-            path = _new_path(folder, f"{object_id[:SHORT]}-{friction}-{body.name}")
-            lines = _lines(object_id, body, list(same), facts)
-            write_parts(path, (line.encode() for line in lines))
-        objects += 1
-        grasps += len(rows)
-        report(objects, total)
-    return {"objects": objects, "grasps": grasps}
+    files = objects = grasps = 0
+    with whole_folder(out) as place:
+        for object_id, body, rows in _grasped_objects(chosen):
+            of_object = sorted(rows, key=lambda row: row.friction)
+            for friction, same in groupby(of_object, key=lambda row: row.friction):
+                path = _new_path(place, f"{object_id[:SHORT]}-{friction}-{body.name}")
+                lines = _lines(object_id, body, list(same), facts)
+                write_parts(path, (line.encode() for line in lines))
+                files += 1
+            objects += 1
+            grasps += len(rows)
+            report(objects, total)
+    return Exported(files, {"objects": objects, "grasps": grasps})
 
 
 def _grasped_objects(chosen: Dataset) -> Iterator[tuple[str, Polyhedron, list[GraspRow]]]:

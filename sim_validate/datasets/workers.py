@@ -172,10 +172,8 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
         raise
     except GraspError as error:
         staging.quarantine(unit, str(error))
-    except MemoryError:
-        staging.quarantine(unit, "out of memory")
-    except OSError as error:
-        if error.errno != errno.ENOMEM:
+    except (MemoryError, OSError) as error:
+        if isinstance(error, OSError) and error.errno != errno.ENOMEM:
             raise
         staging.quarantine(unit, "out of memory")
     except Exception as error:  # a bug that one object triggers must not stop the others
