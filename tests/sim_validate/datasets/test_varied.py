@@ -11,10 +11,7 @@ from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import validate
 from sim_validate.datasets import learning as varied_figures
-from sim_validate.datasets.config import (
-    Learning,
-    config_from_toml,
-)
+from sim_validate.datasets.config import Learning, config_from_toml
 from sim_validate.datasets.learning import RATIOS, execution_cells, region_exit, variants
 from sim_validate.datasets.units import Making, units_of
 from sim_validate.datasets.verify import verify
