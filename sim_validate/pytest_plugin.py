@@ -3,9 +3,10 @@
 Nothing but pytest is imported until such a file, the fixtures or the marker are used.
 """
 
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pytest
 
@@ -20,11 +21,11 @@ MARKER = (
     "grasp([file], *, object=None, friction=0.5, limit=1, families, cones, seed, unit): run the "
     "test with each grasp of a grasps.json, or planned for an object, as its fixture `grasp_case`"
 )
-LINES = pytest.StashKey[list[dict[str, str]]]()
-"""What the terminal says about grasps at the end, kept for a phase of a test and the whole run."""
+NOTE, TOLD, WROTE = "mesh_note", "grasp_change", "baseline_written"
+"""Properties of tests that the terminal shows at the end: pytest carries them between processes."""
 MOST_TOLD = 40
-TRAVELS = "_graspproof"
-"""Name of the attribute that carries these lines on pytest's reports between processes."""
+Properties: TypeAlias = Sequence[tuple[str, object]]
+"""Names and values that a test has kept."""
 
 
 class UnstableError(AssertionError):
@@ -42,10 +43,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the `grasp` marker, and prepare to collect the lines about grasps from all tests."""
+    """Register the `grasp` marker."""
     config.addinivalue_line("markers", MARKER)
-    config.stash[LINES] = []
-    config.pluginmanager.register(_Collecting(config))
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
@@ -75,53 +74,38 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         pytest.fail(wrong, pytrace=False)
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(
-    item: pytest.Item,
-) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Attach the lines about grasps to pytest's report on a test."""
-    report = yield
-    if lines := item.stash.get(LINES, None):
-        setattr(report, TRAVELS, lines)
-        del item.stash[LINES]
-    return report
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """List meshes that are not the planned ones, what passed on them, and new baselines."""
+    reports = chain.from_iterable(terminalreporter.stats.values())
+    kept = [each.user_properties for each in reports if isinstance(each, pytest.TestReport)]
+    for title, texts in sections(kept):
+        terminalreporter.section(title)
+        for text in texts:
+            terminalreporter.write_line(text)
 
 
-class _Collecting:
-    def __init__(self, config: pytest.Config) -> None:
-        self._lines = config.stash[LINES]
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take the lines of one test, run here or in another process."""
-        self._lines += getattr(report, TRAVELS, [])
-
-    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """List meshes that are not the planned ones, what passed on them, and new baselines."""
-        if not self._lines:
-            return
-        for title, texts in sections(self._lines):
-            terminalreporter.section(title)
-            for text in texts:
-                terminalreporter.write_line(text)
-
-
-def sections(lines: Sequence[dict[str, str]]) -> list[tuple[str, list[str]]]:
+def sections(kept: Sequence[Properties]) -> list[tuple[str, list[str]]]:
     """Write what the terminal says at the end: titles, each with at least one line.
 
-    A grasp has a line here only if it passes and is not what it was; failures speak for themselves.
+    Takes the properties that tests have kept. A grasp has a line here only if it passes and is not
+    what it was; failures speak for themselves.
     """
-    notes = sorted({line["mesh_note"] for line in lines if line["mesh_note"]})
-    meshes = [text for note in notes for text in (note, *_told(lines, note, "  "))]
+    notes, wrote = (
+        sorted({str(value) for each in kept for name, value in each if name == wanted})
+        for wanted in (NOTE, WROTE)
+    )
+    meshes = [text for note in notes for text in (note, *_told(kept, note, "  "))]
     found = [
         ("meshes of grasps", meshes),
-        ("grasps that are better", _told(lines, "", "")),
-        ("baselines of grasps", sorted({line["wrote"] for line in lines if line["wrote"]})),
+        ("grasps that are better", _told(kept, "", "")),
+        ("baselines of grasps", wrote),
     ]
     return [(title, texts) for title, texts in found if texts]
 
 
-def _told(lines: Sequence[dict[str, str]], note: str, indent: str) -> list[str]:
-    said = sorted({line["told"] for line in lines if line["told"] and line["mesh_note"] == note})
+def _told(kept: Sequence[Properties], note: str, indent: str) -> list[str]:
+    of_note = [given for given in map(dict, kept) if given.get(NOTE, "") == note]
+    said = sorted({str(given[TOLD]) for given in of_note if TOLD in given})
     more = len(said) - MOST_TOLD
     cut = [f"and {more} more; --junitxml FILE lists all"] if more > 0 else []
     return [f"{indent}{text}" for text in (*said[:MOST_TOLD], *cut)]
@@ -185,8 +169,9 @@ class GraspItem(_SuiteItem):
         files, same = (suite.baseline, suite.grasps), finding.status is Status.SAME
         why = "" if same else explained(done, files, suite.compared)
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
-        told = "" if fails else passing(done, suite.compared)
-        _note(self, "status", finding.status.value, suite.compared.mesh, told=told)
+        _note(self, "status", finding.status.value, suite.compared.mesh)
+        if not fails and (told := passing(done, suite.compared)):
+            self.user_properties.append((TOLD, told))
         if finding.after is not None:
             self.user_properties += finding.after.properties().items()
         if fails:
@@ -201,12 +186,12 @@ class BlessItem(_SuiteItem):
         from sim_validate.baselines.check import written
 
         found, now = self.suite.bless(), self.suite.present
-        self.user_properties.append(("grasps", len(found.entries)))
+        wrote = written(self.suite.baseline, found, now)
+        self.user_properties += [("grasps", len(found.entries)), (WROTE, wrote)]
         for name in now.gone:
             _note(self, f"{name}.status", "gone", now.mesh)
-        wrote = written(self.suite.baseline, found, now)
         for entry in found.entries:
-            _note(self, f"{entry.id}.status", "blessed", now.mesh, wrote=wrote)
+            _note(self, f"{entry.id}.status", "blessed", now.mesh)
 
 
 @pytest.fixture
@@ -270,14 +255,8 @@ def _require(
         raise UnstableError(why)
 
 
-def _note(
-    item: pytest.Item, name: str, status: str, source: "Source | None" = None, *,
-    told: str = "", wrote: str = "",
-) -> None:  # fmt: skip
-    """Keep the status of a grasp as a property of its test, and what the terminal says at the end.
-
-    Takes `name` of the property, `told` of a grasp that passes, `wrote` of a new baseline.
-    """
-    note = "" if source is None else source.note
-    item.user_properties += [(name, status), *([("mesh_note", note)] if note else [])]
-    item.stash.setdefault(LINES, []).append({"told": told, "wrote": wrote, "mesh_note": note})
+def _note(item: pytest.Item, name: str, status: str, source: "Source | None" = None) -> None:
+    """Keep the status of a grasp as a property of its test, and what must be known of its mesh."""
+    item.user_properties.append((name, status))
+    if source is not None and source.note:
+        item.user_properties.append((NOTE, source.note))

@@ -3,10 +3,8 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from grasp_core.files.records import record_of
-from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import extended
 from sim_validate.baselines import flags as baseline_flags
@@ -24,7 +22,8 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     """Simulate grasps and write the results as a baseline, to compare later results with."""
     check_writable(command.out)
     saved = load_grasps(command.grasps)
-    now = _present(saved, command.grasps, command.out, command)
+    where = [command.out.parent]
+    now = present(saved, command.grasps, where, command.changed_part, command.object)
     check_noise(command.more)
     wrenches = () if command.wrenches is None else wrenches_from_file(command.wrenches)
     seed = saved.seed if command.seed is None else command.seed
@@ -48,8 +47,8 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
     saved = load_grasps(path)
-    now = _present(saved, path, command.baseline, command, before.scale)
-    now = now.against(before)
+    asked = command.changed_part.with_scale(before.scale)
+    now = present(saved, path, [command.baseline.parent], asked, command.object).against(before)
     how = before.settings
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))
@@ -64,18 +63,6 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
         reporter.say(f"wrote {command.baseline}")
         return Exit.GOOD
     return exit_code(done.findings, strict=command.strict)
-
-
-def _present(
-    saved: Plan,
-    grasps: Path,
-    baseline: Path,
-    command: baseline_flags.Record | baseline_flags.Check,
-    recorded_scale: float | None = None,
-) -> Present:
-    """Carry grasps over to their part as it is now, as the flags about changed parts ask for."""
-    asked = command.changed_part.with_scale(recorded_scale)
-    return present(saved, grasps, [baseline.parent], asked, command.object)
 
 
 def _say_mesh(now: Present, reporter: Reporter) -> None:

@@ -6,7 +6,7 @@ baseline; faces are called by their numbers on the planned part, of which ids ar
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +19,6 @@ from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RECORDED
 from grasp_core.transferring.face_changes import (
-    FaceChange,
     added_faces,
     changes_in_words,
     face_changes,
@@ -38,21 +37,7 @@ from sim_validate.baselines.baseline import Baseline, RecordedPart
 
 TABLE = "changed_part"
 CARRY = IfChanged()
-
-
-@dataclass(frozen=True, slots=True)
-class Moves:
-    """How the faces of a part moved between two of its shapes."""
-
-    faces: tuple[FaceChange, ...] = ()
-    """What became of each face of the earlier shape; none if both shapes are the same."""
-    added: tuple[int, ...] = ()
-    """Faces of the later shape that succeed no earlier one."""
-    numbers: Mapping[int, int] | None = None
-    """Numbers on the planned part of the earlier shape's faces; None if that is the planned part.
-    """
-    since: str = ""
-    """Since when, such as ` since its baseline was written`; empty for planning."""
+NONE_MOVED = "no face moved"
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,9 +129,9 @@ class Present:
     asked: IfChanged = CARRY
     recorded_unit: str | None = None
     """Unit of the mesh file when the baseline was written; None if that is not known."""
-    since: Moves | None = None
-    """How faces moved since the baseline was written on a changed part; None where they are
-    compared with those of the planned part."""
+    since: str | None = None
+    """How faces moved since the baseline was written on a changed part, empty if they did not; None
+    where they are compared with those of the planned part."""
 
     @property
     def planned(self) -> Polyhedron:
@@ -174,12 +159,18 @@ class Present:
     @property
     def change(self) -> str:
         """Say which faces moved and by how much; empty where the part is as it was."""
-        moves = self.moves
-        if self.source.file is None or not (moves.faces or self.rescaled):
+        if self.source.file is None or not (self.faces_moved or self.rescaled):
             return ""
-        words = changes_in_words(moves.faces, moves.added, moves.numbers) if moves.faces else ""
-        said = [self.rescaled, words or "no face moved"]
-        return f"{self.source.file} has changed{moves.since}: {'; '.join(filter(None, said))}"
+        said = "; ".join(filter(None, [self.rescaled, self.faces_moved or NONE_MOVED]))
+        when = " since its baseline was written" if self.since else ""
+        return f"{self.source.file} has changed{when}: {said}"
+
+    @property
+    def faces_moved(self) -> str:
+        """Say which faces moved, since the baseline where it tells, or else since planning."""
+        if self.since is not None or self.carried is None:
+            return self.since or ""
+        return changes_in_words(self.carried.faces, self.carried.added) or NONE_MOVED
 
     @property
     def rescaled(self) -> str:
@@ -214,13 +205,6 @@ class Present:
         return unit, None if scale == 1.0 else scale
 
     @property
-    def moves(self) -> Moves:
-        """Return how faces moved, since the baseline where it tells, or else since planning."""
-        if self.since is not None:
-            return self.since
-        return Moves() if self.carried is None else Moves(self.carried.faces, self.carried.added)
-
-    @property
     def note(self) -> str:
         """Say what readers must know about the mesh that is tested; empty if nothing."""
         if not self.change:
@@ -246,12 +230,10 @@ class Present:
 
     def only(self, *names: str) -> "Present":
         """Return only the grasps with these ids, of those that the file has."""
-        if self.carried is None:
-            chosen = tuple(grasp for grasp in self.saved.grasps if grasp.id in names)
-            return replace(self, saved=replace(self.saved, grasps=chosen))
+        chosen = tuple(grasp for grasp in self.saved.grasps if grasp.id in names)
         kept = tuple(each for each in self._moved if each.old.id in names)
-        carried = replace(self.carried, grasps=kept)
-        return replace(self, saved=_tested(self.saved, carried), carried=carried)
+        carried = self.carried and replace(self.carried, grasps=kept)
+        return replace(self, saved=replace(self.saved, grasps=chosen), carried=carried)
 
     def against(self, before: Baseline) -> "Present":
         """Measure how faces moved from where they were when a baseline was written.
@@ -263,7 +245,7 @@ class Present:
         if part is None or part.planned_sha256 != planned.content_sha256:
             return found
         if now.content_sha256 == before.object.content_sha256:
-            return replace(found, since=Moves())
+            return replace(found, since="")
         if self.source.file is None or self.asked.refuse:
             return found
         rule = likeness(planned, self.asked.distance_m, self.asked.angle_deg)
@@ -274,8 +256,8 @@ class Present:
             if change.new is not None
         }
         faces = face_changes(then, now, rule)
-        since = Moves(faces, added_faces(faces, now), numbers, " since its baseline was written")
-        return replace(found, since=since)
+        words = changes_in_words(faces, added_faces(faces, now), numbers)
+        return replace(found, since=words or NONE_MOVED)
 
 
 def present(
@@ -303,7 +285,10 @@ def present(
             "file back; if this is another object's file, name the right one with `object`"
         )
     unit, carried = _carried(saved, path, source.file, asked)
-    return Present(_tested(saved, carried), source, carried, unit, asked)
+    grasps = tuple(
+        replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
+    )
+    return Present(replace(saved, body=carried.new, grasps=grasps), source, carried, unit, asked)
 
 
 def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str, Transfer]:
@@ -324,13 +309,6 @@ def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str
             f"{file}: this is not the mesh that {path} was planned on, and its grasps cannot be "
             f"carried over: {said}"
         ) from error
-
-
-def _tested(saved: Plan, carried: Transfer) -> Plan:
-    grasps = tuple(
-        replace(each.grasp, id=each.old.id) for each in carried.grasps if each.grasp is not None
-    )
-    return replace(saved, body=carried.new, grasps=grasps)
 
 
 def testable(now: Present, limit: int | None) -> Plan:

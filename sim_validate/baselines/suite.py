@@ -28,15 +28,7 @@ from sim_validate.baselines.baseline import (
     read_baseline,
     write_baseline,
 )
-from sim_validate.baselines.part import (
-    CARRY,
-    TABLE,
-    IfChanged,
-    Present,
-    Source,
-    present,
-    testable,
-)
+from sim_validate.baselines.part import CARRY, TABLE, IfChanged, Present, Source, present, testable
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_file

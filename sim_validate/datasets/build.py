@@ -23,16 +23,17 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.provenance import arithmetic
 from scenes.drawing.pages import filled
+from sim_validate.datasets.columns import joined, pyarrow, write_files
 from sim_validate.datasets.config import (
     KEYS,
     REFERENCES,
     SPLITS,
     DatasetConfig,
-    Name,
     config_to_toml,
     quoted,
 )
 from sim_validate.datasets.open_dataset import (
+    CONFIG,
     MANIFEST,
     QUARANTINE,
     LeftOut,
@@ -43,7 +44,6 @@ from sim_validate.datasets.open_dataset import (
     read_manifest,
     write_manifest,
 )
-from sim_validate.datasets.parquet import joined, pyarrow, write_files
 from sim_validate.datasets.rows import ROWS, dataset_tables
 from sim_validate.datasets.units import WorkUnit, given_text, provenance, units_of, units_sha256
 from sim_validate.datasets.workers import Engine, Staging, UnitRecord, drive
@@ -66,7 +66,6 @@ TWIN = "the same object as"
 """First words of the reason why an object with the same mesh as another has no rows."""
 CONTACTS = "contacts.json"
 """Name of the file with the given contacts, if there are any; its normals point into the object."""
-CONFIG = "config.toml"
 EXTRAS = ("meshes", "scenes")
 """Folders of the files that units make besides their rows."""
 OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
@@ -103,7 +102,7 @@ def build(
             staging.remove()
             return _as_built(folder, units)
         write_text(folder / CONFIG, config_to_toml(config))
-        staging.clear_unfinished()
+        staging.folder.mkdir(exist_ok=True)
         left = [unit for unit in units if not staging.done(unit)]
         for unit in left:
             staging.forget(unit)
@@ -267,7 +266,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         split=next(iter(of_grasps), "train"),
         quoted=quoted,
         markdown=_as_markdown,
-        references=_reference,
+        references=REFERENCES,
     )
 
 
@@ -291,13 +290,6 @@ def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
             "sorted_by": " and ".join(f"`{key}`" for key in KEYS[name]),
             "columns": columns,
         }
-
-
-def _reference(table: Name, column: str) -> str:
-    """Say which row of another table a column names; empty if it names none."""
-    if (target := REFERENCES.get((table, column))) is None:
-        return ""
-    return f" Names a row of `{target[0]}` by its `{target[1]}`."
 
 
 def _as_address(text: str) -> str:

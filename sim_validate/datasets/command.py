@@ -20,7 +20,7 @@ from sim_validate.datasets.config import (
 )
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import splits_in_words
-from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.verify import verify
 from sim_validate.datasets.workers import Engine
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
@@ -29,7 +29,21 @@ from sim_validate.kit.processes import dask_workers, ray_workers
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
-    return _build(_asked(command), command.out, command.work, reporter)
+    first = Path(command.objects[0]) if command.objects else Path()
+    if first.suffix == ".toml":
+        unsaid = (PlannedContent(), Learning())
+        if len(command.objects) > 1 or (command.content, command.learning) != unsaid:
+            raise InputError(
+                f"{first} holds all settings of the dataset: give no other objects and no flags "
+                "but --out beside it"
+            )
+        config = config_from_toml(first)
+        config = replace(config, objects=_listed(config.objects))
+    else:
+        learning = None if command.learning == Learning() else command.learning
+        objects = _listed(command.objects)
+        config = extended(DatasetConfig, command.content, objects=objects, learning=learning)
+    return _build(config, command.out, command.work, reporter)
 
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
@@ -75,8 +89,7 @@ def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
 
 def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
     """Check a dataset and list its faults."""
-    sample = Sample(command.share, command.seed) if command.share > 0.0 else None
-    faults = verify(command.dataset, sample)
+    faults = verify(command.dataset, command.share, command.seed)
     for fault in faults[:TABLE_ROWS]:
         reporter.warn(fault)
     say_cut(len(faults), reporter)
@@ -112,27 +125,6 @@ def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
         )
 
 
-def _asked(command: dataset_flags.Build) -> DatasetConfig:
-    first = Path(command.objects[0]) if command.objects else Path()
-    if first.suffix == ".toml":
-        unsaid = (PlannedContent(), Learning())
-        if len(command.objects) > 1 or (command.content, command.learning) != unsaid:
-            raise InputError(
-                f"{first} holds all settings of the dataset: give no other objects and no flags "
-                "but --out beside it"
-            )
-        config = config_from_toml(first)
-        return replace(config, objects=_listed(config.objects))
-    learning = None if command.learning == Learning() else command.learning
-    objects = _listed(command.objects)
-    return extended(DatasetConfig, command.content, objects=objects, learning=learning)
-
-
-def is_mesh(path: Path) -> bool:
-    """Tell whether a file of a folder is a mesh: its ending fits, and it is not hidden."""
-    return path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
-
-
 def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
     found: list[str] = []
     if not names:
@@ -144,7 +136,10 @@ def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
         if not folder.is_dir():
             found.append(name)
             continue
-        meshes = sorted(path for path in folder.iterdir() if is_mesh(path))
+        meshes = sorted(
+            path for path in folder.iterdir()
+            if path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
+        )  # fmt: skip
         if not meshes:
             raise InputError(f"{name}: this folder holds no mesh file ({', '.join(FORMATS)})")
         found += map(str, meshes)

@@ -203,6 +203,11 @@ class DatasetConfig(PlannedContent):
             )
 
     @property
+    def asked(self) -> Learning:
+        """What the tables hold besides for learners, with nothing for None."""
+        return self.learning or Learning()
+
+    @property
     def groups(self) -> dict[str, int]:
         """Groups of columns that the tables have on request, with their sizes."""
         executed = self.execution is not None

@@ -27,9 +27,9 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.closure_scene import arrange
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.settings import FingerSettings
-from sim_validate.datasets.config import SHORT, Name, SplitName, quoted
-from sim_validate.datasets.open_dataset import Selection, mesh_path, select, stored_body
-from sim_validate.datasets.parquet import pyarrow
+from sim_validate.datasets.columns import pyarrow
+from sim_validate.datasets.config import CREDITS, SHORT, Name, SplitName, quoted
+from sim_validate.datasets.open_dataset import Dataset, mesh_path, select
 from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow
 from sim_validate.kit.files import whole_folder
 
@@ -72,31 +72,25 @@ def export(
         raise InputError(
             f"{out}: this folder is inside the dataset to export; give an --out outside of it"
         )
+    facts, total = _facts(chosen), chosen.manifest.count("objects", chosen.split)
+    files = objects = grasps = 0
     with whole_folder(out) as place:
-        rows = _write(chosen, place, report)
-        files = sum(1 for _ in place.iterdir())
-    return Exported(files, rows)
+        for object_id, body, rows in _grasped_objects(chosen):
+            of_object = sorted(rows, key=lambda row: row.friction)
+            for friction, same in groupby(of_object, key=lambda row: row.friction):
+                path = _new_path(place, f"{object_id[:SHORT]}-{friction}-{body.name}")
+                lines = _lines(object_id, body, list(same), facts)
+                write_parts(path, (line.encode() for line in lines))
+                files += 1
+            objects += 1
+            grasps += len(rows)
+            report(objects, total)
+    return Exported(files, {"objects": objects, "grasps": grasps})
 
 
-def _write(chosen: Selection, folder: Path, report: Callable[[int, int], None]) -> dict[Name, int]:
-    facts, total = chosen.facts(), chosen.counts()["objects"]
-    objects = grasps = 0
-    for object_id, body, rows in _grasped_objects(chosen):
-        of_object = sorted(rows, key=lambda row: row.friction)
-        for friction, same in groupby(of_object, key=lambda row: row.friction):
-            path = _new_path(folder, f"{object_id[:SHORT]}-{friction}-{body.name}")
-            lines = _lines(object_id, body, list(same), facts)
-            write_parts(path, (line.encode() for line in lines))
-        objects += 1
-        grasps += len(rows)
-        report(objects, total)
-    return {"objects": objects, "grasps": grasps}
-
-
-def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[GraspRow]]]:
+def _grasped_objects(chosen: Dataset) -> Iterator[tuple[str, Polyhedron, list[GraspRow]]]:
     """Yield the id of each object that has grasps, the object, and their rows."""
     names = {row.object_id: row.source_name for row in chosen.rows(ObjectRow)}
-    faces = chosen.config().faces
     planned = (row for row in chosen.rows(GraspRow, force_closed=True) if row.label in GRASPS)
     for object_id, rows in groupby(planned, key=lambda row: row.object_id):
         if object_id not in names:
@@ -104,7 +98,20 @@ def _grasped_objects(chosen: Selection) -> Iterator[tuple[str, Polyhedron, list[
                 f"{chosen.folder}: the object {object_id} has grasps, but its row is missing in "
                 "the table of objects; see `graspproof dataset verify`"
             )
-        yield object_id, stored_body(chosen.folder, object_id, names[object_id], faces), list(rows)
+        yield object_id, chosen.body(object_id, names[object_id]), list(rows)
+
+
+def _facts(chosen: Dataset) -> dict[str, str]:
+    """Versions and settings that made the dataset, and statements on its origin, by name."""
+    config, manifest = chosen.config, chosen.manifest
+    stated = {name: str(getattr(config, name)) for name in CREDITS}
+    return {
+        **{name: text for name, text in stated.items() if text},
+        "split": chosen.split or "all",
+        "schema": str(manifest.SCHEMA),
+        "config_sha256": manifest.config_sha256,
+        **{f"version_{name}": text for name, text in sorted(manifest.versions.items())},
+    }
 
 
 def _new_path(folder: Path, name: str) -> Path:

@@ -25,14 +25,7 @@ from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.cones.spanning import span_angle
-from grasp_core.errors import (
-    GraspError,
-    InputError,
-    NoForcesError,
-    SolverError,
-    UndecidedError,
-    UnfaithfulError,
-)
+from grasp_core.errors import GraspError, InputError, NoForcesError, SolverError, UndecidedError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
 from grasp_core.geometry.polygons import plane_frame
@@ -44,19 +37,12 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
-from sim_validate.closure.controls import (
-    LEAST_FRICTION,
-    Control,
-    ControlVerdict,
-    negative_controls,
-    try_control,
-)
-from sim_validate.closure.validate import tested, validate
+from sim_validate.closure.controls import LEAST_FRICTION, negative_controls, try_control
+from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import Cells, figures_in
-from sim_validate.datasets.config import CONTROLS, DatasetConfig, Learning
-from sim_validate.datasets.rows import VARIED, ExecutionRow, GraspRow
-from sim_validate.engine.gate import Gate
+from sim_validate.datasets.config import DatasetConfig, Learning
+from sim_validate.datasets.rows import ExecutionRow, GraspRow
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute, tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
@@ -125,9 +111,9 @@ def executed_by(
         return ExecutedGrasp(*about, None, str(error))
     except InputError as error:
         return str(error)
-    seeds = () if config.learning is None else config.learning.seeds
     trials = list(first.trials)
-    for place, seed in enumerate(seeds if MISPLACED in settings.trials else (), start=1):
+    seeds = config.asked.seeds if MISPLACED in settings.trials else ()
+    for place, seed in enumerate(seeds, start=1):
         again = replace(settings, trials=(MISPLACED,), seed=seed)
         more = execute(body, contacts, friction, again, enough=False).trials
         trials += [
@@ -142,14 +128,9 @@ def execution_rows(name: str, executed: Executed, config: DatasetConfig) -> Iter
     asked = config.execution
     if asked is None or not isinstance(executed, ExecutedGrasp):
         return
-    seeds = (asked.seed, *(() if config.learning is None else config.learning.seeds))
-    misplaced = 0
+    seeds = (seed for seed in (asked.seed, *config.asked.seeds) for _ in range(asked.misplacements))
     for number, trial in enumerate(executed.trials):
-        seed = None
-        if trial.kind == MISPLACED:
-            seed = seeds[misplaced // asked.misplacements]
-            misplaced += 1
-        yield ExecutionRow(name, number, trial, seed)
+        yield ExecutionRow(name, number, trial, next(seeds) if trial.kind == MISPLACED else None)
 
 
 hand_named = cache(load_hand)
@@ -158,7 +139,7 @@ hand_named = cache(load_hand)
 
 def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact]) -> Cells:
     """Return the figures on request that any contacts have, closed or not."""
-    if config.learning is None or "closure" not in config.learning.figures:
+    if "closure" not in config.asked.figures:
         return {}
     points, normals = stacked(contacts)
     angle = span_angle(normals) if len(contacts) == FINGERS else None
@@ -170,43 +151,35 @@ def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Co
     return {"span_angle_rad": angle, "smallest_singular_value": smallest}
 
 
-def closed_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:
-    """Return the figures on request that only grasps in force closure have, and a hand's pose."""
-    cells, asked = dict[str, Any](), config.learning
-    if asked is not None and "closure" in asked.figures:
-        cells["witness_forces_n"] = grasp.witness.forces
-    if asked is None or not asked.hand:
-        return cells
-    found = reach_with(hand_named(asked.hand), body, grasp, friction, seed=config.seed)
-    cells |= {"hand_reached": found.reached, "hand_reason": found.reason}
-    if not found.reached:
-        return cells
-    contacts = found.contacts or ()
+def hand_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:
+    """Return the pose of a hand in a grasp in force closure, if one is asked for."""
+    if not config.asked.hand:
+        return {}
+    found = reach_with(hand_named(config.asked.hand), body, grasp, friction, seed=config.seed)
+    contacts = found.contacts
     return {
-        **cells,
+        "hand_reached": found.reached,
+        "hand_reason": found.reason,
         "hand_fingers": found.fingers,
         "hand_joints_rad": found.joints,
         "T_object_palm_m": found.palm_pose,
         "hand_open_joints_rad": found.pregrasp,
         "hand_approach": found.approach,
-        "hand_points_m": [contact.position.tolist() for contact in contacts],
-        "hand_normals": [contact.normal.tolist() for contact in contacts],
+        "hand_points_m": contacts and [contact.position for contact in contacts],
+        "hand_normals": contacts and [contact.normal for contact in contacts],
     }
 
 
-def squeeze_cells(
-    config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact], friction: float,
-    mass_kg: float,
-) -> Cells:  # fmt: skip
+def squeeze_cells(config: DatasetConfig, body: Polyhedron, row: GraspRow) -> Cells:
     """Return the figures on request that only executed contacts have."""
-    if config.learning is None or config.execution is None:
+    if config.execution is None or row.mass_kg is None:
         return {}
     settings = config.execution.for_body(body)
-    cells: dict[str, Any] = {"tip_radius_m": tip_radius(body, contacts, settings)}
-    if "least_squeeze" in config.learning.figures:
+    cells: dict[str, Any] = {"tip_radius_m": tip_radius(body, row.placed, settings)}
+    if "least_squeeze" in config.asked.figures:
         with suppress(GraspError):  # no push carries the weight every way, or it is unstable
             least = best_squeeze(
-                body, contacts, friction, any_direction(mass_kg),
+                body, row.placed, row.friction, any_direction(row.mass_kg),
                 stiffness=settings.tip_stiffness_n_per_m, tip_radius_m=cells["tip_radius_m"],
             )  # fmt: skip
             cells |= {"least_push_n": least.max_push_n, "least_squeeze_n": least.grip.squeeze}
@@ -227,8 +200,8 @@ TRIES = 32
 """Number of random ways in which a contact is moved until it stays on its face."""
 PAST = (0.05, 1.0)
 """How far past its region's end a contact moves, over the way to there or `LEAST_WAY`."""
-UNMOVED = (None,) * FINGERS
-"""What is known of the regions' ends where no contact moved."""
+UNMOVED: Cells = {"displaced_m": (0.0,) * FINGERS, "region_exit_m": (None,) * FINGERS}
+"""What rows say where no contact moved: the regions' ends are not known then."""
 LEAST_WAY = 0.1
 """Least way that a contact's move is measured by, in object radii: regions may be points."""
 
@@ -239,20 +212,14 @@ class Variant:
 
     name: str
     """Kind and number, which no other variant of the grasp has."""
-    kind: str
     seated: Seated
     """The contacts and their object."""
     friction: float
     proved: Grasp | ClosureCertificate
-    displaced_m: Array
-    """Distance by which each contact was moved, (4,) [m]."""
-    exits_m: tuple[float | None, ...]
-    """How far each region reaches along the move of its contact [m]; None where none moved."""
-    critical_friction: float | None
-    """Smallest friction with force closure; None where there is none, or it is not known."""
+    cells: Cells
+    """What its row says of how it was varied."""
     mass_kg: float | None = None
     """Mass of the object in the execution; None for the mass of the settings [kg]."""
-    mass_ratio: float | None = None
 
 
 def ratio_of(friction: float, critical: float | None) -> float | None:
@@ -263,14 +230,14 @@ def ratio_of(friction: float, critical: float | None) -> float | None:
 def variants(
     body: Polyhedron, grasp: Grasp, friction: float, asked: Learning, seed: int
 ) -> Iterator[Variant]:
-    """Yield the varied grasps that are asked for, as far as they exist and can be decided."""
+    """Yield grasps with other frictions and contacts, as far as they exist and can be decided."""
+    at = Seated(body, grasp.faces, grasp.contacts)
     for kind in ("friction_below", "friction_near", "friction_above"):
         for number in range(getattr(asked, kind)):
             ratio = _ratio(kind, draws(seed, grasp.id, kind, number))
             varied = _short(ratio * grasp.critical_friction)
             if LEAST_FRICTION <= varied <= LARGEST_FRICTION:
-                at = Seated(body, grasp.faces, grasp.contacts)
-                yield from _decided(kind, number, at, varied, np.zeros(FINGERS), UNMOVED)
+                yield from _decided(kind, number, at, varied, UNMOVED)
     for number in range(asked.moved_out):
         yield from _moved(body, grasp, friction, number, draws(seed, grasp.id, "moved_out", number))
 
@@ -319,9 +286,8 @@ def _moved(
     except InputError:
         return
     moved = np.array([contact.position for contact in at.contacts]) - grasp.positions
-    yield from _decided(
-        "moved_out", number, at, friction, np.linalg.norm(moved, axis=1), tuple(exits)
-    )
+    cells = {"displaced_m": np.linalg.norm(moved, axis=1), "region_exit_m": exits}
+    yield from _decided("moved_out", number, at, friction, cells)
 
 
 def _past(
@@ -342,9 +308,8 @@ def _past(
 
 
 def _decided(
-    kind: str, number: int, at: Seated, friction: float, displaced_m: Array,
-    exits_m: tuple[float | None, ...],
-) -> Iterator[Variant]:  # fmt: skip
+    kind: str, number: int, at: Seated, friction: float, moved: Cells
+) -> Iterator[Variant]:
     """Yield a variant with its proof, unless rounding does not let closure be decided."""
     name = f"{kind}-{number}"
     try:
@@ -352,8 +317,24 @@ def _decided(
         critical = critical_friction(list(at.contacts))
     except (UndecidedError, SolverError):
         return
-    known = critical if math.isfinite(critical) else None
-    yield Variant(name, kind, at, friction, proved, displaced_m, exits_m, known)
+    known = {"critical_friction": critical if math.isfinite(critical) else None}
+    cells = {"kind": kind, **moved, **({} if isinstance(proved, Grasp) else known)}
+    yield Variant(name, at, friction, proved, cells)
+
+
+def heavier(
+    body: Polyhedron, grasp: Grasp, friction: float, executed: Executed, asked: Learning, seed: int
+) -> Iterator[Variant]:
+    """Yield the grasp with masses near the one at which it is predicted to be lost."""
+    if not isinstance(executed, ExecutedGrasp) or executed.execution is None:
+        return
+    lost_kg, kind = executed.least_predicted_loss * executed.execution.mass_kg, "mass_near"
+    at = Seated(body, grasp.faces, grasp.contacts)
+    for number in range(asked.mass_near):
+        mass_kg = _short(_ratio(kind, draws(seed, grasp.id, kind, number)) * lost_kg)
+        if 0.0 < mass_kg < math.inf:
+            cells = {"kind": kind, **UNMOVED, "mass_ratio": mass_kg / lost_kg}
+            yield Variant(f"{kind}-{number}", at, friction, grasp, cells, mass_kg)
 
 
 def _ratio(kind: str, rng: np.random.Generator) -> float:
@@ -365,85 +346,13 @@ def _short(value: float) -> float:
     return float(f"{value:.{DIGITS - 1}e}")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tried:
-    """A varied grasp with its trials and its execution."""
-
-    variant: Variant
-    verdict: Verdict | ControlVerdict
-    executed: Executed
-
-
 def validated_with(
-    body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, asked: Learning | None
+    body: Polyhedron, grasp: Grasp, friction: float, agenda: Agenda, most: int
 ) -> Verdict:
-    """Test a grasp in simulation, with as many synthetic negative controls as are asked for."""
-    most = CONTROLS if asked is None else asked.synthetic
-    if most == CONTROLS:
-        return validate(body, grasp, friction, agenda=agenda)
+    """Test a grasp in simulation, with no more than some synthetic negative controls."""
     verdict = validate(body, grasp, friction, agenda=replace(agenda, controls=False))
-    found = list[Control]()
-    if most:
-        found += negative_controls(body, grasp, friction, agenda.seed)
+    found = negative_controls(body, grasp, friction, agenda.seed)
     order = draws(agenda.seed, grasp.id, "synthetic", 0).permutation(len(found))
-    kept = [found[int(place)] for place in np.sort(order[:most])]
+    kept = (found[int(place)] for place in np.sort(order[:most]))
     controls = tuple(try_control(body, each, agenda, Setup()) for each in kept)
     return replace(verdict, controls=controls, agenda=agenda)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Varying:
-    """How the grasps of one unit of work are varied and tried."""
-
-    config: DatasetConfig
-    asked: Learning
-    friction: float
-    agenda: Agenda
-
-    def of(
-        self, body: Polyhedron, grasp: Grasp, verdict: Verdict, executed: Executed
-    ) -> Iterator[Tried]:
-        """Yield the varied grasps made from a grasp, with their trials."""
-        for each in variants(body, grasp, self.friction, self.asked, self.agenda.seed):
-            try:
-                yield Tried(each, self._verdict(each, verdict.gate), self._executed(each))
-            except InputError:  # fingertips find no room
-                continue
-        yield from self._heavier(body, grasp, verdict, executed)
-
-    def _heavier(
-        self, body: Polyhedron, grasp: Grasp, verdict: Verdict, executed: Executed
-    ) -> Iterator[Tried]:
-        """Yield the grasp with other masses; its other trials are the same."""
-        if not isinstance(executed, ExecutedGrasp) or executed.execution is None:
-            return
-        lost_kg = executed.least_predicted_loss * executed.execution.mass_kg
-        alone, kind = replace(verdict, controls=()), "mass_near"
-        at = Seated(body, grasp.faces, grasp.contacts)
-        for number in range(self.asked.mass_near):
-            rng = draws(self.agenda.seed, grasp.id, kind, number)
-            mass_kg = _short(_ratio(kind, rng) * lost_kg)
-            if 0.0 < mass_kg < math.inf:
-                each = Variant(
-                    f"{kind}-{number}", kind, at, self.friction, grasp, np.zeros(FINGERS), UNMOVED,
-                    grasp.critical_friction, mass_kg, mass_kg / lost_kg,
-                )  # fmt: skip
-                yield Tried(each, alone, self._executed(each))
-
-    def _verdict(self, variant: Variant, gate: Gate | None) -> Verdict | ControlVerdict:
-        seated, friction = variant.seated, variant.friction
-        if isinstance(variant.proved, Grasp):
-            agenda = replace(self.agenda, controls=False, critical_friction=False)
-            return tested(seated.body, variant.proved, friction, gate, agenda, Setup())
-        control = Control(VARIED, friction, variant.proved)
-        return try_control(seated.body, control, self.agenda, Setup())
-
-    def _executed(self, variant: Variant) -> Executed:
-        try:
-            return executed_by(
-                self.config, variant.seated.body, variant.seated.contacts, variant.friction,
-                variant.name, variant.mass_kg,
-            )  # fmt: skip
-        except UnfaithfulError as error:
-            # a varied mass or friction may be beyond what the simulator is faithful for
-            return str(error)

@@ -13,8 +13,9 @@ made: equal configuration, meshes and versions give equal bytes.
 import hashlib
 import json
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from heapq import merge
 from itertools import groupby, islice
 from operator import itemgetter
@@ -27,16 +28,14 @@ from grasp_core.files.json_text import object_of
 from grasp_core.files.records import RecordFile, from_record, record_of, recorded
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import Number, Range, one_of, path_of, shown
-from grasp_core.mesh_files.limits import FaceKind, MeshChoices
+from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
-from grasp_core.planning.given_contacts import seat
 from sim_validate.closure.replaying import Recorded, Wanted
-from sim_validate.datasets.columns import RowOf, row_of
+from sim_validate.datasets.columns import Columns, RowOf, Tables, each_batch, read_columns, row_of
 from sim_validate.datasets.config import (
-    CREDITS,
     KEYS,
     SHORT,
     SPLITS,
@@ -45,15 +44,11 @@ from sim_validate.datasets.config import (
     SplitName,
     config_from_toml,
 )
-from sim_validate.datasets.parquet import Columns, each_batch, read_columns
 from sim_validate.datasets.rows import (
-    GIVEN,
     ROWS,
-    VARIED,
     GraspRow,
     ObjectRow,
     Rows,
-    Tables,
     TrialRow,
     dataset_tables,
     groups_asked,
@@ -63,6 +58,7 @@ from sim_validate.kit.files import path_inside, require_inside
 from sim_validate.planning.asked_objects import NAMED, some
 
 MANIFEST = "manifest.json"
+CONFIG = "config.toml"
 QUARANTINE = "quarantine.jsonl"
 Size = Annotated[int, Range(least=0)]
 
@@ -157,24 +153,6 @@ def listed(folder: Path, path: Path) -> Listed:
     return Listed(path.relative_to(folder).as_posix(), size, digest)
 
 
-def file_faults(folder: Path, files: Sequence[Listed]) -> Iterator[str]:
-    """Yield sentences on files of a dataset that are not as listed, and on those that are not."""
-    names = {each.path for each in files}
-    there = {
-        path.relative_to(folder).as_posix()
-        for path in folder.rglob("*")
-        if path.is_file() and path.name != MANIFEST
-    }
-    # staged files no longer matter
-    there = {name for name in there if not name.startswith("staging/")}
-    yield from (
-        f"{path}: this file is not listed in the manifest" for path in sorted(there - names)
-    )
-    for each in files:
-        if fault := each.fault(folder):
-            yield f"{each.path}: {fault}"
-
-
 def write_manifest(folder: Path, manifest: Manifest) -> Path:
     """Write the manifest of a dataset, whose presence marks the dataset as finished."""
     files = tuple(sorted(manifest.files, key=lambda each: each.path))
@@ -226,26 +204,34 @@ def left_out_from(text: str) -> list[LeftOut]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Selection:
+@dataclass(frozen=True)
+class Dataset:
     """A finished dataset, or the objects of one of its splits."""
 
     folder: Path
     manifest: Manifest
-    split: str | None
+    split: str | None = None
 
     @property
     def tables(self) -> Tables:
         """Tables of the dataset, with their columns."""
         return self.manifest.tables
 
-    def paths(self, name: Name) -> list[Path]:
-        """List the files of a table, each checked to be unchanged."""
-        return [self._whole(each) for each in self.manifest.of_table(name, self.split)]
+    @cached_property
+    def config(self) -> DatasetConfig:
+        """Read the configuration of the dataset."""
+        return config_from_toml(self.folder / CONFIG)
 
-    def counts(self) -> dict[Name, int]:
-        """Number of rows of each table."""
-        return {name: self.manifest.count(name, self.split) for name in self.tables}
+    def paths(self, name: Name) -> list[Path]:
+        """List the files of a table, each checked to have the manifest's hash.
+
+        Checksums of pages miss some bytes.
+        """
+        files = self.manifest.of_table(name, self.split)
+        for each in files:
+            if fault := each.fault(self.folder):
+                raise InputError(f"{each.path}: {fault}; see `graspproof dataset verify`")
+        return [path_inside(self.folder, each.path) for each in files]
 
     def rows(self, kind: type[RowOf], **cells: str | bool) -> Iterator[RowOf]:
         """Yield rows of a class, or those with some cells, without holding all in memory."""
@@ -263,34 +249,51 @@ class Selection:
                     "see `graspproof dataset verify`"
                 )
 
-    def _whole(self, each: Listed) -> Path:
-        """Check that a file has the manifest's hash, as page checksums miss some bytes."""
-        if fault := each.fault(self.folder):
-            raise InputError(f"{each.path}: {fault}; see `graspproof dataset verify`")
-        return path_inside(self.folder, each.path)
+    def by_object(self) -> Iterator[Rows]:
+        """Yield the rows of each object in turn."""
+        streams = map(self._begun, self.tables)
+        for _, same in groupby(merge(*streams, key=itemgetter(0)), key=itemgetter(0)):
+            rows: dict[Name, list[Any]] = {}
+            for _, name, row in same:
+                rows.setdefault(name, []).append(row)
+            yield Rows(**{name: tuple(each) for name, each in rows.items()})
 
-    def config(self) -> DatasetConfig:
-        """Read the configuration of the dataset."""
-        return config_from_toml(self.folder / "config.toml")
+    def _begun(self, name: Name) -> Iterator[tuple[str, Name, Any]]:
+        """Yield rows with the part of their first key that all rows of an object share."""
+        key = KEYS[name][0]
+        for row in self.rows(ROWS[name]):
+            yield str(getattr(row, key))[:SHORT], name, row
 
-    def facts(self) -> dict[str, str]:
-        """Versions and settings that made the dataset, and statements on its origin, by name."""
-        config, manifest = self.config(), self.manifest
-        stated = {name: str(getattr(config, name)) for name in CREDITS}
-        return {
-            **{name: text for name, text in stated.items() if text},
-            "split": self.split or "all",
-            "schema": str(manifest.SCHEMA),
-            "config_sha256": manifest.config_sha256,
-            **{f"version_{name}": text for name, text in sorted(manifest.versions.items())},
-        }
+    def surface(self, object_id: str) -> MeshFile:
+        """Read the triangles of an object [m]."""
+        path = mesh_path(self.folder, object_id)
+        mesh = read_triangles(path, DEFAULT_LIMITS)
+        if (found := content_hash(mesh.vertices, mesh.triangles)) != object_id:
+            raise InputError(
+                f"{path}: this is the mesh of another object, whose hash is {found}; see "
+                "`graspproof dataset verify`"
+            )
+        return mesh
+
+    def body(self, object_id: str, name: str) -> Polyhedron:
+        """Read an object from its canonical mesh."""
+        mesh, known = self.surface(object_id), None
+        said = mesh.data.partition(b"\n")[0].decode("utf-8", "replace")
+        with about(mesh_path(self.folder, object_id)):
+            if said.startswith(SURFACE):
+                with about("first line"):
+                    known = from_record(Surface, object_of(said.removeprefix(SURFACE), "surface"))
+            return polyhedron_from_mesh(
+                mesh.vertices, mesh.triangles, MeshChoices(faces=self.config.faces), name=name,
+                source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,
+            )  # fmt: skip
 
 
-def select(folder: Path, split: str | None = None) -> Selection:
+def select(folder: Path, split: str | None = None) -> Dataset:
     """Open a dataset or one of its splits."""
     if split is not None:
         one_of(split, [name for name, _ in SPLITS], "split")
-    return Selection(folder, read_manifest(folder), split)
+    return Dataset(folder, read_manifest(folder), split)
 
 
 def splits_in_words(manifest: Manifest) -> str:
@@ -318,7 +321,7 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
         InputError: The split is unknown, the dataset is not finished, or a file is damaged.
     """
     chosen = select(path_of(folder, "folder"), split)
-    if split is not None and not chosen.counts()["objects"]:
+    if split is not None and not chosen.manifest.count("objects", split):
         warnings.warn(
             f"{folder}: the split {split} has no objects; the dataset has "
             f"{splits_in_words(chosen.manifest)}. Another seed splits the objects in another way, "
@@ -326,23 +329,6 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
             stacklevel=2,
         )
     return {name: read_columns(chosen.paths(name), name, chosen.tables) for name in chosen.tables}
-
-
-def by_object(chosen: Selection) -> Iterator[Rows]:
-    """Yield the rows of each object in turn."""
-    streams = [_begun(chosen, name) for name in chosen.tables]
-    for _, same in groupby(merge(*streams, key=itemgetter(0)), key=itemgetter(0)):
-        rows: dict[Name, list[Any]] = {}
-        for _, name, row in same:
-            rows.setdefault(name, []).append(row)
-        yield Rows(**{name: tuple(each) for name, each in rows.items()})
-
-
-def _begun(chosen: Selection, name: Name) -> Iterator[tuple[str, Name, Any]]:
-    """Yield rows with the part of their first key that all rows of an object share."""
-    key = KEYS[name][0]
-    for row in chosen.rows(ROWS[name]):
-        yield str(getattr(row, key))[:SHORT], name, row
 
 
 FOLDER = "meshes"
@@ -366,32 +352,6 @@ def mesh_path(folder: Path, object_id: str) -> Path:
     return path_inside(folder, f"{FOLDER}/{object_id}.obj")
 
 
-def stored_surface(folder: Path, object_id: str) -> MeshFile:
-    """Read the triangles of an object of a dataset [m]."""
-    path = mesh_path(folder, object_id)
-    mesh = read_triangles(path, DEFAULT_LIMITS)
-    if (found := content_hash(mesh.vertices, mesh.triangles)) != object_id:
-        raise InputError(
-            f"{path}: this is the mesh of another object, whose hash is {found}; see `graspproof "
-            "dataset verify`"
-        )
-    return mesh
-
-
-def stored_body(folder: Path, object_id: str, name: str, faces: FaceKind) -> Polyhedron:
-    """Read an object of a dataset from its canonical mesh."""
-    path, mesh = mesh_path(folder, object_id), stored_surface(folder, object_id)
-    said, known = mesh.data.partition(b"\n")[0].decode("utf-8", "replace"), None
-    with about(path):
-        if said.startswith(SURFACE):
-            with about("first line"):
-                known = from_record(Surface, object_of(said.removeprefix(SURFACE), "surface"))
-        return polyhedron_from_mesh(
-            mesh.vertices, mesh.triangles, MeshChoices(faces=faces), name=name,
-            source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,
-        )  # fmt: skip
-
-
 def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
     """Read a grasp or a negative control from the tables of a dataset."""
     chosen = select(folder)
@@ -407,19 +367,15 @@ def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
         raise InputError(
             f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
         )
-    config = chosen.config()
     objects = chosen.rows(ObjectRow, object_id=row.object_id)
     source = next((each.source_name for each in objects), row.object_id)
-    body = stored_body(folder, row.object_id, source, config.faces)
-    if row.label in (GIVEN, VARIED):  # on curved surfaces given contacts have faces of their own
-        body = seat(body, row.points, row.normals).body
     return Recorded(
         name=name,
-        body=body,
+        body=row.held_on(chosen.body(row.object_id, source)),
         contacts=row.placed,
         friction=row.friction,
         setup=Setup(),
-        agenda=Agenda(random_wrenches=config.random_wrenches, seed=config.seed),
+        agenda=Agenda(random_wrenches=chosen.config.random_wrenches, seed=chosen.config.seed),
         control=None if row.force_closed else row.label,
         outcomes={
             each.name: each.hold.outcome.value for each in chosen.rows(TrialRow, grasp_id=name)

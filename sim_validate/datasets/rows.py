@@ -17,18 +17,21 @@ from grasp_core.declared import Declared, rules, types
 from grasp_core.errors import InputError
 from grasp_core.files.records import FLAT
 from grasp_core.kinds import Family, Friction, Number, Range, Seed
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
-from sim_validate.closure.verdict import Verdict, WrenchVerdict
+from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import (
     Asked,
     Column,
     FiguresOf,
     Known,
+    Tables,
     Within,
     cells_of,
     columns_of,
 )
-from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName
+from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName, id_beginning
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
 
@@ -48,7 +51,8 @@ CLAIMS = (
     "simulated_first_slip", "executed_trials", "execution_mismatches",
 )  # fmt: skip
 """Cells that only executed grasps have."""
-Row: TypeAlias = Declared
+TOLD = ("load_multiple", "payload_kg", "predicted_first_slip", "simulated_first_slip")
+"""Figures of executions that have columns of their own."""
 ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
 """A vector for each finger, (k, 3); tables have four, null after the last."""
 Lengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
@@ -146,8 +150,7 @@ class GraspRow(Declared):
     mismatches: Number = 0
     """Number of contradictions between simulation and analysis."""
     verdict: Annotated[
-        Mapping[str, Any],
-        FiguresOf(Verdict, told=("id", "predicted_critical_friction")),
+        Mapping[str, Any], FiguresOf(Verdict, ("id", "outcome", "predicted_critical_friction"))
     ] = field(default_factory=dict[str, Any])
     """Figures of the verdict; null for controls."""
 
@@ -175,7 +178,7 @@ class GraspRow(Declared):
     execution_mismatches: Annotated[int | None, Asked(EXECUTED)] = None
     """Number of the execution's own negative controls that did not slip, but must."""
     execution: Annotated[
-        Mapping[str, Any], FiguresOf(Execution, beginning="execution_"), Asked(EXECUTED)
+        Mapping[str, Any], FiguresOf(Execution, TOLD, "execution_"), Asked(EXECUTED)
     ] = field(default_factory=dict[str, Any])
     """Figures of the execution."""
 
@@ -293,6 +296,11 @@ class GraspRow(Declared):
         """The contacts that are there."""
         return tuple(map(Contact, self.points, self.normals))
 
+    def held_on(self, body: Polyhedron) -> Polyhedron:
+        """Return the object; on curved surfaces contacts not planned have faces of their own."""
+        other = self.label in (GIVEN, VARIED)
+        return seat(body, self.points, self.normals).body if other else body
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TrialRow(Declared):
@@ -313,10 +321,6 @@ class TrialRow(Declared):
     hold: Annotated[HoldVerdict, FLAT]
     simulated_limit: Known
     """Multiple of the wrench that slips in simulation."""
-    verdict: Annotated[Mapping[str, Any], FiguresOf(WrenchVerdict)] = field(
-        default_factory=dict[str, Any]
-    )
-    """Other figures of the trial; null for controls."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -336,7 +340,6 @@ ROWS: Mapping[Name, type[Any]] = {
     "objects": ObjectRow, "grasps": GraspRow, "trials": TrialRow, "executions": ExecutionRow,
 }  # fmt: skip
 """The class of each table's rows."""
-Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,9 +351,19 @@ class Rows:
     trials: tuple[TrialRow, ...] = ()
     executions: tuple[ExecutionRow, ...] = ()
 
-    def of(self, name: Name) -> tuple[Row, ...]:
+    def of(self, name: Name) -> tuple[Any, ...]:
         """Return the rows of a table."""
         return getattr(self, name)
+
+    def of_unit(self, row: ObjectRow, friction: float) -> "Rows":
+        """Return the rows of one object at one friction."""
+        beginning = id_beginning(row.object_id, friction)
+        return Rows(
+            (row,),
+            tuple(each for each in self.grasps if each.grasp_id.startswith(beginning)),
+            tuple(each for each in self.trials if each.grasp_id.startswith(beginning)),
+            tuple(each for each in self.executions if each.grasp_id.startswith(beginning)),
+        )
 
     def cells(self, name: Name, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
         """Return the cells of the rows of a table."""

@@ -13,19 +13,21 @@ one object at one friction; its split is chosen by the hash of its mesh.
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
-import numpy as np
-
-from grasp_core.arrays import Array
-from grasp_core.errors import GraspError, InputError, UndecidedError, about
+from grasp_core.arrays import Array, Shape
+from grasp_core.closure.force_closure import ClosureCertificate
+from grasp_core.declared import Declared
+from grasp_core.errors import GraspError, InputError, UndecidedError, UnfaithfulError, about
 from grasp_core.files.json_text import json_of
+from grasp_core.files.records import record_of
 from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
@@ -36,6 +38,7 @@ from grasp_core.settings import as_table
 from grasp_core.values import FINGERS, Contact, Grasp
 from scenes.example_objects import example_object
 from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict, try_control
+from sim_validate.closure.validate import tested
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import learning
 from sim_validate.datasets.columns import Cells, figures_in
@@ -58,20 +61,18 @@ NO_FRICTION = 1.0
 """Friction put in for files that state none; it is never used, because a dataset's configuration
 has its own."""
 
-Triple = tuple[float, float, float]
 
-
-@dataclass(frozen=True, slots=True)
-class GivenGrasp:
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenGrasp(Declared):
     """Four contacts made by another tool, in the object's frame."""
 
     id: str
     """Name that this package gives the grasp, which may be part of a file name."""
     name: str
     """Name that the other tool's file gives the grasp."""
-    points: tuple[Triple, ...]
+    points: Annotated[Array, Shape(FINGERS, 3)]
     """Contact points, (4, 3) [m]."""
-    normals: tuple[Triple, ...]
+    normals: Annotated[Array, Shape(FINGERS, 3)]
     """Unit vectors into the object, (4, 3)."""
 
 
@@ -88,7 +89,7 @@ def given_text(given: Sequence[GivenGrasp]) -> str:
         {
             "id": grasp.name,
             "contacts": [
-                {"position_m": point, "normal": normal}
+                {"position_m": point.tolist(), "normal": normal.tolist()}
                 for point, normal in zip(grasp.points, grasp.normals, strict=True)
             ],
         }
@@ -113,13 +114,9 @@ def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ..
                 f"grasps[{row}] ({each.id}): expected 4 contacts, got {len(each.positions)}"
             )
     return tuple(
-        GivenGrasp(f"given-{i:06}", each.id, _rows(each.positions), _rows(each.normals))
+        GivenGrasp(f"given-{i:06}", each.id, each.positions, each.normals)
         for i, each in enumerate(sets)
     )
-
-
-def _rows(array: Array) -> tuple[Triple, ...]:
-    return tuple((float(x), float(y), float(z)) for x, y, z in array)
 
 
 PART = 25
@@ -153,7 +150,7 @@ class WorkUnit:
         """Name of the unit: 32 hexadecimal digits, the same wherever the mesh file lies."""
         table = as_table(self.config)
         settings = {name: value for name, value in table.items() if name not in APART}
-        given = json.dumps([astuple(grasp) for grasp in self.given])
+        given = json.dumps([record_of(grasp) for grasp in self.given])
         digest = hashlib.sha256(given.encode()).hexdigest()
         own = sorted(provenance().items())
         decisive = [self.source_sha256, self.friction, digest, settings, own]
@@ -232,27 +229,6 @@ PLANNED = "planned"
 """Kind of the grasps that were planned for their friction."""
 
 
-@dataclass(frozen=True, slots=True)
-class Made:
-    """The rows and files of one unit of work."""
-
-    rows: Rows
-    files: Mapping[str, str]
-    """Texts of the files, by their paths in the dataset's folder."""
-
-
-def made_of(unit: WorkUnit, body: Polyhedron) -> Made:
-    """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows."""
-    making = _Making(unit, body)
-    if unit.given:
-        making.judge()
-    else:
-        making.plan()
-    trials, executions = tuple(making.trials), tuple(making.executions)
-    rows = Rows((_object_row(body, unit),), tuple(making.grasps), trials, executions)
-    return Made(rows, making.files)
-
-
 def split_of(object_id: str, seed: int) -> SplitName:
     """Choose the split of an object by its hash, so that adding objects moves no other object."""
     digest = hashlib.sha256(f"{seed} {object_id}".encode()).digest()
@@ -277,18 +253,78 @@ def _object_row(body: Polyhedron, unit: WorkUnit) -> ObjectRow:
     )
 
 
-class _Making:
-    """The rows and files of a unit of work while they are made."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tried:
+    """Contacts with their trials and their execution."""
+
+    body: Polyhedron
+    contacts: Sequence[Contact]
+    proved: Grasp | ClosureCertificate
+    verdict: Verdict | ControlVerdict
+    executed: learning.Executed = None
+
+    @property
+    def cells(self) -> Cells:
+        """What proof and trials say in a row."""
+        verdict, proved = self.verdict, self.proved
+        if isinstance(verdict, Verdict) and isinstance(proved, Grasp):
+            return {
+                "friction": verdict.friction,
+                "force_closed": True,
+                "closure_margin": proved.closure_margin,
+                "critical_friction": proved.critical_friction,
+                "region_kind": proved.regions[0].kind,
+                "region_radii_m": [region.inscribed_radius for region in proved.regions],
+                "ferrari_canny_lower_n": proved.ferrari_canny[0],
+                "ferrari_canny_upper_n": proved.ferrari_canny[1],
+                "witness_forces_n": proved.witness.forces,
+                "held": verdict.held,
+                "outcome": verdict.outcome.value,
+                "mismatches": len(verdict.mismatches),
+                "verdict": figures_in(GraspRow, "verdict", verdict),
+            }
+        assert isinstance(verdict, ControlVerdict)  # noqa: S101 - only closed ones have verdicts
+        ends = [each.hold.outcome for each in verdict.tried]
+        outcome = next((end for end in ends if end is not Outcome.HELD), Outcome.HELD)
+        return {
+            "friction": verdict.control.friction,
+            "force_closed": False,
+            "closure_margin": verdict.control.certificate.margin,
+            "held": outcome is Outcome.HELD,
+            "outcome": outcome.value,
+            "mismatches": int(not verdict.let_go),
+        }
+
+
+def made_of(unit: WorkUnit, body: Polyhedron) -> "Making":
+    """Plan the grasps of a unit or judge the given ones, simulate them, and make their rows."""
+    made = Making(unit, body)
+    if unit.given:
+        made.judge()
+    else:
+        made.plan()
+    return made
+
+
+class Making:
+    """The rows and files of a unit of work, before and after they are made."""
 
     def __init__(self, unit: WorkUnit, body: Polyhedron) -> None:
         self.unit, self.body, self.config = unit, body, unit.config
         self.grasps, self.trials = list[GraspRow](), list[TrialRow]()
         self.executions = list[ExecutionRow]()
+        # texts of the files, by their paths in the dataset's folder
         self.files = {mesh_path(Path(), body.content_sha256).as_posix(): mesh_text(body)}
         self.agenda = Agenda(
             random_wrenches=self.config.random_wrenches, limits=self.config.limits,
             seed=self.config.seed,
         )  # fmt: skip
+
+    @property
+    def rows(self) -> Rows:
+        """The rows of all tables."""
+        own = _object_row(self.body, self.unit)
+        return Rows((own,), tuple(self.grasps), tuple(self.trials), tuple(self.executions))
 
     def plan(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""
@@ -299,157 +335,121 @@ class _Making:
                 limit=config.limit, seed=config.seed,
             )  # fmt: skip
             for grasp in planned.grasps:
-                begun = self._begun(
-                    grasp.contacts, grasp_id=self._name(grasp.id), name=grasp.id, label="grasp",
+                self._try(
+                    grasp, self.body, grasp_id=self._name(grasp.id), name=grasp.id, label="grasp",
                     kind=PLANNED, family=grasp.family, faces=grasp.faces,
                     region_radius_m=grasp.radius,
                 )  # fmt: skip
-                self._try(begun, grasp, self.body)
 
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
         for given in self.unit.given:
+            cells: Cells = {
+                "grasp_id": self._name(given.id), "name": given.name, "label": GIVEN, "kind": GIVEN,
+            }  # fmt: skip
             try:
-                self._judge(given)
+                self._judge(given, cells)
             except (InputError, UndecidedError) as error:
-                contacts = tuple(map(Contact, np.array(given.points), np.array(given.normals)))
-                row = GraspRow(**self._begun_given(given, contacts, note=str(error)))
-                self.grasps.append(row)
+                about = self._about(tuple(map(Contact, given.points, given.normals)))
+                self.grasps.append(GraspRow(**about, **cells, note=str(error)))
 
-    def _judge(self, given: GivenGrasp) -> None:
+    def _judge(self, given: GivenGrasp, cells: Cells) -> None:
         """Try a given grasp; one that is not in force closure is a negative control."""
-        seated = seat(self.body, given.points, given.normals)
-        proved = grasp_of(seated, self.unit.friction, given.id)
-        begun = self._begun_given(given, seated.contacts, moved_m=seated.moved_m)
+        at = seat(self.body, given.points, given.normals)
+        proved = grasp_of(at, self.unit.friction, given.id)
         if isinstance(proved, Grasp):
-            self._try(begun | {"faces": self._faces(proved)}, proved, seated.body)
+            self._try(proved, at.body, **cells, moved_m=at.moved_m, faces=self._faces(proved))
         else:
             control = Control(GIVEN, self.unit.friction, proved)
-            self._add_refuted(begun, try_control(seated.body, control, self.agenda, Setup()))
+            verdict = try_control(at.body, control, self.agenda, Setup())
+            tried = _Tried(at.body, at.contacts, proved, verdict)
+            self._add(tried, **cells, moved_m=at.moved_m)
 
-    def _try(self, begun: Cells, grasp: Grasp, body: Polyhedron) -> None:
+    def _try(self, grasp: Grasp, body: Polyhedron, **cells: Any) -> None:
         """Simulate a grasp and what is varied of it, and add all rows."""
-        config, friction = self.config, self.unit.friction
-        verdict = learning.validated_with(body, grasp, friction, self.agenda, config.learning)
+        config, friction, name = self.config, self.unit.friction, cells["grasp_id"]
+        asked, seed = config.asked, config.seed
+        verdict = learning.validated_with(body, grasp, friction, self.agenda, asked.synthetic)
         if config.scenes and verdict.scene is not None:
-            self.files[f"scenes/{self._name(grasp.id)}.xml"] = verdict.scene.xml
+            self.files[f"scenes/{name}.xml"] = verdict.scene.xml
         executed = learning.executed_by(config, body, grasp.contacts, friction, grasp.id)
-        self._add_closed(begun, grasp, verdict, executed, body)
-        if config.learning is not None:
-            varying = learning.Varying(config, config.learning, friction, self.agenda)
-            for each in varying.of(body, grasp, verdict, executed):
-                self._add_varied(self._name(grasp.id), each)
-
-    def _add_varied(self, made_from: str, tried: learning.Tried) -> None:
-        """Add the row of a grasp that was varied, with its trials; it may be closed or not."""
-        variant, verdict, proved = tried.variant, tried.verdict, tried.variant.proved
-        begun = self._begun(
-            variant.seated.contacts,
-            grasp_id=f"{made_from}:{variant.name}",
-            name=variant.name,
-            label=VARIED,
-            kind=variant.kind,
-            made_from=made_from,
-            friction=variant.friction,
-            displaced_m=variant.displaced_m,
-            region_exit_m=variant.exits_m,
-            mass_ratio=variant.mass_ratio,
+        self._add(_Tried(body, grasp.contacts, grasp, verdict, executed), **cells)
+        varied = chain(
+            learning.variants(body, grasp, friction, asked, seed),
+            learning.heavier(body, grasp, friction, executed, asked, seed),
         )
-        if isinstance(verdict, ControlVerdict):
-            begun |= {"critical_friction": variant.critical_friction}
-            self._add_refuted(begun, verdict, tried.executed)
-        else:
-            assert isinstance(proved, Grasp)  # noqa: S101 - only closed ones have verdicts
-            begun |= {"faces": self._faces(proved)}
-            self._add_closed(begun, proved, verdict, tried.executed, variant.seated.body)
+        for each in varied:
+            try:
+                tried = self.varied(each, verdict)
+            except InputError:  # fingertips find no room
+                continue
+            self._add(
+                tried, **each.cells, grasp_id=f"{name}:{each.name}", name=each.name, label=VARIED,
+                made_from=name, faces=self._faces(each.proved),
+            )  # fmt: skip
 
-    def _begun(self, contacts: Sequence[Contact], **more: Any) -> dict[str, Any]:
-        """Return the cells that are known of any contacts, and more."""
+    def varied(self, variant: learning.Variant, source: Verdict) -> _Tried:
+        """Simulate and execute a varied grasp; where only its mass is another, trials are kept."""
+        at, friction, proved = variant.seated, variant.friction, variant.proved
+        if variant.mass_kg is not None:
+            verdict = replace(source, controls=())
+        elif isinstance(proved, Grasp):
+            agenda = replace(self.agenda, controls=False, critical_friction=False)
+            verdict = tested(at.body, proved, friction, source.gate, agenda, Setup())
+        else:
+            control = Control(VARIED, friction, proved)
+            verdict = try_control(at.body, control, self.agenda, Setup())
+        try:
+            executed = learning.executed_by(
+                self.config, at.body, at.contacts, friction, variant.name, variant.mass_kg
+            )
+        except UnfaithfulError as error:
+            # a varied mass or friction may be beyond what the simulator is faithful for
+            executed = str(error)
+        return _Tried(at.body, at.contacts, proved, verdict, executed)
+
+    def _about(self, contacts: Sequence[Contact]) -> Cells:
+        """Return the cells that are known of any contacts."""
         return {
             "object_id": self.body.content_sha256,
             "split": split_of(self.body.content_sha256, self.config.seed),
             "friction": self.unit.friction,
             "contacts": len(contacts),
-            "contact_points_m": [contact.position.tolist() for contact in contacts],
-            "contact_normals": [contact.normal.tolist() for contact in contacts],
+            "contact_points_m": [contact.position for contact in contacts],
+            "contact_normals": [contact.normal for contact in contacts],
             **learning.contact_cells(self.config, self.body, contacts),
-            **more,
         }
 
-    def _begun_given(
-        self, given: GivenGrasp, contacts: Sequence[Contact], **more: Any
-    ) -> dict[str, Any]:
-        more |= {"grasp_id": self._name(given.id), "name": given.name}
-        return self._begun(contacts, label=GIVEN, kind=GIVEN, **more)
-
-    def _faces(self, grasp: Grasp) -> tuple[int, ...] | None:
+    def _faces(self, proved: Grasp | ClosureCertificate) -> tuple[int, ...] | None:
         """Return faces of the object; on curved surfaces contacts have some made for them alone."""
-        return None if self.body.patches is not None else grasp.faces
+        planar = self.body.patches is None
+        return proved.faces if planar and isinstance(proved, Grasp) else None
 
     def _name(self, grasp: str) -> str:
         """Return the name of a grasp, which no other grasp of the dataset has."""
         return id_beginning(self.body.content_sha256, self.unit.friction) + grasp
 
-    def _add_closed(
-        self, begun: Cells, grasp: Grasp, verdict: Verdict, executed: learning.Executed,
-        body: Polyhedron,
-    ) -> None:  # fmt: skip
-        """Add the rows of a grasp in force closure, of its negative controls, and of all trials."""
-        proved = {
-            "force_closed": True,
-            "closure_margin": grasp.closure_margin,
-            "critical_friction": grasp.critical_friction,
-            "region_kind": grasp.regions[0].kind,
-            "region_radii_m": [region.inscribed_radius for region in grasp.regions],
-            "ferrari_canny_lower_n": grasp.ferrari_canny[0],
-            "ferrari_canny_upper_n": grasp.ferrari_canny[1],
-            "held": verdict.held,
-            "outcome": verdict.outcome.value,
-            "trials": len(verdict.wrenches),
-            "mismatches": len(verdict.mismatches),
-            "verdict": figures_in(GraspRow, "verdict", verdict),
-            **learning.closed_cells(self.config, body, grasp, verdict.friction),
-        }
-        row = self._added(proved | {**begun}, verdict.wrenches, executed, body)
-        for each in verdict.controls:
-            kind = each.control.name
-            refuted = self._begun(
-                each.control.contacts, grasp_id=f"{row.grasp_id}:{kind}", name=row.name,
-                label=kind, kind=kind, control_of=row.grasp_id,
-            )  # fmt: skip
-            self._add_refuted(refuted, each)
-
-    def _add_refuted(
-        self, begun: Cells, verdict: ControlVerdict, executed: learning.Executed = None
-    ) -> None:
-        """Add the rows of contacts that are proved not to be in force closure, and their trials."""
-        control = verdict.control
-        first = next((t for t in verdict.tried if t.hold.outcome is not Outcome.HELD), None)
-        refuted = {
-            "friction": control.friction,
-            "force_closed": False,
-            "closure_margin": control.certificate.margin,
-            "held": first is None,
-            "outcome": (Outcome.HELD if first is None else first.hold.outcome).value,
-            "trials": len(verdict.tried),
-            "mismatches": int(not verdict.let_go),
-        }
-        self._added({**begun, **refuted}, verdict.tried, executed, self.body)
-
-    def _added(
-        self, cells: Cells, tried: Sequence[WrenchVerdict] | Sequence[ControlTrial],
-        executed: learning.Executed, body: Polyhedron,
-    ) -> GraspRow:  # fmt: skip
-        """Add a row with what its execution found, and the rows of its trials."""
+    def _add(self, tried: _Tried, **cells: Any) -> None:
+        """Add the rows of contacts, of their trials, and of the negative controls made of them."""
+        body, verdict, proved = tried.body, tried.verdict, tried.proved
+        cells = {**self._about(tried.contacts), **cells, **tried.cells}
+        if isinstance(proved, Grasp):
+            cells |= learning.hand_cells(self.config, body, proved, cells["friction"])
+        closed = isinstance(verdict, Verdict)
+        trials = verdict.wrenches if closed else verdict.tried
         ratio = learning.ratio_of(cells["friction"], cells.get("critical_friction"))
-        row = GraspRow(**cells, **learning.execution_cells(executed), friction_ratio=ratio)
-        if row.mass_kg is not None:
-            more = learning.squeeze_cells(self.config, body, row.placed, row.friction, row.mass_kg)
-            row = replace(row, **more)
+        executed = learning.execution_cells(tried.executed)
+        row = GraspRow(**cells, **executed, trials=len(trials), friction_ratio=ratio)
+        row = replace(row, **learning.squeeze_cells(self.config, body, row))
         self.grasps.append(row)
-        self.trials += [_trial_row(row.grasp_id, number, each) for number, each in enumerate(tried)]
-        self.executions += learning.execution_rows(row.grasp_id, executed, self.config)
-        return row
+        self.trials += [_trial_row(row.grasp_id, *each) for each in enumerate(trials)]
+        self.executions += learning.execution_rows(row.grasp_id, tried.executed, self.config)
+        for each in verdict.controls if closed else ():
+            kind, proof = each.control.name, each.control.certificate
+            self._add(
+                _Tried(body, each.control.contacts, proof, each), name=row.name, label=kind,
+                grasp_id=f"{row.grasp_id}:{kind}", kind=kind, control_of=row.grasp_id,
+            )  # fmt: skip
 
 
 def _trial_row(grasp_id: str, number: int, tried: WrenchVerdict | ControlTrial) -> TrialRow:
@@ -463,5 +463,4 @@ def _trial_row(grasp_id: str, number: int, tried: WrenchVerdict | ControlTrial) 
         required_friction=tried.required_friction,
         hold=tried.hold,
         simulated_limit=planned and planned.simulated_limit,
-        verdict=figures_in(TrialRow, "verdict", planned),
     )

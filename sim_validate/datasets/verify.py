@@ -14,10 +14,11 @@ proved to be in force closure at the row's friction.
 
 import hashlib
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
-from itertools import islice
+from dataclasses import replace
+from functools import cached_property
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -36,117 +37,105 @@ from grasp_core.hands.collisions import clearances, tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.objects.on_faces import Surface
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.given_contacts import seat
 from grasp_core.provenance import arithmetic
 from grasp_core.values import FINGERS
-from sim_validate.datasets.build import CONFIG, CONTACTS, TWIN
-from sim_validate.datasets.columns import Cells, agrees
-from sim_validate.datasets.config import (
-    KEYS,
-    NAMES,
-    DatasetConfig,
-    Name,
-    config_from_toml,
-    id_beginning,
-)
+from sim_validate.datasets.build import CONTACTS, TWIN
+from sim_validate.datasets.columns import Cells, agrees, pyarrow
+from sim_validate.datasets.config import KEYS, NAMES, REFERENCES, SPLITS, Name
 from sim_validate.datasets.learning import RATIOS, contact_cells, hand_named, ratio_of, trial_cells
 from sim_validate.datasets.open_dataset import (
+    CONFIG,
     MANIFEST,
     QUARANTINE,
-    Manifest,
-    Selection,
-    by_object,
-    file_faults,
+    Dataset,
     read_left_out,
-    read_manifest,
-    stored_body,
-    stored_surface,
+    select,
 )
-from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.rows import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
 from sim_validate.datasets.units import PLANNED, WorkUnit, made_of, provenance, read_given
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip
-from sim_validate.settings import ExecutionSettings
 
 MOST_NAMED = 20
 """Largest number of faults that are listed for one object at one friction."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """Which part of a dataset to compute again."""
-
-    share: float
-    """Share of all objects at frictions that is computed again, at least one of them."""
-    seed: int = 0
-    """Seed of the random choice."""
-
-
-def verify(folder: Path, sample: Sample | None = None) -> list[str]:
+def verify(folder: Path, share: float = 0.0, seed: int = 0) -> list[str]:
     """List what is wrong with a dataset, one line each; an empty list means that all is well.
 
     Checked are hashes, sizes and page checksums of all files; counts, keys and references of rows;
     for each contact set its normals, its closure (proved again), and that its trials agree with its
     row; for each execution what its squeeze carries (proved again), and that its trials agree with
-    the row; and for a sample, whether planning and simulating again gives the same rows.
+    the row; and for a share of all objects at frictions, drawn by a seed, whether planning and
+    simulating again gives the same rows: for one at least, unless the share is zero.
     """
     pyarrow()  # before any work, so that a missing library is named at once
-    manifest, faults = read_manifest(folder), list[str]()
+    dataset, faults = select(folder), list[str]()
     try:
-        if faults := list(file_faults(folder, manifest.files)):
+        if faults := list(_file_faults(dataset)):
             return faults
-        config = config_from_toml(folder / CONFIG)
-        faults += _manifest_faults(folder, manifest, config)
-        faults += _content_faults(folder, manifest, config)
-        if sample is not None and not faults:
-            faults += _sample_faults(folder, manifest, sample)
+        faults += _manifest_faults(dataset)
+        for part, rows in _parts(dataset):
+            faults += _Checking(part, rows).faults()
+        if share > 0.0 and not faults:
+            faults += _sample_faults(dataset, share, seed)
     except InputError as error:
         faults.append(str(error))
     return faults
 
 
-def _content_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
+def _parts(dataset: Dataset) -> Iterator[tuple[Dataset, Rows]]:
+    """Yield the rows of each object, with the split whose files they are in."""
+    for split, _ in SPLITS:
+        part = replace(dataset, split=split)
+        yield from ((part, rows) for rows in part.by_object())
+
+
+def _file_faults(dataset: Dataset) -> Iterator[str]:
+    """Yield sentences on files that are not as the manifest lists them, or that it does not."""
+    folder, files = dataset.folder, dataset.manifest.files
+    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    more = there - {MANIFEST, *(each.path for each in files)}
+    # staged files no longer matter
+    yield from (
+        f"{path}: this file is not listed in the manifest"
+        for path in sorted(more) if not path.startswith("staging/")
+    )  # fmt: skip
+    for each in files:
+        if fault := each.fault(folder):
+            yield f"{each.path}: {fault}"
+
+
+def _manifest_faults(dataset: Dataset) -> Iterator[str]:
+    manifest, config = dataset.manifest, dataset.config
+    if config.sha256 != manifest.config_sha256:
+        yield f"{CONFIG}: the file is not the configuration that the manifest names"
+    if manifest.groups != config.groups:
+        yield f"{MANIFEST}: `groups` is {manifest.groups}, unlike {CONFIG}"
+    lines = len(read_left_out(dataset.folder / QUARANTINE))
+    if lines != manifest.quarantined:
+        yield (
+            f"{QUARANTINE}: the file has {lines} lines, but the manifest says "
+            f"{manifest.quarantined}"
+        )
     for each in manifest.files:
         if each.table and not Path(each.path).name.startswith(f"{each.split}-"):
             yield (
                 f"{each.path}: the manifest lists this file under the split {each.split}, unlike "
                 "its name"
             )
-    for split, rows in _split_rows(folder, manifest):
-        yield from object_faults(folder, config, split, rows)
 
 
-def _split_rows(folder: Path, manifest: Manifest) -> Iterator[tuple[str, Rows]]:
-    """Yield the rows of each object, with the split whose files they are in."""
-    for split in sorted({each.split for each in manifest.files if each.split is not None}):
-        yield from ((split, rows) for rows in by_object(Selection(folder, manifest, split)))
-
-
-def _manifest_faults(folder: Path, manifest: Manifest, config: DatasetConfig) -> Iterator[str]:
-    if config.sha256 != manifest.config_sha256:
-        yield f"{CONFIG}: the file is not the configuration that the manifest names"
-    if manifest.groups != config.groups:
-        yield f"{MANIFEST}: `groups` is {manifest.groups}, unlike {CONFIG}"
-    lines = len(read_left_out(folder / QUARANTINE))
-    if lines != manifest.quarantined:
-        yield (
-            f"{QUARANTINE}: the file has {lines} lines, but the manifest says "
-            f"{manifest.quarantined}"
-        )
-
-
-def _sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator[str]:
-    redoing = _Redoing(folder, manifest)
-    everything = Selection(folder, manifest, None)
+def _sample_faults(dataset: Dataset, share: float, seed: int) -> Iterator[str]:
+    redoing = _Redoing(dataset)
     units = [
         (row.object_id, friction)
-        for row in everything.rows(ObjectRow)
+        for row in dataset.rows(ObjectRow)
         for friction in redoing.frictions(row)
     ]
-    chosen = {*drawn(sorted(units), sample)}
-    for _, rows in _split_rows(folder, manifest):
+    chosen = {*drawn(sorted(units), share, seed)}
+    for _, rows in _parts(dataset):
         for row in rows.objects:
             yield from redoing.faults(row, rows, chosen)
 
@@ -154,16 +143,14 @@ def _sample_faults(folder: Path, manifest: Manifest, sample: Sample) -> Iterator
 class _Redoing:
     """Computes parts of a dataset again."""
 
-    def __init__(self, folder: Path, manifest: Manifest) -> None:
-        self._folder = folder
-        self._config = config_from_toml(folder / CONFIG)
-        self._tables = manifest.tables
+    def __init__(self, dataset: Dataset) -> None:
+        self._dataset, self._config, manifest = dataset, dataset.config, dataset.manifest
         same = (dict(provenance()), arithmetic())
         self._exact = (manifest.versions, manifest.arithmetic) == same
-        self._given = read_given(folder / CONTACTS) if self._config.contacts else ()
+        self._given = read_given(dataset.folder / CONTACTS) if self._config.contacts else ()
         self._left_out: dict[tuple[str, float], set[str]] = {}
         """Given grasps without rows, by source and friction; none where grasps are planned."""
-        for each in read_left_out(folder / QUARANTINE):
+        for each in read_left_out(dataset.folder / QUARANTINE):
             if not each.reason.startswith(TWIN):
                 gone = self._left_out.setdefault((each.source_sha256, each.friction), set())
                 gone.update(each.given)
@@ -175,7 +162,7 @@ class _Redoing:
     def faults(self, row: ObjectRow, rows: Rows, chosen: Set[tuple[str, float]]) -> Iterator[str]:
         """Yield sentences on what is wrong with an object at the chosen frictions."""
         for friction in self._config.frictions:
-            stored = _of_unit(rows, row.object_id, friction)
+            stored = rows.of_unit(row, friction)
             where = f"{row.source_name} at friction {friction}"
             if self._all_left_out(row, friction):
                 if stored.grasps:
@@ -193,7 +180,7 @@ class _Redoing:
         gone = self._left_out.get((source, friction), set())
         given = tuple(each for each in self._given if each.id not in gone)
         try:
-            body = stored_body(self._folder, row.object_id, name, self._config.faces)
+            body = self._dataset.body(row.object_id, name)
             made = made_of(WorkUnit(name, None, source, friction, self._config, given), body)
         except GraspError as error:
             yield f"the grasps cannot be computed again ({error})"
@@ -201,32 +188,23 @@ class _Redoing:
         if not self._exact:
             yield from _loose_differences(stored, made.rows)
             return
-        for table, columns in self._tables.items():
-            yield from _differences(
-                table, stored.cells(table, columns), made.rows.cells(table, columns)
-            )
+        for table, columns in self._dataset.tables.items():
+            before, after = (rows.cells(table, columns) for rows in (stored, made.rows))
+            yield from _differences(table, before, after)
         for path, text in made.files.items():
-            if read_text(self._folder / path) != text:
+            if read_text(self._dataset.folder / path) != text:
                 yield f"{path}: the file differs from what is computed again"
 
 
-def drawn(units: Sequence[tuple[str, float]], sample: Sample) -> list[tuple[str, float]]:
+def drawn(
+    units: Sequence[tuple[str, float]], share: float, seed: int = 0
+) -> list[tuple[str, float]]:
     """Choose units at random, in an order that only the seed decides."""
 
     def place(unit: tuple[str, float]) -> bytes:
-        return hashlib.sha256(f"{sample.seed} {unit}".encode()).digest()
+        return hashlib.sha256(f"{seed} {unit}".encode()).digest()
 
-    return sorted(units, key=place)[: math.ceil(sample.share * len(units))]
-
-
-def _of_unit(rows: Rows, object_id: str, friction: float) -> Rows:
-    beginning = id_beginning(object_id, friction)
-    return Rows(
-        tuple(row for row in rows.objects if row.object_id == object_id),
-        tuple(row for row in rows.grasps if row.grasp_id.startswith(beginning)),
-        tuple(row for row in rows.trials if row.grasp_id.startswith(beginning)),
-        tuple(row for row in rows.executions if row.grasp_id.startswith(beginning)),
-    )
+    return sorted(units, key=place)[: math.ceil(share * len(units))]
 
 
 def _differences(name: Name, stored: Sequence[Cells], made: Sequence[Cells]) -> Iterator[str]:
@@ -281,6 +259,10 @@ object's radius. Planar faces are as flat as six digits show. Negative controls 
 the planes of patches, from which a curved surface departs."""
 BAND = 1e-3
 """Share by which a ratio may leave its band: frictions and masses are rounded to four digits."""
+NAMED: Mapping[tuple[Name, str], tuple[Name, str]] = {
+    **REFERENCES, ("grasps", "control_of"): ("grasps", "grasp_id"),
+}  # fmt: skip
+"""Columns that name a row of another table or, where they are not null, of their own."""
 LABELS = {"grasp": PLANNED, GIVEN: GIVEN}
 """Kind of the rows of a label; other labels but `varied` are kinds themselves."""
 OFF = 1e-9
@@ -294,15 +276,6 @@ ROUNDED = 1e-9
 from a rigid motion, or a direction from unit length."""
 
 
-def object_faults(folder: Path, config: DatasetConfig, split: str, rows: Rows) -> Iterator[str]:
-    """Yield sentences on what is wrong with the rows of one object, and with its mesh."""
-    yield from _table_faults(split, rows)
-    yield from _row_faults(rows, config.frictions)
-    yield from _mesh_faults(folder, rows)
-    if config.execution is not None or config.learning is not None:
-        yield from _requested_faults(folder, config, rows)
-
-
 def _disagreements(row: GraspRow, wanted: Mapping[str, Any], source: str) -> Iterator[str]:
     """Yield cells of a row that something else says otherwise, beyond what their kinds allow."""
     for name, value in wanted.items():
@@ -311,57 +284,187 @@ def _disagreements(row: GraspRow, wanted: Mapping[str, Any], source: str) -> Ite
             yield f"{name} is {stated}, but {value} by {source}"
 
 
-def _table_faults(split: str, rows: Rows) -> Iterator[str]:
-    if any(row.split != split for row in (*rows.objects, *rows.grasps)):
-        yield f"objects or grasps: files of the split {split} have rows of another split"
-    for name in NAMES:
-        keys = Counter(tuple(getattr(row, key) for key in KEYS[name]) for row in rows.of(name))
-        if any(count > 1 for count in keys.values()):
-            yield f"{name}: two rows have the same {' and '.join(KEYS[name])}"
+class _Checking:
+    """Checks the rows of one object, and its mesh."""
 
+    def __init__(self, part: Dataset, rows: Rows) -> None:
+        self.part, self.config, self.rows = part, part.config, rows
+        self.by_name = {row.grasp_id: row for row in rows.grasps}
+        self.outcomes = defaultdict[str, list[Outcome]](list)
+        self.executions = defaultdict[str, list[ExecutionTrial]](list)
+        for row in rows.trials:
+            self.outcomes[row.grasp_id].append(row.hold.outcome)
+        for row in rows.executions:
+            self.executions[row.grasp_id].append(row.tried)
 
-def _row_faults(rows: Rows, frictions: Sequence[float]) -> Iterator[str]:
-    splits = {row.object_id: row.split for row in rows.objects}
-    names = {row.grasp_id for row in rows.grasps}
-    ended: dict[str, list[Outcome]] = {}
-    for trial in rows.trials:
-        ended.setdefault(trial.grasp_id, []).append(trial.hold.outcome)
-    yield from (
-        f"trials: {name} has no row in the table of grasps" for name in sorted(ended.keys() - names)
-    )
-    for row in rows.grasps:
-        faults = list[str]()
-        if splits.get(row.object_id) != row.split:
-            faults.append("the row's object is missing, or in another split")
-        if row.control_of is not None and row.control_of not in names:
-            faults.append(f"{row.control_of}, named in control_of, has no row")
-        outcomes = ended.get(row.grasp_id, [])
-        held = all(one is Outcome.HELD for one in outcomes) if row.was_tried else None
-        by_trials = {"trials": len(outcomes), "held": held}
-        faults += _disagreements(row, by_trials, "the table of trials")
-        own = row.control_of is None and row.label != VARIED
-        if own and row.friction not in frictions:
-            faults.append(f"friction {row.friction} is not among those of {CONFIG}")
-        if row.was_tried:
-            faults += _contact_faults(row)
-        yield from (f"grasps: {row.grasp_id}: {fault}" for fault in faults)
+    @cached_property
+    def bodies(self) -> Mapping[str, Polyhedron]:
+        """The object, or the objects whose names begin alike."""
+        rows = self.rows.objects
+        return {row.object_id: self.part.body(row.object_id, row.source_name) for row in rows}
 
+    def faults(self) -> Iterator[str]:
+        """Yield sentences on what is wrong with the rows of all tables."""
+        yield from self._tables()
+        for row in self.rows.objects:
+            yield from self._mesh(row)
+        for row in self.rows.grasps:
+            own = chain(self._row(row), self._requested(row))
+            yield from (f"grasps: {row.grasp_id}: {fault}" for fault in own)
 
-def _mesh_faults(folder: Path, rows: Rows) -> Iterator[str]:
-    for row in rows.objects:
+    def _tables(self) -> Iterator[str]:
+        split = self.part.split
+        if any(row.split != split for row in (*self.rows.objects, *self.rows.grasps)):
+            yield f"objects or grasps: files of the split {split} have rows of another split"
+        for name in NAMES:
+            rows = self.rows.of(name)
+            keys = Counter(tuple(getattr(row, key) for key in KEYS[name]) for row in rows)
+            if any(count > 1 for count in keys.values()):
+                yield f"{name}: two rows have the same {' and '.join(KEYS[name])}"
+        for (name, column), (other, key) in NAMED.items():
+            there = {getattr(row, key) for row in self.rows.of(other)}
+            named = {getattr(row, column) for row in self.rows.of(name)} - {None}
+            yield from (
+                f"{name}: {missing}, named in {column}, has no row in the table of {other}"
+                for missing in sorted(named - there)
+            )
+
+    def _mesh(self, row: ObjectRow) -> Iterator[str]:
         try:
-            mesh = stored_surface(folder, row.object_id)
+            mesh = self.part.surface(row.object_id)
         except InputError as error:
             yield str(error)
-            continue
+            return
         surface = Surface(mesh.vertices, mesh.triangles)
-        tried = (each for each in rows.grasps if each.object_id == row.object_id and each.was_tried)
-        on_it = [on for each in tried for on in _on_surface(surface, each, row.radius_m)]
+        own = (each for each in self.rows.grasps if each.object_id == row.object_id)
+        on_it = [on for each in own if each.was_tried
+                 for on in _on_surface(surface, each, row.radius_m)]  # fmt: skip
         if off := on_it.count(False):
             yield (
                 f"grasps: {off} contacts of {row.source_name} are not on the object, or not "
                 "with its normals"
             )
+
+    def _row(self, row: GraspRow) -> Iterator[str]:
+        outcomes = self.outcomes[row.grasp_id]
+        held = all(one is Outcome.HELD for one in outcomes) if row.was_tried else None
+        by_trials = {"trials": len(outcomes), "held": held}
+        yield from _disagreements(row, by_trials, "the table of trials")
+        own = row.control_of is None and row.label != VARIED
+        if own and row.friction not in self.config.frictions:
+            yield f"friction {row.friction} is not among those of {CONFIG}"
+        if row.was_tried:
+            yield from _contact_faults(row)
+
+    def _requested(self, row: GraspRow) -> Iterator[str]:
+        """Check what a dataset has only on request, of a row whose object is there."""
+        executed, learned = self.config.execution is not None, self.config.learning is not None
+        body = self.bodies.get(row.object_id) if executed or learned else None
+        if body is None:
+            return
+        if executed:
+            found = [*self._trials(row)]
+            yield from found or self._squeezes(row, body)
+        if learned:
+            yield from self._learned(row, body)
+
+    def _learned(self, row: GraspRow, body: Polyhedron) -> Iterator[str]:
+        if row.label == VARIED:
+            yield from self._varied(row, body)
+        else:
+            yield from _disagreements(row, {"kind": LABELS.get(row.label, row.label)}, "label")
+        ratio = {"friction_ratio": ratio_of(row.friction, row.critical_friction)}
+        yield from _disagreements(row, ratio, "the critical friction")
+        if row.was_tried:
+            by_contacts = contact_cells(self.config, body, row.placed)
+            yield from _disagreements(row, by_contacts, "the contacts")
+        if row.witness_forces_n is not None:
+            yield from _witness_faults(row, row.witness_forces_n, body)
+        if self.config.asked.hand:
+            yield from _hand_faults(row, hand_named(self.config.asked.hand), body)
+
+    def _varied(self, row: GraspRow, body: Polyhedron) -> Iterator[str]:
+        source = self.by_name.get(row.made_from or "")
+        if source is None:
+            yield f"{row.made_from}, named in made_from, has no row"
+            return
+        stated, exits = row.displaced_m, row.region_exit_m
+        if stated is None or exits is None or len(row.points) != len(source.points):
+            yield "displaced_m or region_exit_m is missing, or contacts of made_from are"
+            return
+        moves = np.linalg.norm(row.points - source.points, axis=1)
+        yield from _disagreements(row, {"displaced_m": moves}, "the contacts of made_from")
+        if (row.kind == "moved_out") == (not stated.any()):
+            yield f"contacts of the kind {row.kind} are not where they must be"
+        # where a contact did not move, its exit is NaN, which nothing is below
+        if body.patches is None and (stated <= exits * (1.0 - ROUNDING)).any():
+            yield "a contact was moved, but is still in its region"
+        try:
+            critical = critical_friction(row.points, row.normals)
+        except GraspError as error:
+            yield f"the critical friction cannot be computed ({error})"
+            return
+        yield from _disagreements(row, {"critical_friction": critical}, "the contacts")
+        if row.kind in RATIOS:
+            least, most = RATIOS[row.kind]
+            ratio = row.mass_ratio if row.kind == "mass_near" else row.friction_ratio
+            if ratio is None or not least * (1.0 - BAND) <= ratio <= most * (1.0 + BAND):
+                yield f"the ratio {ratio} is none of the kind {row.kind}"
+
+    def _trials(self, row: GraspRow) -> Iterator[str]:
+        """Check that a row agrees with its trials, and has none if it was not executed."""
+        trials = self.executions[row.grasp_id]
+        if not row.executed:
+            if trials:
+                yield "the table of executions has trials of it, although none was simulated"
+            return
+        wanted = trial_cells(trials)
+        if self.config.learning is None:
+            del wanted["predicted_loss"]
+        else:
+            carried = (row.load_multiple or 0.0) * (row.mass_kg or 0.0)
+            yield from _disagreements(row, {"payload_kg": carried}, "load_multiple times the mass")
+        yield from _disagreements(row, wanted, "the table of executions")
+
+    def _squeezes(self, row: GraspRow, body: Polyhedron) -> Iterator[str]:
+        """Check the mass, and prove again that the squeezes carry what the row says."""
+        yield from self._proved(row, body, "load_multiple")
+        if row.least_squeeze_n is not None:
+            # it carries the weight itself, with no larger push
+            least = replace(row, squeeze_n=row.least_squeeze_n, load_multiple=1.0)
+            yield from self._proved(least, body, "least_push_n", row.least_push_n)
+
+    def _proved(
+        self, row: GraspRow, body: Polyhedron, claim: str, push_n: float | None = None
+    ) -> Iterator[str]:
+        """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
+        asked, load, mass_kg = self.config.execution, row.load_multiple, row.mass_kg
+        if asked is None or row.squeeze_n is None or load is None or mass_kg is None:
+            return  # nothing was executed
+        try:
+            settings = asked.for_body(body)
+            if row.mass_ratio is not None:
+                settings = replace(settings, mass_kg=mass_kg)
+            held = grip(
+                row.held_on(body), row.placed, row.friction, row.squeeze_n[: row.contacts],
+                stiffness=settings.tip_stiffness_n_per_m,
+                tip_radius_m=tip_radius(row.held_on(body), row.placed, settings),
+            )  # fmt: skip
+        except GraspError as error:
+            yield f"the contacts cannot be squeezed as the row says ({error})"
+            return
+        if faults := list(_disagreements(row, {"mass_kg": settings.object_kg}, CONFIG)):
+            yield from faults
+            return
+        survival = Survival.of(held, any_direction(settings.object_kg))
+        reactions = survival.reactions(held.local_squeeze)
+        multiple = load * (1.0 - ROUNDING)
+        pushes = reactions.start[:, 0] + multiple * reactions.swing
+        most_n = settings.push_n if push_n is None else push_n
+        limited = bool((pushes <= most_n * (1.0 + ROUNDING)).all())
+        if not (limited and reactions.survives(multiple, reactions.multipliers(multiple))):
+            stated = getattr(row, claim)
+            yield f"{claim} is {stated:.9g}, but the squeeze is not proved to carry as much"
 
 
 def _on_surface(surface: Surface, row: GraspRow, radius_m: float) -> Iterator[bool]:
@@ -386,143 +489,6 @@ def _contact_faults(row: GraspRow) -> Iterator[str]:
         return
     margin = {"closure_margin": found.margin} if found.closed and row.force_closed else {}
     yield from _disagreements(row, {"force_closed": found.closed, **margin}, "the contacts")
-
-
-def _requested_faults(folder: Path, config: DatasetConfig, rows: Rows) -> Iterator[str]:
-    trials: dict[str, list[ExecutionTrial]] = {}
-    for trial in rows.executions:
-        trials.setdefault(trial.grasp_id, []).append(trial.tried)
-    by_name = {row.grasp_id: row for row in rows.grasps}
-    yield from (
-        f"executions: {name} has no row in the table of grasps"
-        for name in sorted(trials.keys() - by_name.keys())
-    )
-    for of_object in rows.objects:
-        name = of_object.object_id
-        body = stored_body(folder, name, of_object.source_name, config.faces)
-        for row in (each for each in rows.grasps if each.object_id == name):
-            found = list[str]()
-            if config.execution is not None:
-                own = trials.get(row.grasp_id, [])
-                found += _trial_faults(row, own, has_margins=config.learning is not None)
-                found += [] if found else _squeeze_faults(row, body, config.execution)
-            if config.learning is not None:
-                found += _learning_faults(row, by_name, of_object, body, config)
-            yield from (f"grasps: {row.grasp_id}: {fault}" for fault in found)
-
-
-def _learning_faults(
-    row: GraspRow, by_name: Mapping[str, GraspRow], of_object: ObjectRow, body: Polyhedron,
-    config: DatasetConfig,
-) -> Iterator[str]:  # fmt: skip
-    if row.label == VARIED:
-        yield from _varied_faults(row, by_name, is_curved=of_object.curved)
-    else:
-        yield from _disagreements(row, {"kind": LABELS.get(row.label, row.label)}, "label")
-    ratio = {"friction_ratio": ratio_of(row.friction, row.critical_friction)}
-    yield from _disagreements(row, ratio, "the critical friction")
-    if row.was_tried:
-        yield from _disagreements(row, contact_cells(config, body, row.placed), "the contacts")
-    if row.witness_forces_n is not None:
-        yield from _witness_faults(row, row.witness_forces_n, body)
-    if config.learning is not None and config.learning.hand:
-        yield from _hand_faults(row, hand_named(config.learning.hand), body)
-
-
-def _varied_faults(
-    row: GraspRow, by_name: Mapping[str, GraspRow], *, is_curved: bool
-) -> Iterator[str]:
-    source = by_name.get(row.made_from or "")
-    if source is None:
-        yield f"{row.made_from}, named in made_from, has no row"
-        return
-    stated, exits = row.displaced_m, row.region_exit_m
-    if stated is None or exits is None or len(row.points) != len(source.points):
-        yield "displaced_m or region_exit_m is missing, or contacts of made_from are"
-        return
-    moves = np.linalg.norm(row.points - source.points, axis=1)
-    yield from _disagreements(row, {"displaced_m": moves}, "the contacts of made_from")
-    if (row.kind == "moved_out") == (not stated.any()):
-        yield f"contacts of the kind {row.kind} are not where they must be"
-    # where a contact did not move, its exit is NaN, which nothing is below
-    if not is_curved and (stated <= exits * (1.0 - ROUNDING)).any():
-        yield "a contact was moved, but is still in its region"
-    try:
-        critical = critical_friction(row.points, row.normals)
-    except GraspError as error:
-        yield f"the critical friction cannot be computed ({error})"
-        return
-    yield from _disagreements(row, {"critical_friction": critical}, "the contacts")
-    if row.kind in RATIOS:
-        least, most = RATIOS[row.kind]
-        ratio = row.mass_ratio if row.kind == "mass_near" else row.friction_ratio
-        if ratio is None or not least * (1.0 - BAND) <= ratio <= most * (1.0 + BAND):
-            yield f"the ratio {ratio} is none of the kind {row.kind}"
-
-
-def _trial_faults(
-    row: GraspRow, trials: Sequence[ExecutionTrial], *, has_margins: bool
-) -> Iterator[str]:
-    """Check that a row agrees with its trials, and has none if it was not executed."""
-    if not row.executed:
-        if trials:
-            yield "the table of executions has trials of it, although none was simulated"
-        return
-    wanted = trial_cells(trials)
-    loss = wanted.pop("predicted_loss")
-    yield from _disagreements(row, wanted, "the table of executions")
-    if has_margins:
-        yield from _disagreements(row, {"predicted_loss": loss}, "the table of executions")
-        carried = (row.load_multiple or 0.0) * (row.mass_kg or 0.0)
-        yield from _disagreements(row, {"payload_kg": carried}, "load_multiple times the mass")
-
-
-def _squeeze_faults(row: GraspRow, body: Polyhedron, asked: ExecutionSettings) -> Iterator[str]:
-    """Check the mass, and prove again that the squeeze carries what the row says."""
-    yield from _proved(row, body, asked, "load_multiple")
-    if row.least_squeeze_n is not None:
-        # it carries the weight itself, with no larger push
-        least = replace(row, squeeze_n=row.least_squeeze_n, load_multiple=1.0)
-        yield from _proved(least, body, asked, "least_push_n", row.least_push_n)
-
-
-def _proved(
-    row: GraspRow,
-    body: Polyhedron,
-    asked: ExecutionSettings,
-    claim: str,
-    push_n: float | None = None,
-) -> Iterator[str]:
-    """Check that a squeeze carries a multiple of the weight, with pushes that are allowed."""
-    if row.squeeze_n is None or row.load_multiple is None or row.mass_kg is None:
-        return  # nothing was executed
-    try:
-        settings = asked.for_body(body)
-        if row.mass_ratio is not None:
-            settings = replace(settings, mass_kg=row.mass_kg)
-        if row.label in (GIVEN, VARIED):  # on curved surfaces they have faces of their own
-            body = seat(body, row.points, row.normals).body
-        held = grip(
-            body, row.placed, row.friction, row.squeeze_n[: row.contacts],
-            stiffness=settings.tip_stiffness_n_per_m,
-            tip_radius_m=tip_radius(body, row.placed, settings),
-        )  # fmt: skip
-    except GraspError as error:
-        yield f"the contacts cannot be squeezed as the row says ({error})"
-        return
-    if faults := list(_disagreements(row, {"mass_kg": settings.object_kg}, CONFIG)):
-        yield from faults
-        return
-    survival = Survival.of(held, any_direction(settings.object_kg))
-    reactions = survival.reactions(held.local_squeeze)
-    multiple = row.load_multiple * (1.0 - ROUNDING)
-    pushes = reactions.start[:, 0] + multiple * reactions.swing
-    most_n = settings.push_n if push_n is None else push_n
-    limited = bool((pushes <= most_n * (1.0 + ROUNDING)).all())
-    if not (limited and reactions.survives(multiple, reactions.multipliers(multiple))):
-        yield (
-            f"{claim} is {getattr(row, claim):.9g}, but the squeeze is not proved to carry as much"
-        )
 
 
 def _witness_faults(row: GraspRow, forces: Array, body: Polyhedron) -> Iterator[str]:

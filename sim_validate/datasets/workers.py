@@ -11,43 +11,38 @@ could differ. A timer of the system ends a process in which a unit takes too lon
 call that never comes back.
 
 Finished units are kept in a staging folder: one subfolder per unit, renamed in one step. A unit
-that was killed leaves only a temporary folder, which the next run removes. So every subfolder is
-complete, and a resumed build repeats only the units that were under way.
+that was killed leaves only a temporary folder, which is removed when it is computed again. So every
+subfolder is complete, and a resumed build repeats only the units that were under way.
 """
 
 import errno
-import hashlib
 import os
 import re
 import shutil
 import signal
-import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.records import RecordFile
-from grasp_core.files.text_files import read_bytes
 from grasp_core.kinds import FieldError, shown
+from grasp_core.processes import Processes
+from sim_validate.datasets.columns import parquet_bytes
 from sim_validate.datasets.config import Name, SplitName
-from sim_validate.datasets.parquet import parquet_bytes
+from sim_validate.datasets.open_dataset import Listed, listed
 from sim_validate.datasets.rows import dataset_tables
-from sim_validate.datasets.units import Made, WorkerError, WorkUnit, body_of, made_of, provenance
-from sim_validate.kit.files import path_inside
-from sim_validate.kit.processes import check_interrupted
+from sim_validate.datasets.units import Making, WorkerError, WorkUnit, body_of, made_of, provenance
+from sim_validate.kit.files import whole_folder
+from sim_validate.kit.processes import Cluster, check_interrupted
 
 HASH = re.compile(r"[0-9a-f]{64}")
 OTHERS = "others"
 """Subfolder for those files of a unit that are not tables."""
-UNFINISHED = "."
-"""First character of the names of temporary folders."""
-MOST_BYTES = 2**31
-"""Largest size of one file of a unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +50,12 @@ class UnitRecord(RecordFile):
     """Record of a finished unit of work: where its rows belong, or why it has none."""
 
     FILE = "unit.json"
-    SCHEMA = 1
+    SCHEMA = 2
 
     object: str
     friction: float
-    files: Mapping[str, str]
-    """SHA-256 of each file, by its path in the unit's folder."""
+    files: tuple[Listed, ...]
+    """Files of the unit's folder."""
     object_id: str | None = None
     """Hash of the object's mesh, in whose table its row is; None if there are no rows."""
     split: SplitName | None = None
@@ -84,23 +79,15 @@ class Staging:
 
     folder: Path
 
-    def clear_unfinished(self) -> None:
-        """Remove what killed units left; this is safe only when no unit is under way."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        for path in self.folder.iterdir():
-            if path.name.startswith(UNFINISHED):
-                # a worker process of a killed build may still write here
-                shutil.rmtree(path, ignore_errors=True)
-
     def remove(self) -> None:
         """Remove the whole staging folder, once a finished dataset holds its contents."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def write(self, unit: WorkUnit, made: Made) -> None:
+    def write(self, unit: WorkUnit, made: Making) -> None:
         """Keep the rows and files of a finished unit."""
         kinds = dataset_tables(unit.config.groups)
         tables = {
-            _file(name): parquet_bytes(name, made.rows.cells(name, columns), {}, kinds)
+            _file(name): parquet_bytes(name, made.rows.cells(name, columns), kinds)
             for name, columns in kinds.items()
         }
         others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}
@@ -118,10 +105,7 @@ class Staging:
     def done(self, unit: WorkUnit) -> bool:
         """Tell whether a unit is finished or quarantined, and all its files are as written."""
         try:
-            return all(
-                _sha256(read_bytes(path_inside(self._of(unit), name), MOST_BYTES)) == sha256
-                for name, sha256 in self.record(unit).files.items()
-            )
+            return not any(each.fault(self._of(unit)) for each in self.record(unit).files)
         except (OSError, InputError):
             return False
 
@@ -145,20 +129,12 @@ class Staging:
         return self.folder / unit.id
 
     def _put(self, unit: WorkUnit, files: Mapping[str, bytes], **more: Any) -> None:
-        hashes = {name: _sha256(data) for name, data in files.items()}
-        record = UnitRecord(unit.object, unit.friction, hashes, **more)
-        made = Path(tempfile.mkdtemp(dir=self.folder, prefix=f"{UNFINISHED}{unit.id}."))
         try:
-            for name, data in {**files, record.FILE: record.text().encode()}.items():
-                path = made / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                with path.open("wb") as stream:
-                    stream.write(data)
-                    stream.flush()
-                    os.fsync(stream.fileno())
-            made.rename(self._of(unit))
-        except OSError:
-            shutil.rmtree(made, ignore_errors=True)
+            with whole_folder(self._of(unit)) as made:
+                kept = tuple(listed(made, _kept(made / name, data)) for name, data in files.items())
+                record = UnitRecord(unit.object, unit.friction, kept, **more)
+                _kept(made / record.FILE, record.text().encode())
+        except (OSError, InputError):
             if not self.done(unit):  # otherwise another attempt was faster and wrote the same rows
                 raise
 
@@ -167,10 +143,18 @@ def _file(name: Name) -> str:
     return f"{name}.parquet"
 
 
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+def _kept(path: Path, data: bytes) -> Path:
+    """Write a file so that it outlasts a loss of power."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+    return path
 
 
+Engine: TypeAlias = Processes | Cluster
+"""What computes units of work: processes of this machine, or a Ray or Dask cluster."""
 AHEAD = 3
 """Number of units submitted per worker process, so that no worker waits for the next unit."""
 LOOK_S = 1.0
@@ -188,10 +172,8 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
         raise
     except GraspError as error:
         staging.quarantine(unit, str(error))
-    except MemoryError:
-        staging.quarantine(unit, "out of memory")
-    except OSError as error:
-        if error.errno != errno.ENOMEM:
+    except (MemoryError, OSError) as error:
+        if isinstance(error, OSError) and error.errno != errno.ENOMEM:
             raise
         staging.quarantine(unit, "out of memory")
     except Exception as error:  # a bug that one object triggers must not stop the others
@@ -225,29 +207,11 @@ def do_task(task: Task) -> None:
             f"{task.staging.folder}: a worker process cannot see this folder; --out must be on a "
             "file system that all processes share"
         )
-    if task.timeout_s is None:
-        task.work(task.unit, task.staging)
-        return
-    signal.setitimer(signal.ITIMER_REAL, task.timeout_s)
+    signal.setitimer(signal.ITIMER_REAL, task.timeout_s or 0.0)  # none for zero
     try:
         task.work(task.unit, task.staging)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-
-
-class Engine(Protocol):
-    """What computes units of work: processes of this machine, or a Ray or Dask cluster."""
-
-    workers: int
-
-    @property
-    def ended(self) -> tuple[str, ...]:
-        """Names of the errors which say that a worker process died while it computed."""
-        ...
-
-    def submit(self, function: Callable[[Task], None], task: Task, /) -> "Future[None]":
-        """Start a task on a worker process."""
-        ...
 
 
 def drive(

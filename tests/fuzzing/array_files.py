@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pyarrow import parquet
 
-from sim_validate.datasets.parquet import parquet_bytes, read_columns
+from sim_validate.datasets.columns import parquet_bytes, read_columns
 from sim_validate.datasets.rows import TABLES
 from sim_validate.kit.files import arrays_of
 from sim_validate.planning.regions import SHAPES, regions_of
@@ -65,7 +65,7 @@ def _table(data: bytes) -> Any:
     with tempfile.NamedTemporaryFile(dir=MEMORY if MEMORY.is_dir() else None) as file:
         file.write(data)
         file.flush()
-        return read_columns([Path(file.name)], "objects")
+        return read_columns([Path(file.name)], "objects", TABLES)
 
 
 def _same_table(data: bytes, found: Any) -> None:
@@ -79,5 +79,5 @@ def _same_table(data: bytes, found: Any) -> None:
 TARGETS = (
     Target("proof", lambda data: regions_of(arrays_of(data, SHAPES)), lambda: [npz(**_proof())],
            _same_proof, "npz"),
-    Target("table", _table, lambda: [parquet_bytes("objects", _rows(), {})], _same_table),
+    Target("table", _table, lambda: [parquet_bytes("objects", _rows(), TABLES)], _same_table),
 )  # fmt: skip

@@ -19,11 +19,7 @@ from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
-from sim_validate.datasets.open_dataset import (
-    Listed,
-    Manifest,
-    left_out_from,
-)
+from sim_validate.datasets.open_dataset import Listed, Manifest, left_out_from
 from sim_validate.datasets.units import given_from_json
 from sim_validate.datasets.workers import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
@@ -203,7 +199,7 @@ def _same_manifest(data: bytes, found: Manifest) -> None:
 
 LEFT_OUT = {"object": "a.obj", "source_sha256": HASH, "friction": 0.5, "given": ["given-000001"],
             "reason": "no solid"}  # fmt: skip
-UNIT = UnitRecord("a.obj", 0.5, {"grasps.parquet": HASH}, HASH, "train")
+UNIT = UnitRecord("a.obj", 0.5, (Listed("grasps.parquet", 9, HASH),), HASH, "train")
 
 
 def _same_lines(data: bytes, found: Any) -> None:

@@ -3,8 +3,8 @@
 import dataclasses
 import hashlib
 
+from sim_validate.datasets.columns import parquet_bytes, read_table
 from sim_validate.datasets.open_dataset import listed, read_manifest, write_manifest
-from sim_validate.datasets.parquet import parquet_bytes, read_table
 
 
 def forged(folder, name, change):
@@ -21,7 +21,7 @@ def forged(folder, name, change):
         break
     else:
         raise LookupError(f"no row of {name} is as the change wants it")
-    data = parquet_bytes(name, rows, {}, read_manifest(folder).tables)
+    data = parquet_bytes(name, rows, read_manifest(folder).tables)
     path.write_bytes(data)
     manifest, name = read_manifest(folder), path.relative_to(folder).as_posix()
     others = [each for each in manifest.files if each.path != name]

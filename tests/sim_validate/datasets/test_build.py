@@ -13,10 +13,10 @@ import grasp_core as gc
 import sim_validate
 from scenes.example_objects import example_object
 from sim_validate.datasets import build as build_module
-from sim_validate.datasets import parquet
+from sim_validate.datasets import columns as parquet
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
-from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.verify import verify
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
@@ -97,8 +97,8 @@ def test_what_a_killed_worker_left_is_removed_and_damaged_units_are_done_again(d
     engine = Here(die)
     with pytest.raises(KilledError):
         build(CONFIG, folder, engine, silent)
-    (folder / "staging" / ".halfway").mkdir()
     shard = next((folder / "staging").glob("*/trials.parquet"))
+    (folder / "staging" / f".{shard.parent.name}.unfinished-0").mkdir()
     shard.write_bytes(shard.read_bytes()[:-8])
     again = Here()
     build(CONFIG, folder, again, silent)
@@ -236,7 +236,7 @@ def test_a_dataset_without_any_grasp_is_one(tmp_path):
                            cones="normal")  # fmt: skip
     built = build(config, tmp_path / "ds", Here(), silent)
     assert built.manifest.rows == {"objects": 1, "grasps": 0, "trials": 0}
-    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    assert verify(tmp_path / "ds", 1.0) == []
     grasps = sim_validate.load_dataset(tmp_path / "ds")["grasps"]
     assert grasps["contact_points_m"].shape == (0, 4, 3)
 
@@ -312,7 +312,7 @@ def test_a_build_killed_at_any_step_of_its_end_goes_on(dataset, tmp_path):
 def test_scenes_are_written_on_request(dataset, tmp_path):
     config = dataclasses.replace(CONFIG, scenes=True, objects=("tetrahedron",), frictions=(0.5,))
     build(config, tmp_path / "ds", Here(), silent)
-    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    assert verify(tmp_path / "ds", 1.0) == []
     rows = [row for row in rows_of(tmp_path / "ds", "grasps") if row["label"] == "grasp"]
     scenes = {path.stem: path for path in (tmp_path / "ds" / "scenes").iterdir()}
     assert rows

@@ -58,7 +58,7 @@ def test_what_ends_or_hangs_is_given_up_and_the_others_are_done(engine, tmp_path
         limit=1,
     )
     staging = Staging(tmp_path / "staging")
-    staging.clear_unfinished()
+    staging.folder.mkdir()
     units = units_of(config)
     drive(units, staging, engine, silent, 12.0, faulty)
     came = {unit.object: staging.record(unit).reason for unit in units}

@@ -14,7 +14,7 @@ from grasp_core.arrays import Array, Shape
 from grasp_core.declared import Declared
 from grasp_core.figures import Shown, figures
 from grasp_core.files.records import FLAT, recorded
-from sim_validate.closure.verdict import Verdict
+from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets.columns import (
     Asked,
     FiguresOf,
@@ -63,9 +63,7 @@ class Row(Declared):
     part: Annotated[Part, FLAT]
     limit: Known = None
     angles_rad: Annotated[Annotated[Array, Shape("hand")] | None, Asked("hand")] = None
-    pie: Annotated[Mapping[str, Any], FiguresOf(Pie, beginning="pie_")] = field(
-        default_factory=dict
-    )
+    pie: Annotated[Mapping[str, Any], FiguresOf(Pie, (), "pie_")] = field(default_factory=dict)
 
 
 PIE = Pie(Taste.SWEET, ("dough", "apples"))
@@ -102,7 +100,9 @@ def test_every_figure_of_a_verdict_and_its_trials_is_a_column():
     of_grasps, of_trials = ({each.name for each in TABLES[name]} for name in ("grasps", "trials"))
     told_otherwise = {"id", "predicted_critical_friction"}
     assert {each.name for each in figures(Verdict)} - told_otherwise <= of_grasps
-    assert {each.name for each in figures(HoldVerdict)} <= of_trials
+    assert {
+        each.name for kind in (HoldVerdict, WrenchVerdict) for each in figures(kind)
+    } <= of_trials
 
 
 def test_no_table_has_a_column_twice():

@@ -1,11 +1,7 @@
 import pytest
 
 import grasp_core as gc
-from sim_validate.datasets.config import (
-    DatasetConfig,
-    config_from_toml,
-    config_to_toml,
-)
+from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 
 SETTINGS = {"objects": ["wedge", "dodecahedron"], "frictions": [0.3, 1], "limit": 4, "seed": 7}
 

@@ -18,7 +18,7 @@ from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.learning import execution_cells, execution_rows
 from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import TABLES, GraspRow
-from sim_validate.datasets.verify import Sample, loose_differences, verify
+from sim_validate.datasets.verify import loose_differences, verify
 from sim_validate.execution.verdict import CLEAR_OF_SLIP, ExecutedGrasp
 from tests.sim_validate.datasets.configs import rows_of
 from tests.sim_validate.datasets.engines import Here, silent
@@ -137,7 +137,7 @@ def test_trials_that_come_out_otherwise_are_named(copied):
 
     forged(copied, "executions", change)
     assert verify(copied) == []
-    faults = verify(copied, Sample(0.01))
+    faults = verify(copied, 0.01)
     assert len(faults) == 1
     assert "slip_m is" in faults[0]
 

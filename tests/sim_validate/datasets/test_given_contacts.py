@@ -13,7 +13,7 @@ from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.units import read_given
-from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.verify import verify
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
@@ -50,7 +50,7 @@ def written(path, grasps):
 def judged(folder, path, **settings):
     config = DatasetConfig(objects=("wedge",), contacts=str(path), **settings)
     build(config, folder, Here(), silent)
-    assert verify(folder, Sample(1.0)) == []
+    assert verify(folder, 1.0) == []
     grasps = sim_validate.load_dataset(folder)["grasps"]
     mine = grasps["label"] == "given"
     return {name: column[mine] for name, column in grasps.items()}

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sim_validate
-from sim_validate.datasets.open_dataset import by_object, select
-from sim_validate.datasets.parquet import parquet_bytes, read_columns, read_table
+from sim_validate.datasets.columns import parquet_bytes, read_columns, read_table
+from sim_validate.datasets.open_dataset import select
 from sim_validate.datasets.rows import TABLES
 
 pytest.importorskip("pyarrow")
@@ -74,8 +74,8 @@ def test_truth_values_are_bool_or_floats_that_refuse_to_be_negated(beside, tmp_p
     (path,) = sorted(Path(beside).glob("data/grasps/train-*.parquet"))
     rows = read_table(path, "grasps", TABLES).to_pylist()
     unknown = tmp_path / "grasps.parquet"
-    unknown.write_bytes(parquet_bytes("grasps", [rows[0] | {"held": None}, *rows[1:]], {}))
-    found = read_columns([unknown], "grasps")["held"]
+    unknown.write_bytes(parquet_bytes("grasps", [rows[0] | {"held": None}, *rows[1:]], TABLES))
+    found = read_columns([unknown], "grasps", TABLES)["held"]
     assert found.dtype == np.float64
     assert np.isnan(found).sum() == 1
     assert (found == True).sum() + (found == False).sum() == len(rows) - 1  # noqa: E712
@@ -121,10 +121,11 @@ def test_graspproof_loads_it_as_the_card_says(beside):
 @pytest.mark.parametrize("split", SPLITS)
 def test_every_row_is_met_once_with_its_object(folder, split):
     chosen = select(folder, split)
-    groups = list(by_object(chosen))
-    assert len(groups) == chosen.counts()["objects"]
+    groups = list(chosen.by_object())
+    assert len(groups) == chosen.manifest.count("objects", split)
     for name in TABLES:
-        assert sum(len(group.of(name)) for group in groups) == chosen.counts()[name] > 0
+        count = chosen.manifest.count(name, split)
+        assert sum(len(group.of(name)) for group in groups) == count > 0
     for group in groups:
         (owner,) = group.objects
         assert {row.object_id for row in group.grasps} == {owner.object_id}

@@ -3,17 +3,23 @@ import pytest
 
 import grasp_core as gc
 from scenes.example_objects import example_names, example_object
-from sim_validate.datasets.open_dataset import mesh_path, mesh_text, stored_body, stored_surface
+from sim_validate.datasets.open_dataset import CONFIG, Dataset, mesh_path, mesh_text
 from tests.grasp_core.records import test_recorded_surfaces as recorded
 
 NAMES = [*(name for name in example_names() if "FACES" not in name), "random-30-1"]
+
+
+def dataset_in(folder):
+    """A dataset whose meshes alone are there, with faces of the usual kind."""
+    (folder / CONFIG).write_text('objects = ["wedge"]\n')
+    return Dataset(folder, None)
 
 
 def stored(body, folder):
     path = mesh_path(folder, body.content_sha256)
     path.parent.mkdir(exist_ok=True)
     path.write_text(mesh_text(body))
-    return stored_body(folder, body.content_sha256, body.name, "auto")
+    return dataset_in(folder).body(body.content_sha256, body.name)
 
 
 def same(one, other):
@@ -34,7 +40,7 @@ def same(one, other):
 def test_a_stored_object_comes_back_to_the_last_bit(name, tmp_path):
     body = example_object(name)
     assert same(body, stored(body, tmp_path))
-    mesh = stored_surface(tmp_path, body.content_sha256)
+    mesh = dataset_in(tmp_path).surface(body.content_sha256)
     vertices, triangles = mesh.vertices, mesh.triangles
     np.testing.assert_array_equal(vertices, body.vertices)
     np.testing.assert_array_equal(triangles, body.triangles)
@@ -56,10 +62,10 @@ def test_a_stored_surface_whose_first_line_is_no_record_is_refused_by_field(tmp_
     text = mesh_text(body)
     path.write_text(text.replace('"caps": [190, 191]', '"caps": [190, 192]'))
     with pytest.raises(gc.InputError, match="obj: caps must be numbers of triangles below 192"):
-        stored_body(tmp_path, body.content_sha256, "capped", "auto")
+        dataset_in(tmp_path).body(body.content_sha256, "capped")
     path.write_text(text.replace('"holes": 2', '"holes": "two"'))
     with pytest.raises(gc.InputError, match=r"obj: first line: holes must be a whole"):
-        stored_body(tmp_path, body.content_sha256, "capped", "auto")
+        dataset_in(tmp_path).body(body.content_sha256, "capped")
 
 
 def test_the_mesh_of_another_object_is_refused(tmp_path):
@@ -68,6 +74,6 @@ def test_the_mesh_of_another_object_is_refused(tmp_path):
     path.parent.mkdir()
     path.write_text(mesh_text(prism))
     with pytest.raises(gc.InputError, match="another object"):
-        stored_body(tmp_path, wedge.content_sha256, "wedge", "auto")
+        dataset_in(tmp_path).body(wedge.content_sha256, "wedge")
     with pytest.raises(gc.InputError, match="another object"):
-        stored_surface(tmp_path, wedge.content_sha256)
+        dataset_in(tmp_path).surface(wedge.content_sha256)

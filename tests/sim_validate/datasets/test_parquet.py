@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.datasets import parquet
-from sim_validate.datasets.columns import Column
+from sim_validate.datasets import columns as parquet
+from sim_validate.datasets.columns import Column, each_batch, parquet_bytes, read_table
 from sim_validate.datasets.config import KEYS, DatasetConfig
-from sim_validate.datasets.parquet import each_batch, parquet_bytes, read_table
 from sim_validate.datasets.rows import TABLES
 from sim_validate.datasets.units import body_of, made_of, split_of, units_of
 
@@ -33,7 +32,7 @@ def written(rows, tmp_path):
     found = {}
     for name in TABLES:
         path = tmp_path / f"{name}.parquet"
-        path.write_bytes(parquet_bytes(name, rows[name], {"made by": "a test"}))
+        path.write_bytes(parquet_bytes(name, rows[name], TABLES))
         found[name] = path
     return found
 
@@ -83,9 +82,9 @@ def test_tables_are_read_as_they_were_written(rows, written):
 
 def test_files_do_not_depend_on_the_order_of_rows_nor_on_when_they_are_made(unit, rows):
     for name in TABLES:
-        once = parquet_bytes(name, rows[name], {"a": "1", "b": "2"})
-        assert parquet_bytes(name, rows[name][::-1], {"b": "2", "a": "1"}) == once
-        assert parquet_bytes(name, cells_made(unit)[name], {"a": "1", "b": "2"}) == once
+        once = parquet_bytes(name, rows[name], TABLES)
+        assert parquet_bytes(name, rows[name][::-1], TABLES) == once
+        assert parquet_bytes(name, cells_made(unit)[name], TABLES) == once
 
 
 def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
@@ -106,7 +105,7 @@ def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
 
 def test_two_rows_with_one_name_are_refused(rows):
     with pytest.raises(gc.InputError, match="two rows"):
-        parquet_bytes("grasps", [*rows["grasps"], rows["grasps"][0]], {})
+        parquet_bytes("grasps", [*rows["grasps"], rows["grasps"][0]], TABLES)
 
 
 def test_objects_are_split_by_their_hash_in_stated_shares():

@@ -11,12 +11,10 @@ from grasp_core.values import Contact, ContactRegion
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import validate
 from sim_validate.datasets import learning as varied_figures
-from sim_validate.datasets.config import (
-    Learning,
-    config_from_toml,
-)
-from sim_validate.datasets.learning import RATIOS, Varying, execution_cells, region_exit, variants
-from sim_validate.datasets.verify import Sample, verify
+from sim_validate.datasets.config import Learning, config_from_toml
+from sim_validate.datasets.learning import RATIOS, execution_cells, region_exit, variants
+from sim_validate.datasets.units import Making, units_of
+from sim_validate.datasets.verify import verify
 from sim_validate.engine.setup import Agenda
 from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of
 from tests.sim_validate.datasets.forging import forged
@@ -98,7 +96,7 @@ def test_natural_negatives_are_closed_and_lose_their_object(by_id):
 
 
 def test_a_whole_dataset_has_no_fault_and_comes_out_the_same_again(learned):
-    assert verify(learned, Sample(1.0)) == []
+    assert verify(learned, 1.0) == []
 
 
 @pytest.mark.parametrize(
@@ -142,8 +140,8 @@ def test_draws_depend_on_the_seed_and_not_on_what_else_is_asked_for():
     other = list(variants(WEDGE, grasp, 0.5, Learning(moved_out=1), 1))
     first = next(each for each in many if each.name == "moved_out-0")
     assert len(alone) == len(other) == 1
-    assert np.array_equal(alone[0].displaced_m, first.displaced_m)
-    assert not np.array_equal(alone[0].displaced_m, other[0].displaced_m)
+    assert np.array_equal(alone[0].cells["displaced_m"], first.cells["displaced_m"])
+    assert not np.array_equal(alone[0].cells["displaced_m"], other[0].cells["displaced_m"])
 
 
 def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
@@ -153,10 +151,11 @@ def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
         raise UnfaithfulError("the simulator is not faithful here")
 
     (grasp,) = gc.plan(WEDGE, 0.5, families=("concurrent",), limit=1).grasps
-    varying = Varying(LEARNED, Learning(moved_out=1), 0.5, Agenda())
+    (variant,) = variants(WEDGE, grasp, 0.5, Learning(moved_out=1), 0)
+    unit = next(unit for unit in units_of(LEARNED) if unit.object == WEDGE.name)
     verdict = validate(WEDGE, grasp, 0.5, agenda=Agenda(controls=False))
     monkeypatch.setattr(varied_figures, "execute", unfaithful)
-    (tried,) = varying.of(WEDGE, grasp, verdict, None)
+    tried = Making(unit, WEDGE).varied(variant, verdict)
     assert tried.executed == "the simulator is not faithful here"
     assert execution_cells(tried.executed)["executed"] is False
     assert "survived" not in execution_cells(tried.executed)

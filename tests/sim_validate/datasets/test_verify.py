@@ -13,7 +13,7 @@ from scenes.example_objects import example_object
 from sim_validate import load_dataset
 from sim_validate.datasets.build import build
 from sim_validate.datasets.open_dataset import mesh_text, read_manifest, write_manifest
-from sim_validate.datasets.verify import Sample, drawn, verify
+from sim_validate.datasets.verify import drawn, verify
 from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
 from tests.sim_validate.datasets.engines import Here, contents, silent
@@ -62,7 +62,7 @@ def leaning(rows):
             "must be unit vectors",
         ),
         ("grasps", lambda rows: rows[0].update(held=not rows[0]["held"]), "held is"),
-        ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "object is missing"),
+        ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "in object_id, has no row"),
         ("grasps", lambda rows: rows[0].update(force_closed=False), "force_closed is"),
         (
             "grasps",
@@ -79,7 +79,7 @@ def leaning(rows):
         ("grasps", leaning, "not with its normals"),
         ("grasps", lambda rows: rows[0].update(split="validation"), "rows of another split"),
         ("trials", lambda rows: rows.pop(), "table of trials"),
-        ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody has no row"),
+        ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody, named in grasp_id"),
         ("trials", lambda rows: rows[0].update(outcome="slipped"), "table of trials"),
     ],
 )
@@ -91,7 +91,7 @@ def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
 
 
 def test_all_of_it_comes_out_again(dataset):
-    assert verify(dataset, Sample(1.0)) == []
+    assert verify(dataset, 1.0) == []
 
 
 def test_a_dataset_of_tiny_triangles_verifies(tmp_path):
@@ -128,7 +128,7 @@ def test_what_comes_out_otherwise_is_named(copy):
     for name, change, _ in changes:
         forged(copy, name, change)
     assert verify(copy) == []
-    faults = verify(copy, Sample(1.0))
+    faults = verify(copy, 1.0)
     for _, _, message in changes:
         assert any(message in fault for fault in faults), message
 
@@ -138,9 +138,9 @@ def test_with_other_rounding_verdicts_and_critical_frictions_count(copy, change)
     write_manifest(copy, dataclasses.replace(read_manifest(copy), **change))
     forged(copy, "trials", lambda rows: shifted(rows, "displacement_m"))
     forged(copy, "grasps", lambda rows: shifted(rows, "ferrari_canny_lower_n"))
-    assert verify(copy, Sample(1.0)) == []
+    assert verify(copy, 1.0) == []
     forged(copy, "grasps", lambda rows: shifted(rows, "critical_friction"))
-    faults = verify(copy, Sample(1.0))
+    faults = verify(copy, 1.0)
     assert any("critical_friction is" in fault for fault in faults), faults
 
 
@@ -156,7 +156,7 @@ def test_a_grasp_that_was_left_out_is_named(copy):
     for name in ("grasps", "trials"):
         forged(copy, name, lambda rows: rows.__setitem__(slice(None), list(filter(kept, rows))))
     assert verify(copy) == []
-    assert any(gone in fault and "has no row" in fault for fault in verify(copy, Sample(1.0)))
+    assert any(gone in fault and "has no row" in fault for fault in verify(copy, 1.0))
 
 
 def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
@@ -169,9 +169,9 @@ def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
     config = dataclasses.replace(CONFIG, objects=paths, frictions=(0.5,))
     built = build(config, tmp_path / "ds", Here(), silent)
     assert built.manifest.quarantined == 1
-    assert verify(tmp_path / "ds", Sample(1.0)) == []
+    assert verify(tmp_path / "ds", 1.0) == []
     forged(tmp_path / "ds", "trials", lambda rows: shifted(rows, "displacement_m"))
-    assert any("displacement_m" in fault for fault in verify(tmp_path / "ds", Sample(1.0)))
+    assert any("displacement_m" in fault for fault in verify(tmp_path / "ds", 1.0))
 
 
 def test_what_is_quarantined_has_no_rows(copy):
@@ -181,7 +181,7 @@ def test_what_is_quarantined_has_no_rows(copy):
     path = copy / "quarantine.jsonl"
     path.write_text("\n".join(lines) + "\n")
     relisted(copy, path, quarantined=2)
-    assert sum("left out, but it has rows" in fault for fault in verify(copy, Sample(1.0))) == 2
+    assert sum("left out, but it has rows" in fault for fault in verify(copy, 1.0)) == 2
 
 
 def test_settings_that_are_not_the_manifests_are_named(copy):
@@ -193,11 +193,11 @@ def test_settings_that_are_not_the_manifests_are_named(copy):
 
 def test_a_larger_sample_holds_a_smaller_one():
     units = [(f"{i:064x}", 0.5) for i in range(100)]
-    some, more = drawn(units, Sample(0.1, seed=3)), drawn(units, Sample(0.25, seed=3))
+    some, more = drawn(units, 0.1, seed=3), drawn(units, 0.25, seed=3)
     assert (len(some), len(more)) == (10, 25)
     assert more[:10] == some
-    assert drawn(units, Sample(0.1, seed=4)) != some
-    assert len(drawn(units, Sample(0.001))) == 1
+    assert drawn(units, 0.1, seed=4) != some
+    assert len(drawn(units, 0.001)) == 1
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ CONFIG = DatasetConfig(objects=("tetrahedron",), families=("concurrent",), limit
 @pytest.fixture
 def staging(tmp_path):
     made = Staging(tmp_path / "staging")
-    made.clear_unfinished()
+    made.folder.mkdir()
     return made
 
 
