@@ -13,13 +13,15 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from itertools import groupby
+from typing import Literal, Self, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, Polygon
 from grasp_core.declared import Declared
 from grasp_core.geometry.polygons import convex_hull
+from scenes.drawing.panels import thinned
 from scenes.drawing.sheets import (
     FINGERS,
     FOCUS,
@@ -30,19 +32,19 @@ from scenes.drawing.sheets import (
     Area,
     Dots,
     Line,
+    Mark,
+    closed,
     hexed,
     rgb,
 )
-from scenes.drawing.views import View
+from scenes.drawing.views import Extent, View
 
 Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
     "plane", "ruled surface", "contact", "hand", "fingertip",
 ]  # fmt: skip
-Part: TypeAlias = Area | Line | Dots
-"""A flat part of a picture, in metres from its middle, with y upwards."""
-Near: TypeAlias = tuple[float, Part]
-"""A part and its position along the line of sight [m]; larger values are nearer to the viewer."""
+Near: TypeAlias = tuple[float, Mark]
+"""A mark and its position along the line of sight [m]; larger values are nearer to the viewer."""
 SMOOTH_DEG = 20.0
 """Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
 MOST_EDGES = 1500
@@ -64,8 +66,17 @@ equally bright and on the same side are joined."""
 SHADES = 7
 """Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
 clear glass."""
-WHOLE: tuple[Role, ...] = ("friction cone",)
+SHORT: tuple[Role, ...] = ("friction cone",)
 """Roles whose lines are short, so that each is drawn whole."""
+MARGIN = 0.04
+"""Width of the empty margin, as a share of the picture's width."""
+FARTHEST = 2.0
+"""Distance from the object's centre beyond which points may be cut off, in object radii."""
+KEPT: tuple[Role, ...] = ("hand", "fingertip")
+"""Roles of which nothing is cut off, however far from the object it is."""
+MANY = 60
+"""Number of corners of an area above which those that are not seen are left out."""
+POLYGON = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -89,6 +100,45 @@ class Shape(Declared):
 def extent_of(shapes: Iterable[Shape]) -> Array:
     """Return all points of several shapes, (n, 3) [m]."""
     return np.vstack([shape.vertices() for shape in shapes])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """The square of what a view shows that is drawn on a sheet."""
+
+    view: View
+    low: Array
+    """Lower left corner of the square in the view, (2,) [m]."""
+    width: float
+    """Width of the square in the view [m]."""
+    side: float
+    """Width of the square on the sheet [pixels]."""
+
+    @classmethod
+    def around(
+        cls, shapes: Sequence[Shape], numbers: Array, body: Extent, view: View, side: float
+    ) -> Self:
+        """Choose the square around shapes, and around the places of numbers, (k, 3) [m]."""
+        points = np.vstack([extent_of(shapes), numbers])
+        distances = np.linalg.norm(points - body.center_of_mass, axis=1)
+        kept = [np.full(len(shape.vertices()), shape.role in KEPT) for shape in shapes]
+        hand = np.concatenate([*kept, np.full(len(numbers), any(each.any() for each in kept))])
+        flat, _ = view.seen(points[(distances <= FARTHEST * body.radius) | hand])
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        half = 0.5 * (1.0 + 2.0 * MARGIN) * float((high - low).max())
+        middle = 0.5 * (low + high)
+        low, high = middle - half, middle + half
+        return cls(view, low, float(high[0] - low[0]), side)
+
+    def place(self, flat: Array) -> Array:
+        """Find where places in the view [m] are on the sheet, (n, 2) [pixels]."""
+        scale = self.side / self.width
+        return np.array([0.0, self.side]) + np.array([scale, -scale]) * (flat - self.low)
+
+    def seen(self, points: Array) -> tuple[Array, Array]:
+        """Project points (n, 3) to the sheet, (n, 2) [pixels], with their nearness, (n,) [m]."""
+        flat, near = self.view.seen(points)
+        return self.place(flat), near
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,102 +293,119 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     return tuple(loops)
 
 
-def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Part, ...]:
-    """Return the parts of a picture of a given width [m], in the order to draw them."""
-    parts = [part for shape in shapes for part in _parts(shape, view, width)]
-    return tuple(part for _, part in sorted(parts, key=lambda each: each[0]))
+def painted(shapes: Iterable[Shape], frame: Frame) -> Iterator[Mark]:
+    """Yield the marks of a picture, in the order to draw them; lines that look alike are joined."""
+    parts = [part for shape in shapes for part in _parts(shape, frame)]
+    marks = [mark for _, mark in sorted(parts, key=lambda each: each[0])]
+    for look, alike in groupby(
+        marks, key=lambda mark: (mark.colour, mark.width, mark.opacity)
+        if isinstance(mark, Line) else None
+    ):  # fmt: skip
+        if look is None:
+            yield from alike
+        else:
+            lines = tuple(line for mark in alike if isinstance(mark, Line) for line in mark.lines)
+            yield Line(lines, *look)
 
 
-def _parts(shape: Shape, view: View, width: float) -> Iterator[Near]:
+def _parts(shape: Shape, frame: Frame) -> Iterator[Near]:
     look = look_of(shape)
     if look.fill and shape.polygons:
         paint = _solid if look.solid else FILLED.get(shape.role, _each)
-        yield from paint(shape, look, view)
+        yield from paint(shape, look, frame)
     if shape.role == "object" and shape.polygons:
-        for line in outline(Surface.of(shape.polygons), view.camera):
-            yield from _line(line, LOOKS["edge"], view, width)
-    thick = 0.01 * look.line * width
+        for line in outline(Surface.of(shape.polygons), frame.view.camera):
+            yield from _line(line, LOOKS["edge"], frame)
     for line in shape.lines if look.line else ():
-        if shape.role in WHOLE:
-            flat, near = view.seen(line)
-            yield float(near.mean()), Line((flat,), look.colour, thick, look.opacity)
+        if shape.role in SHORT:
+            flat, near = frame.seen(line)
+            yield float(near.mean()), Line((flat,), look.colour, _thick(look, frame), look.opacity)
         else:
-            yield from _line(line, look, view, width)
+            yield from _line(line, look, frame)
     for point in () if shape.points is None else shape.points:
-        place, (near,) = view.seen(point[None])
+        place, (near,) = frame.seen(point[None])
         # A dot is drawn in front of what it marks.
-        dot = Dots(place, look.colour, 0.005 * look.dot * width, look.opacity)
-        yield float(near) + 0.02 * width, dot
+        dot = Dots(place, look.colour, 0.005 * look.dot * frame.side, look.opacity)
+        yield float(near) + 0.02 * frame.width, dot
 
 
-def _each(shape: Shape, look: Look, view: View) -> Iterator[Near]:
-    for polygon in shape.polygons:
-        flat, near = view.seen(polygon)
-        shade = float(_brightness(_normal(polygon)[None], view)[0]) if look.shaded else 1.0
-        yield float(near.mean()), Area((flat,), _shaded(look.colour, shade), look.fill)
+def _thick(look: Look, frame: Frame) -> float:
+    """Return how wide lines are on the sheet [pixels]."""
+    return round(0.01 * look.line * frame.side, 3)
 
 
-def _glass(shape: Shape, look: Look, view: View) -> Iterator[Near]:
+def _area(flats: Iterable[Array], colour: str, opacity: float, frame: Frame) -> Area:
+    """Fill loops of places in the view [m], without corners that would not be seen."""
+    loops = tuple(map(frame.place, flats))
+    if sum(map(len, loops)) > MANY:
+        loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
+    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), colour, opacity)
+
+
+def _each(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
+    bright = _brightness(_normals(shape.polygons), frame.view).tolist()
+    for polygon, shade in zip(shape.polygons, bright, strict=True):
+        flat, near = frame.view.seen(polygon)
+        colour = _shaded(look.colour, shade) if look.shaded else look.colour
+        yield float(near.mean()), _area([flat], colour, look.fill, frame)
+
+
+def _glass(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
     """Draw a clear surface; of many polygons, those that look alike are joined."""
     if len(shape.polygons) <= FEW:
-        yield from _each(shape, look, view)
+        yield from _each(shape, look, frame)
         return
-    surface = Surface.of(shape.polygons)
+    surface, view = Surface.of(shape.polygons), frame.view
     front = surface.facing(view.camera)
-    bright = _brightness(surface.normals, view)
-    levels = _levels(bright)
+    levels = _levels(_brightness(surface.normals, view))
     nearness = view.seen(surface.corners)[1]
     for side in (False, True):
         near = nearness[(front == side)[surface.owners]]
         depth = float(near.mean()) if len(near) else 0.0
         for level in np.unique(levels[front == side]).tolist():
             loops = joined(surface, (front == side) & (levels == level))
-            flat = tuple(view.seen(loop)[0] for loop in loops)
-            yield depth, Area(flat, _shaded(look.colour, _shade(level)), look.fill)
+            flats = [view.seen(loop)[0] for loop in loops]
+            yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, frame)
 
 
-def _solid(shape: Shape, look: Look, view: View) -> Iterator[Near]:
+def _solid(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
     """Draw a convex body: its outline, and on it the sides that face the viewer."""
-    corners = shape.vertices()
-    middle = corners.mean(axis=0)
+    corners, view = shape.vertices(), frame.view
     flat, near = view.seen(corners)
     depth = float(near.mean())
-    sides = list[tuple[Array, int]]()
-    for polygon in shape.polygons:
-        normal = _normal(polygon)
-        normal = normal if normal @ (polygon.mean(axis=0) - middle) > 0.0 else -normal
-        if normal @ (view.camera - polygon[0]) > 0.0:
-            sides.append((polygon, int(_levels(_brightness(normal[None], view))[0])))
-    mean = round(float(np.mean([level for _, level in sides] or [SHADES - 1])))
-    yield depth, Area((convex_hull(flat),), _shaded(look.colour, _shade(mean)), look.fill)
-    for level in sorted({level for _, level in sides} - {mean}):
-        alike = tuple(view.seen(polygon)[0] for polygon, other in sides if other == level)
-        yield depth, Area(alike, _shaded(look.colour, _shade(level)), look.fill)
+    middles = np.array([polygon.mean(axis=0) for polygon in shape.polygons])
+    firsts = np.array([polygon[0] for polygon in shape.polygons])
+    normals = _normals(shape.polygons)
+    inward = np.einsum("ij,ij->i", normals, middles - corners.mean(axis=0)) <= 0.0
+    normals[inward] *= -1.0
+    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, view.camera - firsts) > 0.0)
+    levels = _levels(_brightness(normals[facing], view))
+    mean = round(float(levels.mean())) if len(levels) else SHADES - 1
+    yield depth, _area([convex_hull(flat)], _shaded(look.colour, _shade(mean)), look.fill, frame)
+    for level in sorted({*levels.tolist()} - {mean}):
+        flats = [view.seen(shape.polygons[side])[0] for side in facing[levels == level].tolist()]
+        yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, frame)
 
 
-def _cone(shape: Shape, look: Look, view: View) -> Iterator[Near]:
+def _cone(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
-    flat, near = view.seen(shape.vertices())
-    for part in (convex_hull(flat), view.seen(rim)[0]):
-        yield float(near.mean()), Area((part,), look.colour, look.fill)
+    flat, near = frame.view.seen(shape.vertices())
+    for part in (convex_hull(flat), frame.view.seen(rim)[0]):
+        yield float(near.mean()), _area([part], look.colour, look.fill, frame)
 
 
-FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Near]]] = {
+FILLED: dict[Role, Callable[[Shape, Look, Frame], Iterator[Near]]] = {
     "object": _glass, "force cone": _cone,
 }  # fmt: skip
 """How areas of some roles are drawn, other than each on its own."""
 
 
-def _normal(polygon: Array) -> Array:
-    """Return the unit normal of a flat polygon; zero if its first corners are in line."""
-    one, two = (polygon[1] - polygon[0]).tolist(), (polygon[2] - polygon[1]).tolist()
-    # written out, because NumPy's function takes twenty times as long for one pair
-    normal = np.array([
-        one[1] * two[2] - one[2] * two[1],
-        one[2] * two[0] - one[0] * two[2],
-        one[0] * two[1] - one[1] * two[0],
-    ])  # fmt: skip
-    return normal / max(float(np.linalg.norm(normal)), np.finfo(np.float64).tiny)
+def _normals(polygons: Sequence[Array]) -> Array:
+    """Return unit normals of flat polygons, (k, 3); zero where first corners are in line."""
+    corners = np.array([polygon[:3] for polygon in polygons])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.maximum(lengths, np.finfo(np.float64).tiny)
 
 
 def _brightness(normals: Array, view: View) -> Array:
@@ -362,16 +429,16 @@ def _shaded(colour: str, shade: float) -> str:
     return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
 
 
-def _line(line: Array, look: Look, view: View, width: float) -> Iterator[Near]:
-    flat, near = view.seen(line)
-    thick = 0.01 * look.line * width
+def _line(line: Array, look: Look, frame: Frame) -> Iterator[Near]:
+    flat, near = frame.view.seen(line)
+    nearer, thick = 0.005 * look.line * frame.width, _thick(look, frame)
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
         length = float(np.linalg.norm(end - start))
         if length > 0.0:
-            for low, high in _spans(length / width, look):
+            for low, high in _spans(length / frame.width, look):
                 ends = np.array([start + low * (end - start), start + high * (end - start)])
-                depth = float(first + 0.5 * (low + high) * (last - first)) + 0.5 * thick
-                yield depth, Line((ends,), look.colour, thick, look.opacity)
+                depth = float(first + 0.5 * (low + high) * (last - first)) + nearer
+                yield depth, Line((frame.place(ends),), look.colour, thick, look.opacity)
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:

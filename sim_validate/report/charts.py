@@ -23,12 +23,11 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.errors import InputError
-from grasp_core.kinds import Quantity, value_of
+from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import check_drawn
 from scenes.drawing.panels import (
     ROW,
     SMALL,
@@ -40,6 +39,7 @@ from scenes.drawing.panels import (
     ticks_between,
     ticks_in,
 )
+from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import (
     BAD,
     FINGERS,
@@ -61,7 +61,7 @@ from scenes.drawing.sheets import (
     levels_of,
     outlined,
 )
-from scenes.drawing.views import View, best_view
+from scenes.drawing.views import View
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Replayed
 from sim_validate.closure.verdict import AGREEMENT
@@ -123,47 +123,33 @@ def margin_figure(
     Raises:
         InputError: The grasp does not lie on the body, or is not in force closure at this friction.
     """
-    panels = margin_panels(body, grasp, friction, max_normal_force_n=max_normal_force_n)
-    return beside(panels)
+    return beside(margin_panels(Drawing(body, grasp, friction), max_normal_force_n))
 
 
-def margin_panels(
-    body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
-) -> tuple[Sheet, Sheet]:
+def margin_panels(drawing: Drawing, max_normal_force_n: float) -> tuple[Sheet, Sheet]:
     """Draw the panels of `margin_figure` as sheets of their own."""
-    forces, torques = margins(body, grasp, friction, max_normal_force_n=max_normal_force_n)
+    forces, torques = margins(drawing, max_normal_force_n)
     return _map(forces, "force", "N"), _map(torques, "torque", "mN m")
 
 
-def margins(
-    body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
-) -> tuple[Array, Array]:
+def margins(drawing: Drawing, max_normal_force_n: float) -> tuple[Array, Array]:
     """Compute the largest force [N] and torque [mN m] resisted, (LATITUDES, LONGITUDES) each."""
-    check_drawn(body, grasp, friction)
-    value_of(Quantity, max_normal_force_n, "max_normal_force_n")
-    certificate = force_closure(grasp, friction=friction)
-    if certificate.forces is None:
+    grasp, friction, body = drawing.grasp, drawing.friction, drawing.body
+    largest = value_of(Quantity, max_normal_force_n, "max_normal_force_n")
+    if not force_closure(grasp, friction=friction).closed:
         raise InputError(
             f"{grasp.id} is not in force closure at friction {friction:g}, so it resists nothing "
             f"in some direction; draw it at a friction above {grasp.critical_friction:.4g}"
         )
-    ways = np.zeros((LATITUDES * LONGITUDES, 6))
-    ways[:, :3] = directions_of_map().reshape(-1, 3)
-    forces = _limits(body, grasp, friction, max_normal_force_n, ways)
-    ways = np.roll(ways, 3, axis=1) * body.radius
-    torques = _limits(body, grasp, friction, max_normal_force_n, ways)
-    return forces, MILLI * body.radius * torques
-
-
-def _limits(
-    body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
-) -> Array:
+    ways, still = directions_of_map().reshape(-1, 3), np.zeros((LATITUDES * LONGITUDES, 3))
+    wrenches = np.vstack([np.hstack([ways, still]), np.hstack([still, body.radius * ways])])
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
     found = wrench_limits(
         grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
     )
-    limits = np.array([each.limit for each in found])
-    return limits[same.reshape(-1)].reshape(LATITUDES, LONGITUDES)
+    limits = np.array([each.limit for each in found])[same.reshape(-1)]
+    forces, torques = limits.reshape(2, LATITUDES, LONGITUDES)
+    return forces, MILLI * body.radius * torques
 
 
 def _nodes() -> tuple[Array, Array]:
@@ -275,20 +261,19 @@ def wrench_figure(
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.
     """
-    return beside(wrench_panels(body, grasp, friction, view=view))
+    return beside(wrench_panels(Drawing(body, grasp, friction), view))
 
 
-def wrench_panels(
-    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
-) -> tuple[Sheet, Sheet, Sheet]:
+def wrench_panels(drawing: Drawing, view: View | None = None) -> tuple[Sheet, Sheet, Sheet]:
     """Draw the panels of `wrench_figure` as sheets of their own."""
-    check_drawn(body, grasp, friction, view)
-    view = view or best_view(body, grasp)
+    if view is not None:
+        instance(view, View, "view", "View.of_angles makes one")
+    body, (right, up, _) = drawing.body, (view or drawing.view()).axes
     quality = ferrari_canny(
-        grasp, friction=friction, center=body.center_of_mass, torque_scale=body.radius
-    )
+        drawing.grasp, friction=drawing.friction, center=body.center_of_mass,
+        torque_scale=body.radius,
+    )  # fmt: skip
     wrenches, radius = quality.wrenches, quality.upper
-    right, up = view.axes[0], view.axes[1]
     still = np.zeros(3)
     closed = "weakest direction" if radius > 0.0 else "not in force closure: zero is outside"
     scale = f"torques over {1e3 * body.radius:.3g} mm"

@@ -20,7 +20,7 @@ from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_trial_clip
 from scenes.drawing.pages import turntable_page
-from scenes.drawing.pictures import grasp_sheet
+from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
@@ -62,17 +62,16 @@ def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
     held = held_in(reaches, grasp)
     if reaches is not None and held is None:
         reporter.warn(f"the hand is not shown: {why_not_held(reaches, grasp)}")
-    files = list[str]()
+    drawing, files = Drawing(saved.body, grasp, friction, held), list[str]()
 
     def keep(path: Path) -> None:
         reporter.say(f"wrote {path}")
         files.append(str(path))
 
     if command.picture is not None:
-        sheet = grasp_sheet(saved.body, grasp, friction, legend=True, held=held)
-        keep(sheet.write(command.picture))
+        keep(drawing.sheet(legend=True).write(command.picture))
     if command.page is not None:
-        keep(write_text(command.page, turntable_page(saved.body, grasp, friction, held)))
+        keep(write_text(command.page, turntable_page(drawing)))
     if command.clip is not None:
         keep(write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip))
     reporter.document({"id": grasp.id, "files": files})

@@ -15,9 +15,8 @@ from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.hands import PosedHand
-from scenes.drawing.pictures import grasp_sheet
-from scenes.drawing.sheets import svg_of
-from scenes.drawing.views import best_view
+from scenes.drawing.pictures import Drawing
+from scenes.drawing.sheets import Sheet, svg_of
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Wanted, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict
@@ -103,26 +102,27 @@ def tasks_of(
 
 def draw(task: Task) -> Drawn:
     """Draw one grasp and write its pictures and charts."""
-    body, grasp, friction = task.saved.body, task.grasp, task.saved.friction
-    view = best_view(body, grasp)
-    path = task.folder / PICTURES / f"{task.name}.svg"
-    write_text(path, svg_of(grasp_sheet(body, grasp, friction, view=view), alone=True))
-    drawn = Drawn(f"{PICTURES}/{path.name}")
+    drawing = Drawing(task.saved.body, task.grasp, task.saved.friction)
+    view = drawing.view()
+    drawn = Drawn(_picture(task, drawing.sheet(view), ""))
     if task.held is not None:
-        path = task.folder / PICTURES / f"{task.name}-hand.svg"
-        sheet = grasp_sheet(body, grasp, friction, held=task.held)
-        write_text(path, svg_of(sheet, alone=True))
-        drawn = replace(drawn, hand=f"{PICTURES}/{path.name}")
-    if force_closure(grasp, friction=friction).closed:
-        largest = largest_push(task.verdict)
-        wrenches = wrench_panels(body, grasp, friction, view=view)
-        margins = margin_panels(body, grasp, friction, max_normal_force_n=largest)
+        sheet = replace(drawing, held=task.held).sheet()
+        drawn = replace(drawn, hand=_picture(task, sheet, "-hand"))
+    if force_closure(task.grasp, friction=drawing.friction).closed:
+        wrenches = wrench_panels(drawing, view)
+        margins = margin_panels(drawing, largest_push(task.verdict))
         drawn = replace(
             drawn, wrenches=tuple(map(svg_of, wrenches)), margins=tuple(map(svg_of, margins))
         )
     if task.verdict is not None:
         drawn = _with_motion(task, task.verdict, drawn)
     return _with_executed(task, task.executions, drawn) if task.clip and task.executions else drawn
+
+
+def _picture(task: Task, sheet: Sheet, suffix: str) -> str:
+    path = f"{PICTURES}/{task.name}{suffix}.svg"
+    write_text(task.folder / path, svg_of(sheet, alone=True))
+    return path
 
 
 def _with_motion(task: Task, verdict: Verdict, drawn: Drawn) -> Drawn:

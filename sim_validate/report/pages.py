@@ -22,6 +22,7 @@ from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing import pages
 from scenes.drawing.pages import NOTHING, Fact, as_text, grasp_data, grasp_facts, number
+from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import night_style, svg_of
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.planning.asked_objects import GRASPS
@@ -135,7 +136,9 @@ def grasp_page(
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
         commands=list(_commands(run, grasp, verdict)),
         drawing=as_text(
-            grasp_data(run.saved.body, shown, run.friction, sections.held_in(run.reaches, grasp))
+            grasp_data(
+                Drawing(run.saved.body, shown, run.friction, sections.held_in(run.reaches, grasp))
+            )
         ),
     )
 
