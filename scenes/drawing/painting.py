@@ -383,7 +383,8 @@ def _solid(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
     mean = round(float(levels.mean())) if len(levels) else SHADES - 1
     yield depth, _area([convex_hull(flat)], _shaded(look.colour, _shade(mean)), look.fill, frame)
     for level in sorted({*levels.tolist()} - {mean}):
-        flats = [view.seen(shape.polygons[side])[0] for side in facing[levels == level].tolist()]
+        alike: list[int] = facing[levels == level].tolist()
+        flats = [view.seen(shape.polygons[side])[0] for side in alike]
         yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, frame)
 
 

@@ -32,8 +32,8 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id
 from sim_validate.report.report import Report, write_report
-from sim_validate.report.run_folder import GRASPS, folder_of, reaches_beside
-from sim_validate.report.sections import held_in, why_not_held
+from sim_validate.report.run_folder import GRASPS, RunFolder, folder_of, reaches_beside
+from sim_validate.report.sections import why_not_held
 
 COMING, RESTING = 60, 20
 """Number of clip frames in which fingers come in, and in which they then stay."""
@@ -59,10 +59,10 @@ def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
         reporter.document({"id": grasp.id, "files": []})
         return Exit.GOOD
     reaches = reaches_beside(path, saved) if command.hand else None
-    held = held_in(reaches, grasp)
-    if reaches is not None and held is None:
-        reporter.warn(f"the hand is not shown: {why_not_held(reaches, grasp)}")
-    drawing, files = Drawing(saved.body, grasp, friction, held), list[str]()
+    found = RunFolder(path.parent, saved, friction, reaches=reaches).of(grasp)
+    if reaches is not None and found.held is None:
+        reporter.warn(f"the hand is not shown: {why_not_held(found)}")
+    drawing, files = Drawing(saved.body, grasp, friction, found.held), list[str]()
 
     def keep(path: Path) -> None:
         reporter.say(f"wrote {path}")

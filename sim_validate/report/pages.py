@@ -6,7 +6,6 @@ The templates include those of single drawings.
 import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any, cast
@@ -17,7 +16,6 @@ from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.figures import figures, table
 from grasp_core.files.records import record_of
-from grasp_core.objects.symmetries import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing import pages
@@ -37,12 +35,11 @@ from sim_validate.report.agreement import (
     frictions_in,
     limits_in,
     quadrants_in,
-    said_of_execution,
     wrench_size,
 )
+from sim_validate.report.cards import Card, Paged, largest_push
 from sim_validate.report.charts import fidelity_panel
-from sim_validate.report.drawn_grasps import Drawn, largest_push
-from sim_validate.report.run_folder import RunFolder, about_grasp
+from sim_validate.report.run_folder import Findings, RunFolder
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -63,8 +60,6 @@ def style() -> str:
 
 
 MILLI, MICRO, PERCENT = 1e3, 1e6, 100.0
-ROTATED, MIRRORED = "rotated", "mirrored"
-"""Kinds of copies of a grasp, as the pages call them."""
 FAMILIES = {
     "concurrent": "the lines of force meet in one point",
     "pencil": "two pairs of lines, which meet in points of a common line",
@@ -81,29 +76,17 @@ SAID_ABOVE = ("id", "outcome", "predicted_critical_friction", "simulated_critica
 FOCUS = "where lines of force meet, in the object's frame"
 
 
-@dataclass(frozen=True, slots=True)
-class Copy:
-    """A grasp that a symmetry of the object makes from another."""
-
-    id: str
-    page: str
-    """Path of its page, relative to the report's folder."""
-    kind: str
-    """`ROTATED`, or `MIRRORED` if only a reflection makes it."""
-
-
 def grasp_page(
-    run: RunFolder, grasp: Grasp, object_script: str, drawn: Drawn | None = None, *,
-    neighbours: tuple[str | None, str | None] = (None, None), copies: Sequence[Copy] = (),
-    first: Copy | None = None,
+    found: Findings, card: Card, around: tuple[str | None, str | None] = (None, None),
+    copy: Paged | None = None,
 ) -> str:  # fmt: skip
-    """Write the text of the page about one grasp.
+    """Write the text of the page about one grasp: that of a card, or a copy, which has no pictures.
 
-    It leads to the pages before and after it. A grasp that is drawn has copies by symmetry; of
-    these, `first` is the one that is drawn, with the kind of this copy.
+    It leads to the pages before and after it, and from a copy to the grasp that is drawn.
     """
-    verdict, shown = run.verdict(grasp.id), run.shown(grasp)
-    said, tone = run.said(grasp.id)
+    run, grasp, verdict = found.run, found.grasp, found.verdict
+    said, tone = found.said
+    drawn = card.drawn if copy is None else None
     size = None if verdict is None else verdict.scale.grasp_size_m
     return page(
         "grasp.html",
@@ -114,36 +97,32 @@ def grasp_page(
         verdict=verdict,
         verdict_text=said,
         tone=tone,
-        before=neighbours[0],
-        after=neighbours[1],
-        copies=copies,
-        first=first,
+        before=around[0],
+        after=around[1],
+        card=card,
+        copy=copy,
         drawn=drawn,
         push=largest_push(verdict),
-        executed=sections.execution_section(run, grasp.id),
-        reached=sections.reach_section(run.reaches, grasp),
+        executed=sections.execution_section(found),
+        reached=sections.reach_section(found),
         executed_clips=drawn.executed if drawn else (),
-        object_script=object_script,
-        facts=list(_facts(run, grasp, verdict)),
-        contacts=list(_contacts(shown)),
+        facts=list(_facts(found)),
+        contacts=list(_contacts(found.shown)),
         run=run,
-        certified=about_grasp(run.certified, grasp.id),
+        certified=found.certified,
         sizes={  # by which torques are divided: the object's radius, the grasp's size
             "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
             "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
         },
         trial_columns=[(each.shown.heading, each.meaning) for each in TRIAL_FIGURES],
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
-        commands=list(_commands(run, grasp, verdict)),
-        drawing=as_text(
-            grasp_data(
-                Drawing(run.saved.body, shown, run.friction, sections.held_in(run.reaches, grasp))
-            )
-        ),
+        commands=list(_commands(found)),
+        drawing=as_text(grasp_data(Drawing(run.saved.body, found.shown, run.friction, found.held))),
     )
 
 
-def _facts(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable[Fact]:
+def _facts(found: Findings) -> Iterable[Fact]:
+    run, grasp, verdict = found.run, found.grasp, found.verdict
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
     yield "Family", grasp.family, FAMILIES[grasp.family]
@@ -156,9 +135,7 @@ def _facts(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable[Fa
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
         yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
     if verdict is not None:
-        for figure in figures(Verdict):
-            if figure.name not in SAID_ABOVE and figure.of(verdict) is not None:
-                yield figure.shown.heading, figure.cell(verdict), figure.meaning
+        yield from sections.facts_of(verdict, SAID_ABOVE)
         if (repeats := verdict.robustness) is not None:
             low, high = repeats.interval
             said = f"held {repeats.held} of {len(repeats.trials)} times"
@@ -210,17 +187,18 @@ def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
     }
 
 
-def _commands(run: RunFolder, grasp: Grasp, verdict: Verdict | None) -> Iterable[str]:
+def _commands(found: Findings) -> Iterable[str]:
+    run, grasp = found.run, found.grasp
     asked = f"--grasp {shlex.quote(grasp.id)}"
     other = "" if run.friction == run.saved.friction else f" --friction {run.friction:g}"
     yield f"graspproof view {GRASPS} {asked}{other}"
-    if verdict is not None:
+    if found.verdict is not None:
         yield f"graspproof replay . {asked} --out replay"
-        for name in (each.control.name for each in verdict.controls):
+        for name in (each.control.name for each in found.verdict.controls):
             yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
-    if run.executions is not None and grasp.id in run.executions:
+    if run.executions is not None and found.executed is not None:
         yield sections.execute_command(run.executions, GRASPS, grasp.id)
-    yield from sections.reach_commands(run.reaches, grasp, GRASPS)
+    yield from sections.reach_commands(found, GRASPS)
 
 
 def millimetres(point: Array) -> str:
@@ -229,45 +207,6 @@ def millimetres(point: Array) -> str:
 
 
 ROWS = 20
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """A card in the gallery of the first page: a grasp, and its copies by symmetry."""
-
-    run: RunFolder
-    grasp: Grasp
-    script: str
-    """Name of the script with the object's drawing."""
-    page: str
-    """Path of the grasp's page, relative to the report's folder, as that of the picture."""
-    copies: tuple[Copy, ...] = ()
-    picture: str = ""
-    """Path of the picture; empty until it is drawn."""
-
-
-def cards_of(run: RunFolder) -> tuple[Copies, ...]:
-    """Sort the grasps of a run into cards: each is a grasp and those that symmetries make of it.
-
-    Only grasps whose tests ended alike share a card, so that no problem is hidden behind another
-    grasp.
-
-    Gives places of the grasps in the run, by card, in the order of the cards' first grasps.
-    """
-    grasps = run.saved.grasps
-    ended: dict[object, list[int]] = {}
-    for place, grasp in enumerate(grasps):
-        executed = said_of_execution(run.executed(grasp.id)) if run.executions else None
-        reached = sections.said_of_reach(run.reaches, grasp)[0]
-        ended.setdefault((run.said(grasp.id), executed, reached), []).append(place)
-    cards = list[Copies]()
-    for places in ended.values():
-        for card in copies_of(run.saved.body, [grasps[place] for place in places]):
-            rotated, mirrored = (
-                tuple(places[each] for each in found) for found in (card.rotated, card.mirrored)
-            )
-            cards.append(Copies(places[card.first], rotated, mirrored))
-    return tuple(sorted(cards, key=lambda card: card.first))
 
 
 def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 0) -> str:
@@ -339,29 +278,28 @@ def _described_possible(best: Best) -> Record:
     }
 
 
-def _card(shown: Card) -> dict[str, Any]:
-    grasp, verdict = shown.grasp, shown.run.verdict(shown.grasp.id)
-    said, tone = shown.run.said(grasp.id)
+def _card(card: Card) -> dict[str, Any]:
+    found, run, grasp = card.found, card.found.run, card.found.grasp
+    said, tone = found.said
+    simulated = None if found.reached is None else found.reached.simulated
     return {
         "id": grasp.id,
-        "object": shown.run.saved.body.name,
+        "object": run.saved.body.name,
         "family": grasp.family,
-        "page": shown.page,
-        "picture": shown.picture,
-        "copies": shown.copies,
-        "mirrored": sum(copy.kind == MIRRORED for copy in shown.copies),
+        "page": card.page,
+        "picture": card.drawn.hand or card.drawn.picture if card.drawn else "",
+        "copies": card.copies,
+        "mirrored": sum(copy.mirrored for copy in card.copies),
         "verdict": said,
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),
         "quality": grasp.ferrari_canny[0],
-        "share": shown.run.possible.shares.get(grasp.id) if shown.run.possible else None,
+        "share": run.possible.shares.get(grasp.id) if run.possible else None,
         "critical_friction": grasp.critical_friction,
-        "executed": sections.execution_row(shown.run.executed(grasp.id))
-        if shown.run.executions
-        else None,
-        "reached": sections.said_of_reach(shown.run.reaches, grasp) if shown.run.reaches else None,
-        "weakest": None if verdict is None else _weakest(verdict),
-        "by_hand": sections.held_by_hand(shown.run.reaches, grasp),
+        "executed": sections.execution_row(found.executed) if run.executions else None,
+        "reached": sections.said_of_reach(found) if run.reaches else None,
+        "weakest": None if found.verdict is None else _weakest(found.verdict),
+        "by_hand": None if simulated is None else simulated.weakest_n,
     }
 
 

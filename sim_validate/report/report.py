@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
@@ -12,7 +13,7 @@ from scenes.drawing.pages import as_text, object_data
 from sim_validate.kit import files
 from sim_validate.kit.processes import available_cores, each
 from sim_validate.report import pages
-from sim_validate.report.drawn_grasps import Drawn, Task, draw, tasks_of
+from sim_validate.report.cards import Card, cards_to_draw, draw
 from sim_validate.report.run_folder import RunFolder, folder_of, runs_in
 
 FIRST = 4
@@ -81,14 +82,20 @@ def write_report(
     runs = tuple(run.first(limit) for run in runs_in(folder))
     files.require_report_folder(out)
     with files.new_pages(out) as place:
-        cards = list(_cards(runs, place, clips))
+        cards = list(_cards(runs, clips))
         ready = ready if place == out else _nothing
         report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
     return replace(report, index=out / files.INDEX)
 
 
+def _cards(runs: Runs, clips: int) -> Iterator[Card]:
+    for number, run in enumerate(runs):
+        prefix = f"{number}-" if len(runs) > 1 else ""
+        yield from cards_to_draw(run, f"object-{number}.js", prefix, clips)
+
+
 def _written(
-    cards: Sequence[tuple[pages.Card, Task]], runs: Runs, out: Path, jobs: int,
+    cards: Sequence[Card], runs: Runs, out: Path, jobs: int,
     progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
 ) -> Report:  # fmt: skip
     for name in files.STATIC:
@@ -96,14 +103,18 @@ def _written(
     for number, run in enumerate(runs):
         data = as_text(object_data(run.saved.body))
         write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
-    tasks = [task for _, task in cards]
-    names = [None, *(f"{task.name}.html" for task in tasks), None]
-    shown = list[pages.Card]()
+    tasks = [replace(card, copies=()) for card in cards]
+    names = [None, *(f"{card.name}.html" for card in cards), None]
+    shown = list[Card]()
     no_clip, next_index = "", min(FIRST, len(cards))
-    results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
-    for (card, _), drawn in zip(cards, results, strict=True):
+    drawing = partial(draw, out)
+    results = chain(each(drawing, tasks[:FIRST], jobs=1), each(drawing, tasks[FIRST:], jobs=jobs))
+    for card, drawn in zip(cards, results, strict=True):
         around = names[len(shown)], names[len(shown) + 2]
-        shown.append(_pages_of(card, drawn, out, around))
+        shown.append(replace(card, drawn=drawn))
+        write_text(out / card.page, pages.grasp_page(card.found, shown[-1], around))
+        for copy in card.copies:
+            write_text(out / copy.page, pages.grasp_page(copy.found, card, copy=copy))
         no_clip = no_clip or drawn.no_clip
         if len(shown) == next_index:
             waiting = len(cards) - len(shown)
@@ -114,35 +125,3 @@ def _written(
         progress(len(shown), len(cards))
     grasps = sum(1 + len(card.copies) for card in shown)
     return Report(out / files.INDEX, grasps, no_clip, len(cards))
-
-
-def _cards(runs: Runs, out: Path, clips: int) -> Iterator[tuple[pages.Card, Task]]:
-    for number, run in enumerate(runs):
-        prefix = f"{number}-" if len(runs) > 1 else ""
-        grasps = run.saved.grasps
-        classes = pages.cards_of(run)
-        firsts = [grasps[each.first] for each in classes]
-        for found, task in zip(classes, tasks_of(run, firsts, out, prefix, clips), strict=True):
-            copies = tuple(
-                pages.Copy(grasps[place].id, f"{files.GRASPS}/{prefix}{grasps[place].id}.html",
-                     pages.MIRRORED if place in found.mirrored else pages.ROTATED)
-                for place in found.places if place != found.first
-            )  # fmt: skip
-            script, path = f"object-{number}.js", f"{files.GRASPS}/{task.name}.html"
-            yield pages.Card(run, grasps[found.first], script, path, copies), task
-
-
-def _pages_of(
-    card: pages.Card, drawn: Drawn, out: Path, around: tuple[str | None, str | None]
-) -> pages.Card:
-    """Write the page of a card's grasp, and those of its copies, which have no pictures."""
-    grasps = {grasp.id: grasp for grasp in card.run.saved.grasps}
-    text = pages.grasp_page(
-        card.run, card.grasp, card.script, drawn, neighbours=around, copies=card.copies
-    )
-    write_text(out / card.page, text)
-    for copy in card.copies:
-        first = pages.Copy(card.grasp.id, card.page, copy.kind)
-        text = pages.grasp_page(card.run, grasps[copy.id], card.script, first=first)
-        write_text(out / copy.page, text)
-    return replace(card, picture=drawn.hand or drawn.picture)

@@ -12,9 +12,7 @@ from grasp_core.declared import counted
 from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
 from grasp_core.hands.named_hands import HANDS
-from grasp_core.values import Grasp
-from scenes.drawing.hands import PosedHand, posed_hand
-from scenes.drawing.pages import number
+from scenes.drawing.pages import Fact, number
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     ExecutionControl,
@@ -24,14 +22,12 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of_execution
-from sim_validate.report.run_folder import RunFolder, about_grasp
+from sim_validate.report.run_folder import Findings
 from sim_validate.settings import ExecutionSettings
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-Fact = tuple[str, str, str]
-"""Name, value and meaning of a figure."""
 REASONS = {
     "collision": "a collision",
     "limit": "a joint's limit",
@@ -47,30 +43,23 @@ ALWAYS = ("mass_kg", "seed")
 """Settings of executions whose usual value depends on the object or on the plan."""
 
 
-def held_in(reaches: "Reaches | None", grasp: Grasp) -> PosedHand | None:
-    """Return the hand in the pose in which it stands in a grasp."""
-    found = about_grasp(reaches, grasp.id)
-    if reaches is None or found is None or not found.reach.reached:
-        return None
-    return posed_hand(reaches.hand, found.reach, grasp)
-
-
-def why_not_held(reaches: "Reaches", grasp: Grasp) -> str:
+def why_not_held(found: Findings) -> str:
     """Say why there is no hand to draw in a grasp."""
-    found = about_grasp(reaches, grasp.id)
-    if found is None:
-        return f"reaches.json holds nothing about {grasp.id}; `graspproof reach` looks for a pose"
-    return f"{grasp.id}: {found.reach.explanation}"
+    name, reached = found.grasp.id, found.reached
+    if reached is None:
+        return f"reaches.json holds nothing about {name}; `graspproof reach` looks for a pose"
+    return f"{name}: {reached.reach.explanation}"
 
 
-def said_of_reach(reaches: "Reaches | None", grasp: Grasp) -> tuple[str, str]:
+def said_of_reach(found: Findings) -> tuple[str, str]:
     """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
+    reached, reaches = found.reached, found.run.reaches
     if reaches is None:
         return "", QUIET
-    found, name = about_grasp(reaches, grasp.id), reaches.hand.name
-    if found is None:
+    name = reaches.hand.name
+    if reached is None:
         return f"{name}: not asked", QUIET
-    reach, held, executed = found.reach, found.simulated, found.executed
+    reach, held, executed = reached.reach, reached.simulated, reached.executed
     if not reach.reached:
         return f"{name}: not reached, {REASONS[reach.reason]}", QUIET
     within = reach.within_regions or ()
@@ -86,15 +75,6 @@ def said_of_reach(reaches: "Reaches | None", grasp: Grasp) -> tuple[str, str]:
         said.append(f"survived {kept} of {len(executed.trials)} trials")
     lost = executed is not None and not all(trial.survived for trial in executed.trials)
     return ", ".join(said), BAD if lost or (held is not None and not held.held) else GOOD
-
-
-def held_by_hand(reaches: "Reaches | None", grasp: Grasp) -> float | None:
-    """Return the weakest wrench that a hand resists in a grasp [N]; None if it was not simulated.
-
-    Torques count over the object's radius.
-    """
-    found = about_grasp(reaches, grasp.id)
-    return None if found is None or found.simulated is None else found.simulated.weakest_n
 
 
 def described_reaches(reaches: "Reaches | None") -> str:
@@ -117,18 +97,18 @@ def reach_settings(reaches: "Reaches") -> Iterable[tuple[str, str]]:
         yield "hand.torque_limits_n_m", ", ".join(f"{limit:g}" for limit in stated)
 
 
-def reach_section(reaches: "Reaches | None", grasp: Grasp) -> Record | None:
+def reach_section(found: Findings) -> Record | None:
     """Build the section about the hand in a grasp; None where no hand was asked for."""
-    found = about_grasp(reaches, grasp.id)
-    if reaches is None or found is None:
+    reached, reaches = found.reached, found.run.reaches
+    if reaches is None or reached is None:
         return None
-    said, tone = said_of_reach(reaches, grasp)
+    said, tone = said_of_reach(found)
     return {
         "hand": reaches.hand.name,
         "said": said.partition(": ")[2],
         "tone": tone,
-        "facts": list(_reach_facts(reaches, found)),
-        "explanation": found.reach.explanation,
+        "facts": list(_reach_facts(reaches, reached)),
+        "explanation": reached.reach.explanation,
     }
 
 
@@ -136,11 +116,11 @@ def _reach_facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
     if found.reach.reached:
         names = reaches.finger_names(found.reach)
         yield "Fingers used", ", ".join(f"{k}: {name}" for k, name in enumerate(names)), FINGERS
-    yield from _figures(found, "")
+    yield from _of_hand(found)
     if found.simulated is not None:
-        yield from _figures(found.simulated, "With its motors: ")
+        yield from _of_hand(found.simulated, "With its motors: ")
     if (executed := found.executed) is not None:
-        yield from _figures(executed, "Executed with the hand: ")
+        yield from _of_hand(executed, "Executed with the hand: ")
         if executed.reason is not None:
             yield "Not executed", executed.reason, ""
         yield from _enough(executed)
@@ -151,20 +131,26 @@ def _enough(found: ExecutedGrasp) -> Iterable[Fact]:
         yield "What would be enough", str(found.enough), ""
 
 
-def _figures(record: object, part: str) -> Iterable[Fact]:
-    """Yield the figures that a record has, but for the grasp that the page is about."""
+def facts_of(record: object, but: Sequence[str]) -> Iterable[Fact]:
+    """Yield the figures that a record has, but for those that the page says in other places."""
     for each in figures(type(record)):
-        if each.name not in SAID_ABOVE and each.of(record) is not None:
-            heading = f"{part}{each.shown.heading}"
-            yield heading[:1].upper() + heading[1:], each.cell(record), each.meaning
+        if each.name not in but and each.of(record) is not None:
+            yield each.shown.heading, each.cell(record), each.meaning
 
 
-def reach_commands(reaches: "Reaches | None", grasp: Grasp, path: str) -> Sequence[str]:
+def _of_hand(record: object, part: str = "") -> Iterable[Fact]:
+    for heading, cell, meaning in facts_of(record, SAID_ABOVE):
+        said = f"{part}{heading}"
+        yield f"{said[0].upper()}{said[1:]}", cell, meaning
+
+
+def reach_commands(found: Findings, path: str) -> Sequence[str]:
     """Write the shell command that seeks the pose again; none for a hand from a file."""
-    if reaches is None or reaches.hand.name not in HANDS or grasp.id not in reaches:
+    reaches = found.run.reaches
+    if reaches is None or reaches.hand.name not in HANDS or found.reached is None:
         return []
     asked, usual = reaches.asked, type(reaches.asked)()
-    words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", grasp.id]
+    words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", found.grasp.id]
     words += ["--friction", repr(reaches.friction)]
     numbers = replace(asked, regions=usual.regions, table_down=usual.table_down)
     words += _changed_flags(numbers, usual)
@@ -198,19 +184,19 @@ def described_executions(executions: Executions) -> str:
     return " ".join(f"{line[0].upper()}{line[1:]}." for line in totals_in_words(executions) + ended)
 
 
-def execution_section(run: RunFolder, name: str) -> Record | None:
+def execution_section(found: Findings) -> Record | None:
     """Build the section about the execution of a grasp; None where no grasp was executed."""
-    if run.executions is None:
+    executed, executions = found.executed, found.run.executions
+    if executions is None:
         return None
-    found = run.executed(name)
-    said, tone = said_of_execution(found)
-    execution = None if found is None else found.execution
+    said, tone = said_of_execution(executed)
+    execution = None if executed is None else executed.execution
     trials, controls = ((), ()) if execution is None else (execution.trials, execution.controls)
     return {
         "said": said,
         "tone": tone,
-        "facts": list(_execution_facts(run.executions, found)),
-        "reason": None if found is None else found.reason,
+        "facts": list(_execution_facts(executions, executed)),
+        "reason": None if executed is None else executed.reason,
         "trials": records_table(trials, ExecutionTrial),
         "controls": records_table(controls, ExecutionControl),
         "skipped": () if execution is None else execution.skipped,
