@@ -20,8 +20,13 @@ from scenes.drawing.pictures import Drawing, grasp_figure
 from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, png_of
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.report.agreement import Agreement
-from sim_validate.report.charts import fidelity_panel, margin_figure, motion_panels, wrench_figure
+from sim_validate.report.charts import (
+    Agreement,
+    fidelity_panel,
+    margin_figure,
+    motion_panels,
+    wrench_figure,
+)
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"

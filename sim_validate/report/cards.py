@@ -4,7 +4,7 @@ Any process can draw a card. Charts of motion need a trial: the first that was n
 weakest wrench, is simulated again.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -22,9 +22,8 @@ from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
 from sim_validate.kit.files import CLIPS, GRASPS, PICTURES
-from sim_validate.report.agreement import said_of_execution
 from sim_validate.report.charts import margin_panels, motion_panels, wrench_panels
-from sim_validate.report.run_folder import Findings, RunFolder
+from sim_validate.report.run_folder import Findings, RunFolder, said_of_execution
 from sim_validate.report.sections import said_of_reach
 
 
@@ -112,18 +111,21 @@ def cards_of(run: RunFolder) -> tuple[Copies, ...]:
     return tuple(sorted(cards, key=lambda card: card.first))
 
 
-def cards_to_draw(run: RunFolder, script: str, prefix: str, clips: int) -> Iterator[Card]:
-    """Yield the cards of a run, with clips of some, those with problems first."""
-    paged = [Paged(found, f"{prefix}{found.grasp.id}", mirrored=False) for found in run]
-    classes = cards_of(run)
-    firsts = [paged[each.first] for each in classes]
-    filmed = sorted(firsts, key=lambda each: not each.found.alarming)[:clips]
-    for first, places in zip(firsts, classes, strict=True):
-        copies = tuple(
-            replace(paged[place], mirrored=place in places.mirrored)
-            for place in places.places if place != places.first
-        )  # fmt: skip
-        yield Card(first.found, first.name, False, script, first in filmed, copies)
+def cards_to_draw(runs: Sequence[RunFolder], clips: int) -> Iterator[Card]:
+    """Yield the cards of runs, with clips of some of each run, those with problems first."""
+    for number, run in enumerate(runs):
+        prefix = f"{number}-" if len(runs) > 1 else ""
+        paged = [Paged(found, f"{prefix}{found.grasp.id}", mirrored=False) for found in run]
+        classes = cards_of(run)
+        firsts = [paged[each.first] for each in classes]
+        filmed = sorted(firsts, key=lambda each: not each.found.alarming)[:clips]
+        for first, places in zip(firsts, classes, strict=True):
+            copies = tuple(
+                replace(paged[place], mirrored=place in places.mirrored)
+                for place in places.places if place != places.first
+            )  # fmt: skip
+            script, clip = f"object-{number}.js", first in filmed
+            yield Card(first.found, first.name, False, script, clip, copies)
 
 
 def draw(folder: Path, card: Card) -> Drawn:

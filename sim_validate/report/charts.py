@@ -11,11 +11,16 @@ border of W in its weakest direction; in a plane that holds this direction, the 
 line that touches the disc and the projection.
 
 A trial's charts show how far object and fingers moved, and how hard fingers pushed. Points of
-simulated over predicted values should lie on the line of equal values.
+simulated over predicted values should lie on the line of equal values. A trial that was predicted
+to hold and did not, or the reverse, contradicts the analysis or the simulation. As in `validate`,
+neither is counted for loads within `AGREEMENT` of their limit and for trials that prove nothing,
+such as those that diverged.
 """
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -63,9 +68,10 @@ from scenes.drawing.sheets import (
 )
 from scenes.drawing.views import View
 from scenes.settings import FingerSettings
+from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Replayed
-from sim_validate.closure.verdict import AGREEMENT
-from sim_validate.report.agreement import Agreement
+from sim_validate.closure.verdict import AGREEMENT, Verdict, WrenchVerdict
+from sim_validate.engine.traces import LET_GO, Outcome
 
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
@@ -438,6 +444,94 @@ def friction_used(pushes: Array, friction: Array) -> Array:
     pushing = normal > LEAST_PUSH * max(float(normal.max(initial=0.0)), 1e-12)
     safe = np.where(pushing, normal, 1.0) * friction[:, None]
     return np.where(pushing, tangential / safe, np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Predicted and simulated values of one quantity, such as the critical friction."""
+
+    quantity: str
+    pairs: tuple[tuple[float, float], ...]
+    below: int = 0
+    """Number of grasps that held even at the least friction tried, so no value was found."""
+
+    def differ(self) -> tuple[bool, ...]:
+        """Whether each pair differs by more than is allowed."""
+        return tuple(abs(two - one) > AGREEMENT * one for one, two in self.pairs)
+
+    @property
+    def worst(self) -> float:
+        """Largest relative difference between prediction and simulation; 0 without pairs."""
+        shares = [abs(two - one) / one if one > 0.0 else math.inf for one, two in self.pairs]
+        return max(shares, default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Quadrants:
+    """Numbers of trials, counted by what was predicted and what happened."""
+
+    resisted_held: int = 0
+    resisted_let_go: int = 0
+    not_resisted_held: int = 0
+    not_resisted_let_go: int = 0
+    neither: int = 0
+
+
+def frictions_in(verdicts: Iterable[Verdict]) -> Agreement:
+    """Compare critical frictions; a simulated zero means that the least one tried sufficed."""
+    found = [verdict.critical_friction for verdict in verdicts]
+    measured = [(each.predicted, each.simulated) for each in found if each.simulated is not None]
+    pairs = tuple(pair for pair in measured if pair[1])
+    return Agreement("critical friction", pairs, len(measured) - len(pairs))
+
+
+def limits_in(verdicts: Iterable[Verdict]) -> Agreement:
+    """Compare the sizes of the largest wrenches that were resisted."""
+    pairs = tuple(
+        (size * trial.predicted_limit, size * trial.simulated_limit)
+        for verdict in verdicts
+        for trial in verdict.wrenches
+        if trial.simulated_limit is not None and math.isfinite(trial.predicted_limit)
+        for size in [wrench_size(verdict, trial)]
+    )
+    return Agreement("largest wrench [N], torques over grasp size", pairs)
+
+
+def wrench_size(verdict: Verdict, trial: WrenchVerdict) -> float:
+    """Compute the size of a trial's wrench [N], with torques divided by the grasp's size."""
+    force, torque = np.reshape(trial.wrench, (2, 3))
+    return math.hypot(*force, *(torque / verdict.scale.grasp_size_m))
+
+
+def quadrants_in(verdicts: Sequence[Verdict]) -> Quadrants:
+    """Count trials of grasps and of negative controls; nothing resists the loads of a control."""
+    counts = Counter[str]()
+    for verdict in verdicts:
+        counts.update(_place(trial, resisted(trial)) for trial in verdict.wrenches)
+        for control in verdict.controls:
+            counts.update(_place(trial, False) for trial in control.tried)
+    return Quadrants(**counts)
+
+
+def resisted(trial: WrenchVerdict) -> bool | None:
+    """Tell whether a load is predicted to be resisted; None if it is too near its limit."""
+    limit = trial.predicted_limit
+    return None if abs(limit - 1.0) <= AGREEMENT else limit > 1.0
+
+
+def as_predicted(trial: WrenchVerdict) -> bool:
+    """Tell whether a trial ended as predicted, or in a way that the prediction leaves open."""
+    wanted = resisted(trial)
+    ends = (Outcome.HELD, *LET_GO) if wanted is None else (Outcome.HELD,) if wanted else LET_GO
+    return trial.hold.outcome in ends
+
+
+def _place(trial: WrenchVerdict | ControlTrial, wanted: bool | None) -> str:
+    outcome = trial.hold.outcome
+    if wanted is None or outcome not in (Outcome.HELD, *LET_GO):
+        return "neither"
+    held = "held" if outcome is Outcome.HELD else "let_go"
+    return f"{'resisted' if wanted else 'not_resisted'}_{held}"
 
 
 def fidelity_panel(agreement: Agreement) -> Sheet:

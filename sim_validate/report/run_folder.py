@@ -1,4 +1,4 @@
-"""Reads the folder of a run: its grasps, verdicts, executions, regions, and a hand's poses."""
+"""Reads the folder of a run, its grasps and all results, and says how tests of a grasp ended."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -13,17 +13,20 @@ from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.drawing.hands import PosedHand, posed_hand
 from sim_validate.closure.verdict import Verdict, Verdicts
+from sim_validate.engine.traces import LET_GO, Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.kit.files import REACHES
 from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best import Best
 from sim_validate.planning.regions import GraspRegions, Regions
 from sim_validate.protocols.verdict import Judgements
-from sim_validate.report.agreement import BAD, said_of_both
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
+GOOD, BAD, QUIET = "good", "bad", "quiet"
+FAILED, LOST = "failed", "lost"
+"""Word that begins how many trials were not survived, and the one word for it."""
 File = TypeVar("File", Verdicts, Executions, Regions, Judgements, Best)
 Item = TypeVar("Item", bound=Named)
 
@@ -121,6 +124,53 @@ class Findings:
         if reaches is None or found is None or not found.reach.reached:
             return None
         return posed_hand(reaches.hand, found.reach, self.grasp)
+
+
+def said_of(verdict: Verdict | None) -> tuple[str, str]:
+    """Say in words what the verdict on a grasp is, and of which kind: good, bad or quiet."""
+    if verdict is None:
+        return "not validated", QUIET
+    outcome = verdict.outcome.value.replace("_", " ")
+    if verdict.outcome not in (Outcome.HELD, *LET_GO):
+        return outcome, BAD
+    if verdict.mismatches:
+        return "contradicts the analysis", BAD
+    if any(control.held for control in verdict.controls):
+        return "a negative control held", BAD
+    if not verdict.controls_let_go:
+        return "a negative control is undecided", BAD
+    return outcome, GOOD if verdict.held else BAD
+
+
+def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
+    """Say in words how the execution of a grasp ended, with the tone: good, bad or neither."""
+    if found is None:
+        return "not executed", QUIET
+    if found.execution is None:
+        return "no squeeze", BAD
+    if not found.controls_let_go:
+        return "a negative control held", BAD
+    if not found.execution.trials:
+        return "no trial is possible", BAD
+    if lost := found.execution.lost:
+        return f"{FAILED} {len(lost)} of {len(found.execution.trials)} trials", BAD
+    return "survived", GOOD
+
+
+def said_of_both(
+    verdict: Verdict | None, executions: Executions | None, found: ExecutedGrasp | None
+) -> tuple[str, str]:
+    """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
+
+    Gives the words, and the tone: good, bad or neither; bad if either ending is.
+    """
+    closure, tone = said_of(verdict)
+    if executions is None:
+        return closure, tone
+    ended, other = said_of_execution(found)
+    tones = {tone, other}
+    worst = next(each for each in (BAD, GOOD, QUIET) if each in tones)
+    return f"closure: {closure}; execution: {LOST if ended.startswith(FAILED) else ended}", worst
 
 
 def folder_of(path: Path) -> Path:

@@ -2,9 +2,9 @@
 
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 
@@ -21,13 +21,14 @@ from sim_validate.execution.verdict import (
     multiple_in_words,
     totals_in_words,
 )
-from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of_execution
-from sim_validate.report.run_folder import Findings
+from sim_validate.report.run_folder import BAD, GOOD, QUIET, Findings, said_of_execution
 from sim_validate.settings import ExecutionSettings
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
+Record: TypeAlias = Mapping[str, Any]
+"""What a template fills in, by name."""
 REASONS = {
     "collision": "a collision",
     "limit": "a joint's limit",

@@ -18,23 +18,21 @@ from sim_validate.closure.verdict import WrenchVerdict
 from sim_validate.engine.rig import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome
-from sim_validate.report.agreement import (
+from sim_validate.report.charts import (
     Agreement,
     as_predicted,
-    frictions_in,
-    limits_in,
-    quadrants_in,
-)
-from sim_validate.report.charts import (
     directions_of_map,
     fidelity_panel,
     friction_used,
+    frictions_in,
+    limits_in,
     margin_figure,
     margin_panels,
     margins,
     motion_panels,
     on_map,
     pixels,
+    quadrants_in,
     shadow_of,
     wrench_panels,
 )

@@ -31,10 +31,9 @@ from sim_validate.kit.files import AboutObject
 from sim_validate.main import main
 from sim_validate.report import cards
 from sim_validate.report import report as reports
-from sim_validate.report.agreement import said_of_both
 from sim_validate.report.cards import Drawn
 from sim_validate.report.report import write_report
-from sim_validate.report.run_folder import runs_in
+from sim_validate.report.run_folder import runs_in, said_of_both
 from sim_validate.report.sections import execute_command
 from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.changing import changed, slipped
