@@ -35,8 +35,17 @@ from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.painting import Role, Shape
-from scenes.drawing.views import DISTANCE, SAME_MERIT, Alone, View, edge_on, least_gaps, views_at
+from scenes.drawing.painting import (
+    DISTANCE,
+    SAME_MERIT,
+    Alone,
+    Role,
+    Shape,
+    View,
+    edge_on,
+    least_gaps,
+    views_at,
+)
 
 STEPS = 3
 """Number of sides along a quarter of a circle."""

@@ -31,7 +31,7 @@ from grasp_core.kinds import path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
-from scenes.drawing.painting import Shape, look_of
+from scenes.drawing.painting import Alone, Extent, Shape, View, look_of
 from scenes.drawing.pictures import (
     AZIMUTH_DEG,
     ELEVATION_DEG,
@@ -43,7 +43,6 @@ from scenes.drawing.pictures import (
     sheet_of,
 )
 from scenes.drawing.sheets import svg_of
-from scenes.drawing.views import Alone, Extent, View
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.layout import Layout
 

@@ -32,10 +32,20 @@ from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import SAME_SHARE, first_best
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.hands import PosedHand, hand_shapes, numbers_behind, posed_hand, view_of_hand
-from scenes.drawing.painting import LOOKS, Frame, Role, Shape, feature_edges, painted
+from scenes.drawing.painting import (
+    LOOKS,
+    Extent,
+    Frame,
+    Role,
+    Shape,
+    View,
+    approaches,
+    best_view,
+    feature_edges,
+    painted,
+)
 from scenes.drawing.panels import ROW, Entry, Kind, keyed
 from scenes.drawing.sheets import FINGERS, NEUTRAL, Sheet, closed, format_of, numbered
-from scenes.drawing.views import Extent, View, approaches, best_view
 
 RULINGS = 40
 PARALLEL = 1e-9

@@ -33,6 +33,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
+from scenes.drawing.painting import View
 from scenes.drawing.panels import (
     ROW,
     SMALL,
@@ -66,7 +67,6 @@ from scenes.drawing.sheets import (
     levels_of,
     outlined,
 )
-from scenes.drawing.views import View
 from scenes.settings import FingerSettings
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Replayed

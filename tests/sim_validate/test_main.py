@@ -11,8 +11,8 @@ import pytest
 
 import scenes
 from grasp_core.planning.request import FAMILIES
+from scenes.drawing.painting import View
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
-from scenes.drawing.views import View
 from scenes.example_objects import example_object
 from sim_validate import main as commands
 from sim_validate.kit import processes

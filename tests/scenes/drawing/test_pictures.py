@@ -12,7 +12,17 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_hull
-from scenes.drawing.painting import LOOKS, Frame, Shape, Surface, outline, painted
+from scenes.drawing.painting import (
+    FORESHORTENED,
+    LOOKS,
+    Frame,
+    Shape,
+    Surface,
+    View,
+    best_view,
+    outline,
+    painted,
+)
 from scenes.drawing.panels import width_of
 from scenes.drawing.pictures import BAR_RADIUS, Drawing, glass, grasp_figure, write_picture
 from scenes.drawing.sheets import (
@@ -31,7 +41,6 @@ from scenes.drawing.sheets import (
     png_of,
     rgb,
 )
-from scenes.drawing.views import FORESHORTENED, View, best_view
 from tests.scenes.drawing.whole import assert_whole
 from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
