@@ -308,6 +308,8 @@ class Surface:
     """Number of the point at each corner, (n,); polygons that meet share numbers."""
     owners: Indices
     """Polygon of each corner, (n,)."""
+    following: Indices
+    """Place of the next corner of the same polygon for each corner, (n,)."""
     normals: Array
     """Unit normals, outwards, (polygons, 3); zero for polygons without area."""
 
@@ -319,27 +321,26 @@ class Surface:
         size = float(np.ptp(corners, axis=0).max())
         places = np.rint(corners / (SAME_POINT * size)).astype(np.int64)
         names = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
-        owners = np.repeat(np.arange(len(polygons)), counts)
-        turned = np.cross(corners, corners[_followers(owners, counts)])
-        normals = np.add.reduceat(turned, np.cumsum(counts) - counts)
+        ends, following = np.cumsum(counts), np.arange(1, len(corners) + 1)
+        following[ends - 1] = ends - counts
+        normals = np.add.reduceat(np.cross(corners, corners[following]), ends - counts)
         lengths = np.linalg.norm(normals, axis=1)
         normals = normals / np.where(lengths > 0.0, lengths, np.inf)[:, None]
-        return cls(corners, names, owners, normals)
+        return cls(corners, names, np.repeat(np.arange(len(polygons)), counts), following, normals)
 
-    def following(self) -> Indices:
-        """Return the place of the next corner of the same polygon for each corner, (n,)."""
-        return _followers(self.owners, np.bincount(self.owners))
+    def edges(self) -> tuple[Indices, Indices, Array]:
+        """Pair the edges of polygons that meet: first corners in one and, reversed, in another.
 
-    def edges(self) -> tuple[Indices, Indices]:
-        """Pair the edges of polygons that meet: first corners in one and, reversed, in another."""
-        first, second = self.names, self.names[self.following()]
+        Gives also the angles between the normals on both sides, (k,) [rad].
+        """
+        first, second = self.names, self.names[self.following]
         count = int(self.names.max()) + 1
         ahead, back = first * count + second, second * count + first
         order = np.argsort(ahead)
-        found = np.minimum(np.searchsorted(ahead, back, sorter=order), len(ahead) - 1)
-        other = order[found]
-        paired = (ahead[other] == back) & (first < second)
-        return np.flatnonzero(paired), other[paired]
+        other = order[np.minimum(np.searchsorted(ahead, back, sorter=order), len(ahead) - 1)]
+        one = np.flatnonzero((ahead[other] == back) & (first < second))
+        sides = self.normals[self.owners[one]], self.normals[self.owners[other[one]]]
+        return one, other[one], np.arccos(np.clip(np.einsum("ij,ij->i", *sides), -1.0, 1.0))
 
     def facing(self, camera: Array) -> Array:
         """Tell which polygons face a point, (polygons,)."""
@@ -348,46 +349,29 @@ class Surface:
 
     def segments(self, places: Indices) -> Array:
         """Return the edges that begin at corners, (k, 2, 3) [m]."""
-        return np.stack([self.corners[places], self.corners[self.following()[places]]], axis=1)
-
-
-def _followers(owners: Indices, counts: Indices) -> Indices:
-    """Return the place of the next corner of the same polygon, (n,)."""
-    places = np.arange(len(owners)) + 1
-    ends = np.cumsum(counts)
-    places[ends - 1] = ends - counts
-    return places
-
-
-def _angles(surface: Surface, one: Indices, two: Indices) -> Array:
-    """Measure the angles between the normals on both sides of edges, (k,) [rad]."""
-    sides = surface.normals[surface.owners[one]], surface.normals[surface.owners[two]]
-    return np.arccos(np.clip(np.einsum("ij,ij->i", *sides), -1.0, 1.0))
+        return np.stack([self.corners[places], self.corners[self.following[places]]], axis=1)
 
 
 def feature_edges(polygons: Sequence[Array]) -> Array:
     """Find the edges at which a surface is bent, the sharpest first, (k, 2, 3) [m]."""
     surface = Surface.of(polygons)
-    one, two = surface.edges()
-    angles = _angles(surface, one, two)
+    places, _, angles = surface.edges()
     order = np.argsort(-angles, kind="stable")[:MOST_EDGES]
-    return surface.segments(one[order[angles[order] > math.radians(SMOOTH_DEG)]])
+    return surface.segments(places[order[angles[order] > math.radians(SMOOTH_DEG)]])
 
 
 def outline(surface: Surface, camera: Array) -> Array:
     """Find the smooth edges between polygons that face the camera and others, (k, 2, 3) [m]."""
-    one, two = surface.edges()
+    one, two, angles = surface.edges()
     front = surface.facing(camera)
     between = front[surface.owners[one]] != front[surface.owners[two]]
-    one, two = one[between], two[between]
-    return surface.segments(one[_angles(surface, one, two) <= math.radians(SMOOTH_DEG)])
+    return surface.segments(one[between & (angles <= math.radians(SMOOTH_DEG))])
 
 
 def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     """Join polygons of a surface that meet, and return the loops around them, each (k, 3) [m]."""
-    following = surface.following()
     places = np.flatnonzero(chosen[surface.owners])
-    first, second = surface.names[places], surface.names[following[places]]
+    first, second = surface.names[places], surface.names[surface.following[places]]
     count = int(surface.names.max()) + 1
     alone = ~np.isin(second * count + first, first * count + second)
     ways = defaultdict[int, list[tuple[int, int]]](list)

@@ -42,8 +42,6 @@ from scenes.drawing.panels import (
     Scale,
     marker,
     thinned,
-    ticks_between,
-    ticks_in,
 )
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import (
@@ -211,14 +209,12 @@ def _scale(low: float, high: float) -> Iterator[Mark]:
     ends = f"{low:.3g}", f"{high:.3g}"
     yield Words(EDGE, top + 20.0, ends[0], "start", SMALL)
     yield Words(WIDTH - EDGE, top + 20.0, ends[1], "end", SMALL)
-    inside = [tick for tick in ticks_in(low, high) if low < tick < high] if high > low else []
-    between = [
-        tick for tick in inside if APART < (tick - low) / (high - low) < 1.0 - APART
-    ]  # fmt: skip
-    for tick in between:
-        x = EDGE + long * (tick - low) / (high - low)
-        yield ink_line([(x, top + 10.0), (x, top + 13.0)])
-        yield Words(x, top + 20.0, f"{tick:g}", "middle", SMALL)
+    for tick in Scale(low, high).ticks() if high > low else ():
+        share = (tick - low) / (high - low)
+        if APART < share < 1.0 - APART:
+            x = EDGE + long * share
+            yield ink_line([(x, top + 10.0), (x, top + 13.0)])
+            yield Words(x, top + 20.0, f"{tick:g}", "middle", SMALL)
     y = top + 40.0
     yield outlined([circle(np.array([EDGE + 6.0, y]), 5.0)], BAD, 2.5)
     yield Words(EDGE + 18.0, y, f"least: {low:.3g}", size=SMALL)
@@ -338,7 +334,7 @@ def _shadow(
     x, y = (Scale(float(each - half), float(each + half)) for each in middle)
     panel = Panel(PLACE[0], PLACE[1], PLACE[2], PLACE[2], x, y)
     disc = circle(np.zeros(2), ball)
-    marks = [*panel.frame(ticks_in(x.low, x.high), ticks_in(y.low, y.high))]
+    marks = [*panel.frame(x.ticks(), y.ticks())]
     area = thinned(panel.at(*border.T))
     marks += [Area((area,), GOOD, 0.25), outlined([area], GOOD), *_hatched(panel, ball)]
     marks += [outlined([panel.at(*disc.T)], INK, 1.2)]
@@ -401,7 +397,7 @@ def _moved(found: Replayed, threshold_m: float) -> Sheet:
     steps = 10.0 ** np.arange(-4, math.log10(highest), 2)
     slips = list(zip(FINGERS, trace.slips_m.T, strict=False))
     marks = [
-        *panel.frame(ticks_in(panel.x.low, panel.x.high, 4), steps.tolist()),
+        *panel.frame(panel.x.ticks(4), steps.tolist()),
         *(panel.curve(trace.times_s, MICRO * slip, colour) for colour, slip in slips),
         panel.curve(trace.times_s, MICRO * trace.displacements_m, INK, 1.8),
         panel.level(MICRO * threshold_m, BAD),
@@ -420,7 +416,7 @@ def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str
     panel = _panel(times, Scale(low, top if limit is None else MOST_SHARE * limit[0]))
     curves = list(zip(FINGERS, values.T, strict=False))
     marks = [
-        *panel.frame(ticks_in(panel.x.low, panel.x.high, 4), ticks_in(panel.y.low, panel.y.high)),
+        *panel.frame(panel.x.ticks(4), panel.y.ticks()),
         *(panel.curve(times, np.where(np.isfinite(each), each, np.nan), colour)
           for colour, each in curves),
         panel.upright(0.0, NEUTRAL, dashed=True),
@@ -548,10 +544,9 @@ def fidelity_panel(agreement: Agreement) -> Sheet:
     ends = np.array([0.7 * pairs.min(), 1.4 * pairs.max()])
     scale = Scale(float(ends[0]), float(ends[1]), log=True)
     panel = Panel(*PAIRS_PLACE, scale, scale)
-    ticks = ticks_between(scale.low, scale.high)
     low, high = (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends
     band = np.vstack([panel.at(ends, low), panel.at(ends, high)[::-1]])
-    marks: list[Mark] = [*panel.frame(ticks, ticks), Area((band,), NEUTRAL, 0.3)]
+    marks: list[Mark] = [*panel.frame(scale.ticks(), scale.ticks()), Area((band,), NEUTRAL, 0.3)]
     marks.append(Line((panel.at(ends, ends),), NEUTRAL, 1.0))
     key = [Entry("identity", NEUTRAL), Entry(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
     off = np.array(agreement.differ())
