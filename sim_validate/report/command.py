@@ -73,7 +73,11 @@ def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
     if command.page is not None:
         keep(write_text(command.page, turntable_page(drawing)))
     if command.clip is not None:
-        keep(write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip))
+        scene = _scene(saved, grasp, friction)
+        joints = closing(scene)
+        azimuths = np.linspace(0.0, SWING_DEG, len(joints))
+        angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])
+        keep(write_clip(scene, joints, command.clip, grasp.id, angles_deg=angles))
     reporter.document({"id": grasp.id, "files": files})
     return Exit.GOOD
 
@@ -101,14 +105,6 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
             f"MuJoCo's viewer failed with exit code {ended}; show the grasp with --picture, "
             "--page or --clip"
         )
-
-
-def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
-    """Write a clip in which fingers come in to their contacts while the camera moves around."""
-    joints = closing(scene)
-    azimuths = np.linspace(0.0, SWING_DEG, len(joints))
-    angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])
-    return write_clip(scene, joints, path, grasp.id, angles_deg=angles)
 
 
 def closing(scene: Scene) -> Array:
@@ -162,8 +158,14 @@ MICRO = 1e6
 
 def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     """Simulate a recorded trial again and compare its outcome with that in the file."""
-    wanted = Wanted(command.grasp, command.control, command.trial, command.grasps)
-    recorded = _recorded(command.source, wanted)
+    if command.trial is not None and command.control is not None:
+        raise InputError(
+            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
+            "give only one of them"
+        )
+    source = command.source
+    read = recorded_in_dataset if (source / MANIFEST).is_file() else recorded_in
+    recorded = read(source, Wanted(command.grasp, command.control, command.trial, command.grasps))
     found = replayed(recorded, command.wrench)
     said = recorded.outcome_of(found.name)
     _show(recorded, found, said, reporter)
@@ -171,18 +173,6 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     beside = {"recorded_outcome": said, "files": [str(path) for path in files]}
     reporter.document({"name": recorded.name, **record_of(found), **beside})
     return Exit.GOOD if found.hold.outcome.value == said else Exit.NEGATIVE
-
-
-def _recorded(source: Path, wanted: Wanted) -> Recorded:
-    """Read a contact set from a `verdicts.json`, the folder of a run, or a dataset."""
-    if wanted.trial is not None and wanted.control is not None:
-        raise InputError(
-            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
-            "give only one of them"
-        )
-    if source.is_dir() and (source / MANIFEST).is_file():
-        return recorded_in_dataset(source, wanted)
-    return recorded_in(source, wanted)
 
 
 def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Reporter) -> None:
