@@ -4,7 +4,7 @@ import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from sim_validate.execution.verdict import (
     multiple_in_words,
     totals_in_words,
 )
+from sim_validate.hands.flags import Reach
+from sim_validate.kit.command_flags import Execute
+from sim_validate.kit.flag_values import flags_from
 from sim_validate.report.run_folder import BAD, GOOD, QUIET, Findings, said_of_execution
 from sim_validate.settings import ExecutionSettings
 
@@ -154,7 +157,7 @@ def reach_commands(found: Findings, path: str) -> Sequence[str]:
     words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", found.grasp.id]
     words += ["--friction", repr(reaches.friction)]
     numbers = replace(asked, regions=usual.regions, table_down=usual.table_down)
-    words += _changed_flags(numbers, usual)
+    words += flags_from(_changed(numbers, usual), Reach)
     words += [] if asked.table_down is None else ["--table", *map(repr, asked.table_down)]
     words += [] if asked.regions else ["--contacts-only"]
     return [shlex.join(words)]
@@ -209,27 +212,14 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
     usual = ExecutionSettings(executions.settings.object_kg).used
-    return shlex.join([*words, *_changed_flags(executions.settings, usual, ALWAYS)])
+    changed = _changed(executions.settings, usual, ALWAYS)
+    return shlex.join([*words, *flags_from(changed, Execute)])
 
 
-def _changed_flags(settings: Any, usual: Any, always: Sequence[str] = ()) -> list[str]:
-    """Write flags for settings that are not the usual ones, and for some others."""
-    changed = {name: value for name, value in asdict(settings).items()
-               if name in always or value != getattr(usual, name)}  # fmt: skip
-    return [
-        word for name, value in changed.items()
-        for word in (f"--{name.replace('_', '-')}", *_words(value))
-    ]  # fmt: skip
-
-
-def _words(value: object) -> list[str]:
-    """Write the value of a flag: several numbers stand apart, names of trials have commas."""
-    if not isinstance(value, tuple):
-        return [repr(value)]
-    parts = cast("tuple[object, ...]", value)
-    if all(isinstance(part, str) for part in parts):
-        return [",".join(map(str, parts))]
-    return [repr(part) for part in parts]
+def _changed(settings: Any, usual: Any, always: Sequence[str] = ()) -> Record:
+    """Return the settings that are not the usual ones, and some others."""
+    return {name: value for name, value in asdict(settings).items()
+            if name in always or value != getattr(usual, name)}  # fmt: skip
 
 
 def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Iterable[Fact]:

@@ -196,6 +196,17 @@ def test_a_table_of_a_config_file_sets_a_group_of_flags(here, capsys):
     assert "--patches.most must be a whole number from 4 up to 200" in capsys.readouterr().err
 
 
+def test_a_vector_of_a_config_file_sets_one_flag(here, capsys):
+    import trimesh
+
+    body = scenes.example_object("wedge")
+    trimesh.Trimesh(body.vertices, body.triangles).export(here / "wedge.stl")
+    (here / "c.toml").write_text("center_of_mass_m = [0.001, 0.0, -0.002]\n")
+    words = ["inspect", "wedge.stl", "--unit", "m", "--json", "--config", "c.toml"]
+    assert main(words) == Exit.GOOD
+    assert json.loads(capsys.readouterr().out)["center_of_mass_m"] == [0.001, 0.0, -0.002]
+
+
 @pytest.mark.usefixtures("here")
 def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
     monkeypatch.setattr("sim_validate.closure.controls.judge", _always_held)
