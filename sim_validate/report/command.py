@@ -58,7 +58,7 @@ def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
         _in_viewer(_scene(saved, grasp, friction), grasp, reporter)
         reporter.document({"id": grasp.id, "files": []})
         return Exit.GOOD
-    reaches = reaches_beside(path, saved) if command.hand else None
+    reaches = reaches_beside(path.parent, saved) if command.hand else None
     found = RunFolder(path.parent, saved, friction, reaches=reaches).of(grasp)
     if reaches is not None and found.held is None:
         reporter.warn(f"the hand is not shown: {why_not_held(found)}")

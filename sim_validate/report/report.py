@@ -181,33 +181,21 @@ def grasp_page(
 
     It leads to the pages before and after it, and from a copy to the grasp that is drawn.
     """
-    run, grasp, verdict = found.run, found.grasp, found.verdict
-    said, tone = found.said
-    drawn = card.drawn if copy is None else None
+    run, verdict = found.run, found.verdict
     size = None if verdict is None else verdict.scale.grasp_size_m
     return filled(
         "grasp.html",
         ASSETS,
-        grasp=grasp,
-        object=run.saved.body.name,
-        notes=run.saved.body.notes,
-        friction=run.friction,
-        verdict=verdict,
-        verdict_text=said,
-        tone=tone,
-        before=around[0],
-        after=around[1],
+        found=found,
         card=card,
         copy=copy,
-        drawn=drawn,
+        around=around,
+        drawn=card.drawn if copy is None else None,
         push=largest_push(verdict),
         executed=sections.execution_section(found),
         reached=sections.reach_section(found),
-        executed_clips=drawn.executed if drawn else (),
         facts=list(_facts(found)),
         contacts=list(_contacts(found.shown)),
-        run=run,
-        certified=found.certified,
         sizes={  # by which torques are divided: the object's radius, the grasp's size
             "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
             "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
@@ -379,19 +367,16 @@ def _card(card: Card) -> dict[str, Any]:
     said, tone = found.said
     simulated = None if found.reached is None else found.reached.simulated
     return {
-        "id": grasp.id,
+        "grasp": grasp,
+        "page": card.page,
+        "copies": card.copies,
         "object": run.saved.body.name,
         "family": grasp.family,
-        "page": card.page,
         "picture": card.drawn.hand or card.drawn.picture if card.drawn else "",
-        "copies": card.copies,
-        "mirrored": sum(copy.mirrored for copy in card.copies),
         "verdict": said,
         "tone": tone,
         "radius_mm": round(MILLI * grasp.radius, 6),
-        "quality": grasp.ferrari_canny[0],
         "share": run.possible.shares.get(grasp.id) if run.possible else None,
-        "critical_friction": grasp.critical_friction,
         "executed": sections.execution_row(found.executed) if run.executions else None,
         "reached": sections.said_of_reach(found) if run.reaches else None,
         "weakest": None if found.verdict is None else _weakest(found.verdict),

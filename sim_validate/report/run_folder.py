@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
+from grasp_core.files.records import RecordFile
 from grasp_core.grasp_tables import ById, Named
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 GOOD, BAD, QUIET = "good", "bad", "quiet"
 FAILED, LOST = "failed", "lost"
 """Word that begins how many trials were not survived, and the one word for it."""
-File = TypeVar("File", Verdicts, Executions, Regions, Judgements, Best)
+File = TypeVar("File", bound=RecordFile)
 Item = TypeVar("Item", bound=Named)
 
 
@@ -206,22 +207,19 @@ def _run(path: Path) -> RunFolder:
         tested=tried,
         certified=_read(path, Regions, saved),
         executions=_read(path, Executions, saved),
-        reaches=reaches_beside(path / GRASPS, saved),
+        reaches=reaches_beside(path, saved),
         judgements=_read(path, Judgements, saved),
         possible=_read(path, Best, saved),
     )
 
 
-def reaches_beside(grasps: Path, saved: Plan) -> "Reaches | None":
-    """Read where a hand stands in grasps from the folder of their file."""
-    path = grasps.with_name(REACHES)
-    if not path.is_file():
+def reaches_beside(folder: Path, saved: Plan) -> "Reaches | None":
+    """Read where a hand stands in the grasps of a folder."""
+    if not (folder / REACHES).is_file():
         return None
     from sim_validate.hands.reaches import Reaches  # runs without a hand need none
 
-    found = Reaches.read(path)
-    _check_about(path, found, saved)
-    return found
+    return _read(folder, Reaches, saved)
 
 
 def _read(folder: Path, kind: type[File], saved: Plan) -> File | None:
