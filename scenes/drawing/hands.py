@@ -182,8 +182,16 @@ class PosedHand(Declared):
         return np.array([contact.position for contact in self.contacts]).reshape(-1, 3)
 
 
-def posed_hand(hand: Hand, reach: HandReach, grasp: Grasp) -> PosedHand:
-    """Take the pose from what `reach_with` found."""
+def posed_hand(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
+    """Take a hand in its pose from what `reach_with` found; None if nothing is given."""
+    if hand is None and reach is None:
+        return None
+    if hand is None or reach is None:
+        missing = "hand" if hand is None else "reach"
+        raise InputError(
+            f"hand and reach must be given together, got no {missing}: "
+            "reach = gc.reach_with(hand, body, grasp, friction)"
+        )
     instance(hand, Hand, "hand", "load_hand makes one")
     instance(reach, HandReach, "reach", "reach_with finds one")
     if (reach.hand, reach.grasp) != (hand.name, grasp.id):

@@ -31,6 +31,7 @@ from grasp_core.kinds import path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
+from scenes.drawing.hands import posed_hand
 from scenes.drawing.painting import Alone, Extent, Shape, View, look_of
 from scenes.drawing.pictures import (
     AZIMUTH_DEG,
@@ -39,7 +40,6 @@ from scenes.drawing.pictures import (
     bar,
     coarse,
     glass,
-    held_by,
     sheet_of,
 )
 from scenes.drawing.sheets import svg_of
@@ -70,7 +70,6 @@ SIDE = 260
 MOST_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
 ROWS = 5
-COLUMNS = 4
 Row = Sequence[str]
 
 
@@ -163,7 +162,7 @@ def show(
         InputError: The grasp does not lie on the body, the friction is out of range, or `reach`
             holds no pose of this hand in this grasp.
     """
-    drawing = Drawing(body, grasp, friction, held_by(hand, reach, grasp))
+    drawing = Drawing(body, grasp, friction, posed_hand(hand, reach, grasp))
     return Turntable(body.name, grasp.id, turntable_page(drawing))
 
 
@@ -275,17 +274,7 @@ def html_of(value: object) -> str | None:
 
 def card(drawing: str, title: str, rows: Iterable[Row]) -> str:
     """Put a title and a table beside a drawing."""
-    cells = "".join(f"<tr>{_cells(row)}</tr>" for row in rows)
-    return (
-        '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:center">'
-        f"{drawing}<div><b>{escape(title)}</b><table>{cells}</table></div></div>"
-    )
-
-
-def _cells(row: Row) -> str:
-    if len(row) == 1:
-        return f'<td colspan="{COLUMNS}" style="text-align:left">{escape(row[0])}</td>'
-    return "".join(f"<td>{escape(cell)}</td>" for cell in row)
+    return filled("card.html", drawing=drawing, title=title, rows=rows)
 
 
 def picture(

@@ -210,11 +210,6 @@ class Shape(Declared):
         return np.vstack([np.empty((0, 3)), *self.polygons, *self.lines, *alone])
 
 
-def extent_of(shapes: Iterable[Shape]) -> Array:
-    """Return all points of several shapes, (n, 3) [m]."""
-    return np.vstack([shape.vertices() for shape in shapes])
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """The square of what a view shows that is drawn on a sheet."""
@@ -232,7 +227,7 @@ class Frame:
         cls, shapes: Sequence[Shape], numbers: Array, body: Extent, view: View, side: float
     ) -> Self:
         """Choose the square around shapes, and around the places of numbers, (k, 3) [m]."""
-        points = np.vstack([extent_of(shapes), numbers])
+        points = np.vstack([*(shape.vertices() for shape in shapes), numbers])
         distances = np.linalg.norm(points - body.center_of_mass, axis=1)
         kept = [np.full(len(shape.vertices()), shape.role in KEPT) for shape in shapes]
         hand = np.concatenate([*kept, np.full(len(numbers), any(each.any() for each in kept))])

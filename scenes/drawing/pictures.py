@@ -22,7 +22,6 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross
 from grasp_core.cones.spanning import angles_between
-from grasp_core.errors import InputError
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.kinds import Friction, instance, path_of, value_of
@@ -372,7 +371,7 @@ def grasp_figure(
     Raises:
         InputError: As for `write_picture`.
     """
-    drawing = Drawing(body, grasp, friction, held_by(hand, reach, grasp))
+    drawing = Drawing(body, grasp, friction, posed_hand(hand, reach, grasp))
     return drawing.sheet(view, legend=legend)
 
 
@@ -390,19 +389,6 @@ def sheet_of(
         for mark in numbered(middle, radius, text, colour)
     ]
     return Sheet(side, side, name, (*painted(shapes, frame), *marks))
-
-
-def held_by(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
-    """Take a hand in its pose from what a user gave; None if nothing was given."""
-    if hand is None and reach is None:
-        return None
-    if hand is None or reach is None:
-        missing = "hand" if hand is None else "reach"
-        raise InputError(
-            f"hand and reach must be given together, got no {missing}: "
-            "reach = gc.reach_with(hand, body, grasp, friction)"
-        )
-    return posed_hand(hand, reach, grasp)
 
 
 def _entries(shapes: Sequence[Shape]) -> list[Entry]:

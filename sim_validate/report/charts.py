@@ -462,17 +462,6 @@ class Agreement:
         return max(shares, default=0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Quadrants:
-    """Numbers of trials, counted by what was predicted and what happened."""
-
-    resisted_held: int = 0
-    resisted_let_go: int = 0
-    not_resisted_held: int = 0
-    not_resisted_let_go: int = 0
-    neither: int = 0
-
-
 def frictions_in(verdicts: Iterable[Verdict]) -> Agreement:
     """Compare critical frictions; a simulated zero means that the least one tried sufficed."""
     found = [verdict.critical_friction for verdict in verdicts]
@@ -499,14 +488,17 @@ def wrench_size(verdict: Verdict, trial: WrenchVerdict) -> float:
     return math.hypot(*force, *(torque / verdict.scale.grasp_size_m))
 
 
-def quadrants_in(verdicts: Sequence[Verdict]) -> Quadrants:
-    """Count trials of grasps and of negative controls; nothing resists the loads of a control."""
+def quadrants_in(verdicts: Sequence[Verdict]) -> Counter[str]:
+    """Count trials of grasps and of negative controls by what was predicted and what happened.
+
+    Nothing resists the loads of a control.
+    """
     counts = Counter[str]()
     for verdict in verdicts:
         counts.update(_place(trial, resisted(trial)) for trial in verdict.wrenches)
         for control in verdict.controls:
             counts.update(_place(trial, False) for trial in control.tried)
-    return Quadrants(**counts)
+    return counts
 
 
 def resisted(trial: WrenchVerdict) -> bool | None:

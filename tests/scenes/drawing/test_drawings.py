@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.drawing.painting import Shape, extent_of
+from scenes.drawing.painting import Shape
 from scenes.drawing.pictures import (
     BAR_LENGTH,
     MOST_TRIANGLES,
@@ -137,7 +137,7 @@ def test_what_is_round_is_round():
     circle = ring(np.ones(3), axis, 2.0)
     np.testing.assert_allclose(np.linalg.norm(circle - 1.0, axis=1), 2.0)
     np.testing.assert_allclose((circle - 1.0) @ axis, 0.0, atol=1e-12)
-    sides = extent_of([Shape("finger", polygons=tube(np.zeros(3), 5.0 * axis, 0.5))])
+    sides = Shape("finger", polygons=tube(np.zeros(3), 5.0 * axis, 0.5)).vertices()
     np.testing.assert_allclose(np.linalg.norm(np.cross(sides, axis), axis=1), 0.5)
     rim = np.array(cone_sides(np.zeros(3), axis, 0.3, 2.0))[:, 1]
     np.testing.assert_allclose(np.linalg.norm(rim, axis=1), 2.0)
