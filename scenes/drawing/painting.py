@@ -211,7 +211,7 @@ class Shape(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class Window:
     """The square of what a view shows that is drawn on a sheet."""
 
     view: View
@@ -385,9 +385,9 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     return tuple(loops)
 
 
-def painted(shapes: Iterable[Shape], frame: Frame) -> Iterator[Mark]:
+def painted(shapes: Iterable[Shape], window: Window) -> Iterator[Mark]:
     """Yield the marks of a picture, in the order to draw them; lines that look alike are joined."""
-    parts = [part for shape in shapes for part in _parts(shape, frame)]
+    parts = [part for shape in shapes for part in _parts(shape, window)]
     marks = [mark for _, mark in sorted(parts, key=lambda each: each[0])]
     for look, alike in groupby(
         marks, key=lambda mark: (mark.colour, mark.width, mark.opacity)
@@ -400,54 +400,54 @@ def painted(shapes: Iterable[Shape], frame: Frame) -> Iterator[Mark]:
             yield Line(lines, *look)
 
 
-def _parts(shape: Shape, frame: Frame) -> Iterator[Near]:
+def _parts(shape: Shape, window: Window) -> Iterator[Near]:
     look = look_of(shape)
     if look.fill and shape.polygons:
         paint = _solid if look.solid else FILLED.get(shape.role, _each)
-        yield from paint(shape, look, frame)
+        yield from paint(shape, look, window)
     if shape.role == "object" and shape.polygons:
-        for line in outline(Surface.of(shape.polygons), frame.view.camera):
-            yield from _line(line, LOOKS["edge"], frame)
+        for line in outline(Surface.of(shape.polygons), window.view.camera):
+            yield from _line(line, LOOKS["edge"], window)
     for line in shape.lines if look.line else ():
         if shape.role in SHORT:
-            flat, near = frame.seen(line)
-            yield float(near.mean()), Line((flat,), look.colour, _thick(look, frame), look.opacity)
+            flat, near = window.seen(line)
+            yield float(near.mean()), Line((flat,), look.colour, _thick(look, window), look.opacity)
         else:
-            yield from _line(line, look, frame)
+            yield from _line(line, look, window)
     for point in () if shape.points is None else shape.points:
-        place, (near,) = frame.seen(point[None])
+        place, (near,) = window.seen(point[None])
         # A dot is drawn in front of what it marks.
-        dot = Dots(place, look.colour, 0.005 * look.dot * frame.side, look.opacity)
-        yield float(near) + 0.02 * frame.width, dot
+        dot = Dots(place, look.colour, 0.005 * look.dot * window.side, look.opacity)
+        yield float(near) + 0.02 * window.width, dot
 
 
-def _thick(look: Look, frame: Frame) -> float:
+def _thick(look: Look, window: Window) -> float:
     """Return how wide lines are on the sheet [pixels]."""
-    return round(0.01 * look.line * frame.side, 3)
+    return round(0.01 * look.line * window.side, 3)
 
 
-def _area(flats: Iterable[Array], colour: str, opacity: float, frame: Frame) -> Area:
+def _area(flats: Iterable[Array], colour: str, opacity: float, window: Window) -> Area:
     """Fill loops of places in the view [m], without corners that would not be seen."""
-    loops = tuple(map(frame.place, flats))
+    loops = tuple(map(window.place, flats))
     if sum(map(len, loops)) > MANY:
         loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
     return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), colour, opacity)
 
 
-def _each(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
-    bright = _brightness(_normals(shape.polygons), frame.view).tolist()
+def _each(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
+    bright = _brightness(_normals(shape.polygons), window.view).tolist()
     for polygon, shade in zip(shape.polygons, bright, strict=True):
-        flat, near = frame.view.seen(polygon)
+        flat, near = window.view.seen(polygon)
         colour = _shaded(look.colour, shade) if look.shaded else look.colour
-        yield float(near.mean()), _area([flat], colour, look.fill, frame)
+        yield float(near.mean()), _area([flat], colour, look.fill, window)
 
 
-def _glass(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
+def _glass(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
     """Draw a clear surface; of many polygons, those that look alike are joined."""
     if len(shape.polygons) <= FEW:
-        yield from _each(shape, look, frame)
+        yield from _each(shape, look, window)
         return
-    surface, view = Surface.of(shape.polygons), frame.view
+    surface, view = Surface.of(shape.polygons), window.view
     front = surface.facing(view.camera)
     levels = _levels(_brightness(surface.normals, view))
     nearness = view.seen(surface.corners)[1]
@@ -457,12 +457,12 @@ def _glass(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
         for level in np.unique(levels[front == side]).tolist():
             loops = joined(surface, (front == side) & (levels == level))
             flats = [view.seen(loop)[0] for loop in loops]
-            yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, frame)
+            yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
 
 
-def _solid(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
+def _solid(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
     """Draw a convex body: its outline, and on it the sides that face the viewer."""
-    corners, view = shape.vertices(), frame.view
+    corners, view = shape.vertices(), window.view
     flat, near = view.seen(corners)
     depth = float(near.mean())
     middles = np.array([polygon.mean(axis=0) for polygon in shape.polygons])
@@ -473,21 +473,21 @@ def _solid(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
     facing = np.flatnonzero(np.einsum("ij,ij->i", normals, view.camera - firsts) > 0.0)
     levels = _levels(_brightness(normals[facing], view))
     mean = round(float(levels.mean())) if len(levels) else SHADES - 1
-    yield depth, _area([convex_hull(flat)], _shaded(look.colour, _shade(mean)), look.fill, frame)
+    yield depth, _area([convex_hull(flat)], _shaded(look.colour, _shade(mean)), look.fill, window)
     for level in sorted({*levels.tolist()} - {mean}):
         alike: list[int] = facing[levels == level].tolist()
         flats = [view.seen(shape.polygons[side])[0] for side in alike]
-        yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, frame)
+        yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
 
 
-def _cone(shape: Shape, look: Look, frame: Frame) -> Iterator[Near]:
+def _cone(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
-    flat, near = frame.view.seen(shape.vertices())
-    for part in (convex_hull(flat), frame.view.seen(rim)[0]):
-        yield float(near.mean()), _area([part], look.colour, look.fill, frame)
+    flat, near = window.view.seen(shape.vertices())
+    for part in (convex_hull(flat), window.view.seen(rim)[0]):
+        yield float(near.mean()), _area([part], look.colour, look.fill, window)
 
 
-FILLED: dict[Role, Callable[[Shape, Look, Frame], Iterator[Near]]] = {
+FILLED: dict[Role, Callable[[Shape, Look, Window], Iterator[Near]]] = {
     "object": _glass, "force cone": _cone,
 }  # fmt: skip
 """How areas of some roles are drawn, other than each on its own."""
@@ -522,16 +522,16 @@ def _shaded(colour: str, shade: float) -> str:
     return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
 
 
-def _line(line: Array, look: Look, frame: Frame) -> Iterator[Near]:
-    flat, near = frame.view.seen(line)
-    nearer, thick = 0.005 * look.line * frame.width, _thick(look, frame)
+def _line(line: Array, look: Look, window: Window) -> Iterator[Near]:
+    flat, near = window.view.seen(line)
+    nearer, thick = 0.005 * look.line * window.width, _thick(look, window)
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
         length = float(np.linalg.norm(end - start))
         if length > 0.0:
-            for low, high in _spans(length / frame.width, look):
+            for low, high in _spans(length / window.width, look):
                 ends = np.array([start + low * (end - start), start + high * (end - start)])
                 depth = float(first + 0.5 * (low + high) * (last - first)) + nearer
-                yield depth, Line((frame.place(ends),), look.colour, thick, look.opacity)
+                yield depth, Line((window.place(ends),), look.colour, thick, look.opacity)
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:

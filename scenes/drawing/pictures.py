@@ -34,10 +34,10 @@ from scenes.drawing.hands import PosedHand, hand_shapes, numbers_behind, posed_h
 from scenes.drawing.painting import (
     LOOKS,
     Extent,
-    Frame,
     Role,
     Shape,
     View,
+    Window,
     approaches,
     best_view,
     feature_edges,
@@ -381,14 +381,14 @@ def sheet_of(
 ) -> Sheet:  # fmt: skip
     """Draw shapes on a square sheet, with labels at the places of numbers, (k, 3) [m]."""
     places = np.empty((0, 3)) if numbers is None else numbers
-    frame = Frame.around(shapes, places, extent, view, side)
+    window = Window.around(shapes, places, extent, view, side)
     radius = max(NUMBER, NUMBER_SHARE * side)
     marks = [
         mark
-        for (text, colour), middle in zip(labels, frame.seen(places)[0], strict=False)
+        for (text, colour), middle in zip(labels, window.seen(places)[0], strict=False)
         for mark in numbered(middle, radius, text, colour)
     ]
-    return Sheet(side, side, name, (*painted(shapes, frame), *marks))
+    return Sheet(side, side, name, (*painted(shapes, window), *marks))
 
 
 def _entries(shapes: Sequence[Shape]) -> list[Entry]:

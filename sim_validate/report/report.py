@@ -323,7 +323,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 
         controls=_controls(verdicts),
         executions=[sections.described_executions(each) for each in executed],
         executed_columns=[
-            (each.shown.heading, each.meaning) for each in sections.execution_figures()
+            (each.shown.heading, each.meaning) for each in sections.EXECUTION_FIGURES
         ],
         judged=_judged(runs),
         possible=[

@@ -39,6 +39,8 @@ REASONS = {
     "no closure": "no three contacts close",
 }
 """Words for what was in the way."""
+EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
+"""Figures of executed grasps, but for the id, which leads to a grasp's page."""
 FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
 SAID_ABOVE = ("grasp", "id")
 """Figures that the page has in its title."""
@@ -167,19 +169,13 @@ def execution_row(found: ExecutedGrasp | None) -> Record:
     """Build the cells about one grasp in the table of the first page, and on its card."""
     said, tone = said_of_execution(found)
     least = 0.0 if found is None else found.least_predicted_loss
-    listed = execution_figures()
     return {
         "said": said,
         "tone": tone,
         "loss": multiple_in_words(least),
         "least_loss": "Infinity" if math.isinf(least) else f"{least:.6g}",  # as scripts read it
-        "cells": [(NONE if found is None else each.cell(found), "") for each in listed],
+        "cells": [(NONE if found is None else each.cell(found), "") for each in EXECUTION_FIGURES],
     }
-
-
-def execution_figures() -> Sequence[Figure]:
-    """Return the figures of executed grasps, but for the id, which leads to a grasp's page."""
-    return figures(ExecutedGrasp)[1:]
 
 
 def described_executions(executions: Executions) -> str:
@@ -235,7 +231,7 @@ def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Ite
         return
     sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))
     yield "Squeeze, finger by finger", f"{sizes} N", ""
-    for figure in execution_figures():
+    for figure in EXECUTION_FIGURES:
         yield figure.shown.heading, figure.cell(found), figure.meaning
     yield from _enough(found)
 

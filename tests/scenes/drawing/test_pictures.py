@@ -15,10 +15,10 @@ from grasp_core.geometry.polygons import convex_hull
 from scenes.drawing.painting import (
     FORESHORTENED,
     LOOKS,
-    Frame,
     Shape,
     Surface,
     View,
+    Window,
     best_view,
     outline,
     painted,
@@ -46,7 +46,7 @@ from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
 
 FRONT = View.of_angles(0.0, 0.0, scenes.example_object("box"))
-SHEET = Frame(FRONT, np.array([-1.0, -1.0]), 2.0, 100.0)
+SHEET = Window(FRONT, np.array([-1.0, -1.0]), 2.0, 100.0)
 
 
 @pytest.fixture(scope="module")
@@ -188,10 +188,10 @@ def test_a_curved_body_has_an_outline_and_no_seams():
     heights = (lines.reshape(-1, 3) - body.center_of_mass) @ view.axes[2] / body.radius
     # the camera is nine radii away: the tangents touch at a ninth, here to an edge's length
     assert np.abs(heights - 1.0 / 9.0).max() < 0.2
-    frame = Frame.around([surface], np.empty((0, 3)), body, view, 500.0)
-    areas = [part for part in painted((surface,), frame) if isinstance(part, Area)]
+    window = Window.around([surface], np.empty((0, 3)), body, view, 500.0)
+    areas = [part for part in painted((surface,), window) if isinstance(part, Area)]
     assert 2 <= len(areas) <= 14  # two sides, at most seven shades each
-    flat, _ = frame.seen(surface.vertices())
+    flat, _ = window.seen(surface.vertices())
     covered = sum(abs(signed(loop)) for area in areas for loop in area.loops)
     assert covered == pytest.approx(2.0 * abs(signed(convex_hull(flat))), rel=0.35)
 
