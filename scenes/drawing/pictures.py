@@ -33,6 +33,7 @@ from grasp_core.values import Contact, Grasp
 from scenes.drawing.hands import PosedHand, hand_shapes, numbers_behind, posed_hand, view_of_hand
 from scenes.drawing.painting import (
     LOOKS,
+    POLYGON,
     Extent,
     Role,
     Shape,
@@ -69,7 +70,6 @@ FARTHEST = 4.0
 has its plane drawn, in object radii; the foci of built-in objects are within three."""
 SLACK_RAD = 1e-6
 """Angle by which rounding may make a force cone exceed its friction cone [rad]."""
-POLYGON = 3
 MOST_TRIANGLES = 2500
 """Largest number of triangles drawn for the object; finer surfaces are simplified first."""
 SIDES = 20
