@@ -27,7 +27,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import FINGERS, Grasp
 from scenes.drawing import sheets
-from scenes.drawing.views import approaches
+from scenes.drawing.painting import approaches
 from scenes.mujoco.fingertips import fitting_radius
 
 ROD_LENGTH = 0.5

@@ -100,18 +100,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.write(examples_for(arguments))
         return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except FieldError as error:
-        return _complain(f"{_flag_of(error)} {error.fault}", Exit.USAGE)
+        names = (each.name for each in flags_of(Command)
+                 if (each.owner, each.field) == (error.owner, error.name))  # fmt: skip
+        flag = "--" + next(names, error.name).replace("_", "-")
+        return _complain(f"{flag} {error.fault}", Exit.USAGE)
     except InputError as error:  # settings that do not fit each other
         return _complain(str(error), Exit.USAGE)
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
-
-
-def _flag_of(error: FieldError) -> str:
-    found = (each.name for each in flags_of(Command)
-             if (each.owner, each.field) == (error.owner, error.name))  # fmt: skip
-    return "--" + next(found, error.name).replace("_", "-")
 
 
 def _dispatch(command: flags.Spoken) -> int:

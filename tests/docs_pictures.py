@@ -16,12 +16,17 @@ from PIL import Image
 import grasp_core as gc
 import scenes
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
-from scenes.drawing.pictures import grasp_figure, grasp_sheet
+from scenes.drawing.pictures import Drawing, grasp_figure
 from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, png_of
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.report.agreement import Agreement
-from sim_validate.report.charts import fidelity_panel, margin_figure, motion_panels, wrench_figure
+from sim_validate.report.charts import (
+    Agreement,
+    fidelity_panel,
+    margin_figure,
+    motion_panels,
+    wrench_figure,
+)
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
@@ -47,7 +52,7 @@ def families():
     """A grasp of each of the paper's families, side by side."""
     sheets = []
     for case in FAMILIES:
-        sheet = grasp_sheet(*best(*case), case[2])
+        sheet = Drawing(*best(*case), case[2]).sheet()
         title = Words(0.5 * sheet.width, 14.0, case[1], "middle", 16.0, bold=True)
         marks = [moved(mark, np.array([0.0, TITLE])) for mark in sheet.marks]
         sheets.append(Sheet(sheet.width, sheet.height + TITLE, case[1], (*marks, title)))

@@ -34,8 +34,17 @@ from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.painting import Role, Shape
-from scenes.drawing.views import DISTANCE, SAME_MERIT, Alone, View, edge_on, least_gaps, views_at
+from scenes.drawing.painting import (
+    DISTANCE,
+    SAME_MERIT,
+    Alone,
+    Role,
+    Shape,
+    View,
+    edge_on,
+    least_gaps,
+    views_at,
+)
 
 STEPS = 3
 """Number of sides along a quarter of a circle."""
@@ -94,30 +103,20 @@ def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices,
     # which corners coincide does not depend on sizes, so that a box of size 1 tells
     high = np.array(long, dtype=float)
     corners = _corners(-high, high, float(rounded), first, last)
-    cut = np.zeros(len(corners), dtype=np.int64)  # one bit for each cut that a corner lies in
-    for bit, (end, sign) in enumerate([(first, -1.0), (last, 1.0)]):
-        for axis in range(3):
-            if not end[axis]:
-                on = np.abs(corners[:, axis] - sign * high[axis]) < SAME
-                cut |= on.astype(np.int64) << (3 * bit + axis)
+    on_cut = np.abs(np.tile(corners, 2) - np.concatenate([-high, high])) < SAME
+    on_cut &= ~np.array([*first, *last])
+    places = np.arange(len(corners)).reshape(_grid()[0].shape[:2])
+    above, below = places[:-1], places[1:]
+    around = np.stack(
+        [above, below, np.roll(below, -1, axis=1), np.roll(above, -1, axis=1)], axis=-1
+    )
     sides = list[Indices]()
-    for side in _around():
+    for side in (places[0], places[-1, ::-1], *around.reshape(-1, 4)):
         here = corners[side]
         side = side[np.abs(np.roll(here, -1, axis=0) - here).max(axis=1) > SAME]  # each corner once
-        if len(side) >= FEWEST_CORNERS and not np.bitwise_and.reduce(cut[side]):
+        if len(side) >= FEWEST_CORNERS and not on_cut[side].all(axis=0).any():
             sides.append(side)
     return tuple(sides)
-
-
-def _around() -> Iterator[Indices]:
-    """Yield the corners of the sides around the poles, and of those between them."""
-    rows, columns = _grid()[0].shape[:2]
-    places: Indices = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
-    yield places[0]
-    yield places[-1, ::-1]
-    for i, j in product(range(rows - 1), range(columns)):
-        k = (j + 1) % columns
-        yield places[[i, i + 1, i + 1, i], [j, j, k, k]]
 
 
 @cache
@@ -151,16 +150,13 @@ class PosedHand(Declared):
     contacts: tuple[Contact, ...]
 
     def _check_together(self) -> None:
-        joints, known = len(self.hand.joints), range(len(self.hand.fingers))
-        if len(self.joints) != joints:
+        joints, known, used = len(self.hand.joints), len(self.hand.fingers), set(self.fingers)
+        alike = len(used) == len(self.fingers) == len(self.contacts)
+        if len(self.joints) != joints or not alike or not used <= set(range(known)):
             raise InputError(
-                f"joints must hold the {joints} angles of the hand, got {len(self.joints)}"
-            )
-        used = set(self.fingers)
-        if not len(used) == len(self.fingers) == len(self.contacts) or not used <= set(known):
-            raise InputError(
-                f"fingers must be different fingers of the hand, numbered from 0 to {known[-1]}, "
-                f"one for each of {len(self.contacts)} contacts, got {list(self.fingers)}"
+                f"the pose must be one of the hand {self.hand.name}: {joints} angles, and for each "
+                f"of {len(self.contacts)} contacts another finger, numbered from 0 to {known - 1}; "
+                f"got {len(self.joints)} angles and fingers {list(self.fingers)}"
             )
 
     @property
@@ -185,8 +181,16 @@ class PosedHand(Declared):
         return np.array([contact.position for contact in self.contacts]).reshape(-1, 3)
 
 
-def posed_hand(hand: Hand, reach: HandReach, grasp: Grasp) -> PosedHand:
-    """Take the pose from what `reach_with` found."""
+def posed_hand(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
+    """Take a hand in its pose from what `reach_with` found; None if nothing is given."""
+    if hand is None and reach is None:
+        return None
+    if hand is None or reach is None:
+        missing = "hand" if hand is None else "reach"
+        raise InputError(
+            f"hand and reach must be given together, got no {missing}: "
+            "reach = gc.reach_with(hand, body, grasp, friction)"
+        )
     instance(hand, Hand, "hand", "load_hand makes one")
     instance(reach, HandReach, "reach", "reach_with finds one")
     if (reach.hand, reach.grasp) != (hand.name, grasp.id):

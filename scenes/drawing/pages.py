@@ -14,7 +14,7 @@ a second. Figures that a grasp has put off are left out, because the first of th
 import importlib
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -31,12 +31,18 @@ from grasp_core.kinds import path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import bar, check_drawn, coarse, drawing_of, glass, numbers_of, view_of
-from scenes.drawing.hands import PosedHand
-from scenes.drawing.painting import Shape, look_of
-from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG, held_by, sheet_of
+from scenes.drawing.hands import posed_hand
+from scenes.drawing.painting import Alone, Extent, Shape, View, look_of
+from scenes.drawing.pictures import (
+    AZIMUTH_DEG,
+    ELEVATION_DEG,
+    Drawing,
+    bar,
+    coarse,
+    glass,
+    sheet_of,
+)
 from scenes.drawing.sheets import svg_of
-from scenes.drawing.views import Alone, Extent, View
 from scenes.mujoco.closure_scene import Layout, Scene
 
 ASSETS = Path(__file__).parent / "assets"
@@ -63,7 +69,6 @@ SIDE = 260
 MOST_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
 ROWS = 5
-COLUMNS = 4
 Row = Sequence[str]
 
 
@@ -156,9 +161,8 @@ def show(
         InputError: The grasp does not lie on the body, the friction is out of range, or `reach`
             holds no pose of this hand in this grasp.
     """
-    check_drawn(body, grasp, friction)
-    held = held_by(hand, reach, grasp)
-    return Turntable(body.name, grasp.id, turntable_page(body, grasp, friction, held))
+    drawing = Drawing(body, grasp, friction, posed_hand(hand, reach, grasp))
+    return Turntable(body.name, grasp.id, turntable_page(drawing))
 
 
 def object_data(body: Polyhedron) -> list[dict[str, Any]]:
@@ -166,23 +170,21 @@ def object_data(body: Polyhedron) -> list[dict[str, Any]]:
     return [_shape(shape, body) for shape in glass(body)]
 
 
-def grasp_data(
-    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
-) -> dict[str, Any]:
+def grasp_data(drawing: Drawing) -> dict[str, Any]:
     """Return the drawing of a grasp without the object, and the view in which it is first seen.
 
     With a hand, the reader first sees what the picture with the hand shows, and can have the bars
     and lines of the paper's picture shown, too.
     """
-    every = drawing_of(body, grasp, friction, held)
+    body, every = drawing.body, drawing.shapes()
     roles = {shape.role for shape in every}
-    planned = () if held is None else drawing_of(body, grasp, friction)
+    planned = () if drawing.held is None else replace(drawing, held=None).shapes()
     shown = [shape for shape in every if shape.role not in OF_OBJECT]
     more = [shape for shape in planned if shape.role not in roles]
-    view = view_of(body, grasp, held)
+    view = drawing.view()
     return {
         "shapes": [_shape(shape, body) for shape in (*shown, *more)],
-        "numbers": _whole(numbers_of(body, grasp, held), body),
+        "numbers": _whole(drawing.numbers(), body),
         "axes": np.round(view.axes, 4).tolist(),
         "middle": _whole(view.center, body),
         "distance": round(UNITS * view.distance / body.radius),
@@ -190,16 +192,15 @@ def grasp_data(
     }
 
 
-def turntable_page(
-    body: Polyhedron, grasp: Grasp, friction: float, held: PosedHand | None = None
-) -> str:
+def turntable_page(drawing: Drawing) -> str:
     """Write a page that needs no other file and on which a reader can rotate a grasp."""
+    body, grasp, held = drawing.body, drawing.grasp, drawing.held
     return filled(
         "turntable.html",
         id=grasp.id,
         object=body.name,
         family=grasp.family,
-        friction=friction,
+        friction=drawing.friction,
         facts=[*grasp_facts(body, grasp), *([] if held is None else [
             (f"Fingers of {held.hand.name}", ", ".join(held.finger_names),
              "that touch, by finger of the grasp"),
@@ -207,7 +208,7 @@ def turntable_page(
         style=text_of("style.css"),
         script=text_of("turntable.js"),
         object_drawing=as_text(object_data(body)),
-        drawing=as_text(grasp_data(body, grasp, friction, held)),
+        drawing=as_text(grasp_data(drawing)),
     )  # fmt: skip
 
 
@@ -272,17 +273,7 @@ def html_of(value: object) -> str | None:
 
 def card(drawing: str, title: str, rows: Iterable[Row]) -> str:
     """Put a title and a table beside a drawing."""
-    cells = "".join(f"<tr>{_cells(row)}</tr>" for row in rows)
-    return (
-        '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:center">'
-        f"{drawing}<div><b>{escape(title)}</b><table>{cells}</table></div></div>"
-    )
-
-
-def _cells(row: Row) -> str:
-    if len(row) == 1:
-        return f'<td colspan="{COLUMNS}" style="text-align:left">{escape(row[0])}</td>'
-    return "".join(f"<td>{escape(cell)}</td>" for cell in row)
+    return filled("card.html", drawing=drawing, title=title, rows=rows)
 
 
 def picture(
@@ -312,16 +303,15 @@ def _alone(body: Polyhedron) -> str:
 
 
 def _plan(plan: Plan) -> str:
-    body, drawing = plan.body, ""
-    if len(plan):
-        shapes, numbers = drawing_of(body, plan[0], plan.friction), numbers_of(body, plan[0])
-        drawing = picture(shapes, body, view_of(body, plan[0]), numbers)
+    body = plan.body
     title = f"{counted(len(plan), 'grasp')} of {body.name} at friction {plan.friction:g}"
     if not len(plan):
         return card(_alone(body), title, [(plan.absence or "",)])
+    first = Drawing(body, plan[0], plan.friction)
     rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
     rows += [
         (g.id, g.family, f"{MM * g.radius:.3g} mm" if g.radius else "-", f"{g.closure_margin:.4g}")
         for g in plan[:ROWS]
     ]
-    return card(drawing, title, [*rows, ("...",)] if len(plan) > ROWS else rows)
+    rows += [("...",)] if len(plan) > ROWS else []
+    return card(picture(first.shapes(), body, first.view(), first.numbers()), title, rows)

@@ -1,4 +1,4 @@
-"""Describes shapes in space, and projects them to flat coloured parts, the farthest first.
+"""Describes shapes in space, places the camera, and paints them flat, the farthest first.
 
 Lines are cut into pieces, so that one order by depth holds for everything: a finger in front of a
 line of force hides it, and glass in front of the line lets it show through. Solid bodies are
@@ -13,13 +13,21 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from functools import cache
+from itertools import groupby
+from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, Polygon
+from grasp_core.arrays import Array, Indices, Point, Polygon
+from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared
 from grasp_core.geometry.polygons import convex_hull
+from grasp_core.kinds import Quantity, number
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.solvers.ties import first_best
+from grasp_core.values import Grasp
+from scenes.drawing.panels import thinned
 from scenes.drawing.sheets import (
     FINGERS,
     FOCUS,
@@ -30,19 +38,126 @@ from scenes.drawing.sheets import (
     Area,
     Dots,
     Line,
+    Mark,
+    closed,
     hexed,
     rgb,
 )
-from scenes.drawing.views import View
+
+DISTANCE = 9.0
+"""Distance of the camera, in object radii: perspective is visible, and distortion is small."""
+AZIMUTHS, ELEVATIONS = range(5, 360, 10), (18, 28, 40)
+"""Azimuths and elevations of the views to choose from [deg]."""
+EDGE_ON = 0.12
+"""Cosine of the angle between a face's normal and the line of sight below which the face is seen
+nearly as a line."""
+SAME_MERIT = 1e-6
+"""Largest difference of merit at which two views count as equally good; the first one is then
+taken."""
+FORESHORTENED = 0.8
+"""Cosine of the angle to the line of sight above which a finger points at the viewer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alone:
+    """The extent of what is drawn beside an object, as a ball around it."""
+
+    center_of_mass: Array
+    radius: float
+
+
+Extent: TypeAlias = Polyhedron | Alone
+"""The place and size of what is drawn: of an object, or of a grasp or hand beside it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class View(Declared):
+    """A camera that looks at a point, with z of the object's frame upwards."""
+
+    axes: Annotated[Array, ArrayShape(3, 3)]
+    """Unit vectors to the right, up and towards the viewer, (3, 3), rows."""
+    center: Point
+    distance: Quantity
+
+    @classmethod
+    def of_angles(cls, azimuth_deg: float, elevation_deg: float, body: Extent) -> Self:
+        """Place a camera by its azimuth and elevation [deg] as seen from the object."""
+        number(azimuth_deg, "azimuth_deg")
+        number(elevation_deg, "elevation_deg")
+        axes = _axes(math.radians(azimuth_deg), math.radians(elevation_deg))
+        return cls(axes, body.center_of_mass, DISTANCE * body.radius)
+
+    @property
+    def camera(self) -> Array:
+        """The place of the camera, (3,) [m]."""
+        return self.center + self.distance * self.axes[2]
+
+    def seen(self, points: Array) -> tuple[Array, Array]:
+        """Project points (n, 3) to the picture, (n, 2) [m], with their nearness, (n,) [m]."""
+        turned = (points - self.center) @ self.axes.T
+        nearness = turned[:, 2]
+        return turned[:, :2] * _enlarged(nearness, self.distance)[:, None], nearness
+
+
+def _axes(azimuth: float, elevation: float) -> Array:
+    flat = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    towards = math.cos(elevation) * flat + math.sin(elevation) * up
+    right = np.cross(up, flat)
+    return np.array([right, np.cross(towards, right), towards])
+
+
+def approaches(grasp: Grasp) -> Array:
+    """Return the directions in which the fingers of a grasp come in, (4, 3)."""
+    return grasp.normals if grasp.approach_directions is None else grasp.approach_directions
+
+
+def best_view(body: Polyhedron, grasp: Grasp) -> View:
+    """Choose a view that keeps contacts and fingers apart and shows few faces edge-on."""
+    outward = -approaches(grasp)
+    ends = grasp.positions + body.radius * outward
+    angles, axes = views_at(ELEVATIONS)
+    fingers = axes[:, 2] @ outward.T
+    apart = least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
+    pointing = np.maximum(np.abs(fingers) - FORESHORTENED, 0.0).sum(axis=1)
+    in_front = (fingers > SAME_MERIT).mean(axis=1)
+    merits = apart + 0.1 * in_front - 2.0 * pointing - 0.5 * edge_on(body, axes)
+    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], body)
+
+
+def edge_on(body: Polyhedron, axes: Array) -> Array:
+    """Return the share of an object's surface that is seen nearly as lines in each view, (n,)."""
+    areas = np.array([face.area for face in body.faces])
+    return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
+
+
+@cache
+def views_at(elevations: tuple[int, ...]) -> tuple[list[tuple[int, int]], Array]:
+    """Return the angles of views from all around at elevations [deg], and their axes, (n, 3, 3)."""
+    angles = [(azimuth, elevation) for elevation in elevations for azimuth in AZIMUTHS]
+    axes = [_axes(math.radians(azimuth), math.radians(elevation)) for azimuth, elevation in angles]
+    return angles, np.array(axes)
+
+
+def least_gaps(axes: Array, points: Array, body: Extent) -> Array:
+    """Return the smallest distance between any two points (p, 3) in each picture, (n,) [m]."""
+    turned = (points - body.center_of_mass) @ axes.transpose(0, 2, 1)
+    flat = turned[..., :2] * _enlarged(turned[..., 2], DISTANCE * body.radius)[..., None]
+    first, second = np.triu_indices(len(points), 1)
+    return np.linalg.norm(flat[:, first] - flat[:, second], axis=2).min(axis=1)
+
+
+def _enlarged(nearness: Array, distance: float) -> Array:
+    """Return by which factor perspective enlarges what is at some nearness [m], of any shape."""
+    return distance / np.maximum(distance - nearness, 0.1 * distance)
+
 
 Role: TypeAlias = Literal[
     "object", "edge", "finger", "friction cone", "force cone", "region", "line of force", "focus",
     "plane", "ruled surface", "contact", "hand", "fingertip",
 ]  # fmt: skip
-Part: TypeAlias = Area | Line | Dots
-"""A flat part of a picture, in metres from its middle, with y upwards."""
-Near: TypeAlias = tuple[float, Part]
-"""A part and its position along the line of sight [m]; larger values are nearer to the viewer."""
+Near: TypeAlias = tuple[float, Mark]
+"""A mark and its position along the line of sight [m]; larger values are nearer to the viewer."""
 SMOOTH_DEG = 20.0
 """Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
 MOST_EDGES = 1500
@@ -64,8 +179,17 @@ equally bright and on the same side are joined."""
 SHADES = 7
 """Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
 clear glass."""
-WHOLE: tuple[Role, ...] = ("friction cone",)
+SHORT: tuple[Role, ...] = ("friction cone",)
 """Roles whose lines are short, so that each is drawn whole."""
+MARGIN = 0.04
+"""Width of the empty margin, as a share of the picture's width."""
+FARTHEST = 2.0
+"""Distance from the object's centre beyond which points may be cut off, in object radii."""
+KEPT: tuple[Role, ...] = ("hand", "fingertip")
+"""Roles of which nothing is cut off, however far from the object it is."""
+MANY = 60
+"""Number of corners of an area above which those that are not seen are left out."""
+POLYGON = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -86,9 +210,43 @@ class Shape(Declared):
         return np.vstack([np.empty((0, 3)), *self.polygons, *self.lines, *alone])
 
 
-def extent_of(shapes: Iterable[Shape]) -> Array:
-    """Return all points of several shapes, (n, 3) [m]."""
-    return np.vstack([shape.vertices() for shape in shapes])
+@dataclass(frozen=True, slots=True, eq=False)
+class Window:
+    """The square of what a view shows that is drawn on a sheet."""
+
+    view: View
+    low: Array
+    """Lower left corner of the square in the view, (2,) [m]."""
+    width: float
+    """Width of the square in the view [m]."""
+    side: float
+    """Width of the square on the sheet [pixels]."""
+
+    @classmethod
+    def around(
+        cls, shapes: Sequence[Shape], numbers: Array, body: Extent, view: View, side: float
+    ) -> Self:
+        """Choose the square around shapes, and around the places of numbers, (k, 3) [m]."""
+        points = np.vstack([*(shape.vertices() for shape in shapes), numbers])
+        distances = np.linalg.norm(points - body.center_of_mass, axis=1)
+        kept = [np.full(len(shape.vertices()), shape.role in KEPT) for shape in shapes]
+        hand = np.concatenate([*kept, np.full(len(numbers), any(each.any() for each in kept))])
+        flat, _ = view.seen(points[(distances <= FARTHEST * body.radius) | hand])
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        half = 0.5 * (1.0 + 2.0 * MARGIN) * float((high - low).max())
+        middle = 0.5 * (low + high)
+        low, high = middle - half, middle + half
+        return cls(view, low, float(high[0] - low[0]), side)
+
+    def place(self, flat: Array) -> Array:
+        """Find where places in the view [m] are on the sheet, (n, 2) [pixels]."""
+        scale = self.side / self.width
+        return np.array([0.0, self.side]) + np.array([scale, -scale]) * (flat - self.low)
+
+    def seen(self, points: Array) -> tuple[Array, Array]:
+        """Project points (n, 3) to the sheet, (n, 2) [pixels], with their nearness, (n,) [m]."""
+        flat, near = self.view.seen(points)
+        return self.place(flat), near
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +303,8 @@ class Surface:
     """Number of the point at each corner, (n,); polygons that meet share numbers."""
     owners: Indices
     """Polygon of each corner, (n,)."""
+    following: Indices
+    """Place of the next corner of the same polygon for each corner, (n,)."""
     normals: Array
     """Unit normals, outwards, (polygons, 3); zero for polygons without area."""
 
@@ -156,27 +316,26 @@ class Surface:
         size = float(np.ptp(corners, axis=0).max())
         places = np.rint(corners / (SAME_POINT * size)).astype(np.int64)
         names = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
-        owners = np.repeat(np.arange(len(polygons)), counts)
-        turned = np.cross(corners, corners[_followers(owners, counts)])
-        normals = np.add.reduceat(turned, np.cumsum(counts) - counts)
+        ends, following = np.cumsum(counts), np.arange(1, len(corners) + 1)
+        following[ends - 1] = ends - counts
+        normals = np.add.reduceat(np.cross(corners, corners[following]), ends - counts)
         lengths = np.linalg.norm(normals, axis=1)
         normals = normals / np.where(lengths > 0.0, lengths, np.inf)[:, None]
-        return cls(corners, names, owners, normals)
+        return cls(corners, names, np.repeat(np.arange(len(polygons)), counts), following, normals)
 
-    def following(self) -> Indices:
-        """Return the place of the next corner of the same polygon for each corner, (n,)."""
-        return _followers(self.owners, np.bincount(self.owners))
+    def edges(self) -> tuple[Indices, Indices, Array]:
+        """Pair the edges of polygons that meet: first corners in one and, reversed, in another.
 
-    def edges(self) -> tuple[Indices, Indices]:
-        """Pair the edges of polygons that meet: first corners in one and, reversed, in another."""
-        first, second = self.names, self.names[self.following()]
+        Gives also the angles between the normals on both sides, (k,) [rad].
+        """
+        first, second = self.names, self.names[self.following]
         count = int(self.names.max()) + 1
         ahead, back = first * count + second, second * count + first
         order = np.argsort(ahead)
-        found = np.minimum(np.searchsorted(ahead, back, sorter=order), len(ahead) - 1)
-        other = order[found]
-        paired = (ahead[other] == back) & (first < second)
-        return np.flatnonzero(paired), other[paired]
+        other = order[np.minimum(np.searchsorted(ahead, back, sorter=order), len(ahead) - 1)]
+        one = np.flatnonzero((ahead[other] == back) & (first < second))
+        sides = self.normals[self.owners[one]], self.normals[self.owners[other[one]]]
+        return one, other[one], np.arccos(np.clip(np.einsum("ij,ij->i", *sides), -1.0, 1.0))
 
     def facing(self, camera: Array) -> Array:
         """Tell which polygons face a point, (polygons,)."""
@@ -185,46 +344,29 @@ class Surface:
 
     def segments(self, places: Indices) -> Array:
         """Return the edges that begin at corners, (k, 2, 3) [m]."""
-        return np.stack([self.corners[places], self.corners[self.following()[places]]], axis=1)
-
-
-def _followers(owners: Indices, counts: Indices) -> Indices:
-    """Return the place of the next corner of the same polygon, (n,)."""
-    places = np.arange(len(owners)) + 1
-    ends = np.cumsum(counts)
-    places[ends - 1] = ends - counts
-    return places
-
-
-def _angles(surface: Surface, one: Indices, two: Indices) -> Array:
-    """Measure the angles between the normals on both sides of edges, (k,) [rad]."""
-    sides = surface.normals[surface.owners[one]], surface.normals[surface.owners[two]]
-    return np.arccos(np.clip(np.einsum("ij,ij->i", *sides), -1.0, 1.0))
+        return np.stack([self.corners[places], self.corners[self.following[places]]], axis=1)
 
 
 def feature_edges(polygons: Sequence[Array]) -> Array:
     """Find the edges at which a surface is bent, the sharpest first, (k, 2, 3) [m]."""
     surface = Surface.of(polygons)
-    one, two = surface.edges()
-    angles = _angles(surface, one, two)
+    places, _, angles = surface.edges()
     order = np.argsort(-angles, kind="stable")[:MOST_EDGES]
-    return surface.segments(one[order[angles[order] > math.radians(SMOOTH_DEG)]])
+    return surface.segments(places[order[angles[order] > math.radians(SMOOTH_DEG)]])
 
 
 def outline(surface: Surface, camera: Array) -> Array:
     """Find the smooth edges between polygons that face the camera and others, (k, 2, 3) [m]."""
-    one, two = surface.edges()
+    one, two, angles = surface.edges()
     front = surface.facing(camera)
     between = front[surface.owners[one]] != front[surface.owners[two]]
-    one, two = one[between], two[between]
-    return surface.segments(one[_angles(surface, one, two) <= math.radians(SMOOTH_DEG)])
+    return surface.segments(one[between & (angles <= math.radians(SMOOTH_DEG))])
 
 
 def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     """Join polygons of a surface that meet, and return the loops around them, each (k, 3) [m]."""
-    following = surface.following()
     places = np.flatnonzero(chosen[surface.owners])
-    first, second = surface.names[places], surface.names[following[places]]
+    first, second = surface.names[places], surface.names[surface.following[places]]
     count = int(surface.names.max()) + 1
     alone = ~np.isin(second * count + first, first * count + second)
     ways = defaultdict[int, list[tuple[int, int]]](list)
@@ -243,102 +385,120 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     return tuple(loops)
 
 
-def painted(shapes: Iterable[Shape], view: View, width: float) -> tuple[Part, ...]:
-    """Return the parts of a picture of a given width [m], in the order to draw them."""
-    parts = [part for shape in shapes for part in _parts(shape, view, width)]
-    return tuple(part for _, part in sorted(parts, key=lambda each: each[0]))
+def painted(shapes: Iterable[Shape], window: Window) -> Iterator[Mark]:
+    """Yield the marks of a picture, in the order to draw them; lines that look alike are joined."""
+    parts = [part for shape in shapes for part in _parts(shape, window)]
+    marks = [mark for _, mark in sorted(parts, key=lambda each: each[0])]
+    for look, alike in groupby(
+        marks, key=lambda mark: (mark.colour, mark.width, mark.opacity)
+        if isinstance(mark, Line) else None
+    ):  # fmt: skip
+        if look is None:
+            yield from alike
+        else:
+            lines = tuple(line for mark in alike if isinstance(mark, Line) for line in mark.lines)
+            yield Line(lines, *look)
 
 
-def _parts(shape: Shape, view: View, width: float) -> Iterator[Near]:
+def _parts(shape: Shape, window: Window) -> Iterator[Near]:
     look = look_of(shape)
     if look.fill and shape.polygons:
         paint = _solid if look.solid else FILLED.get(shape.role, _each)
-        yield from paint(shape, look, view)
+        yield from paint(shape, look, window)
     if shape.role == "object" and shape.polygons:
-        for line in outline(Surface.of(shape.polygons), view.camera):
-            yield from _line(line, LOOKS["edge"], view, width)
-    thick = 0.01 * look.line * width
+        for line in outline(Surface.of(shape.polygons), window.view.camera):
+            yield from _line(line, LOOKS["edge"], window)
     for line in shape.lines if look.line else ():
-        if shape.role in WHOLE:
-            flat, near = view.seen(line)
-            yield float(near.mean()), Line((flat,), look.colour, thick, look.opacity)
+        if shape.role in SHORT:
+            flat, near = window.seen(line)
+            yield float(near.mean()), Line((flat,), look.colour, _thick(look, window), look.opacity)
         else:
-            yield from _line(line, look, view, width)
+            yield from _line(line, look, window)
     for point in () if shape.points is None else shape.points:
-        place, (near,) = view.seen(point[None])
+        place, (near,) = window.seen(point[None])
         # A dot is drawn in front of what it marks.
-        dot = Dots(place, look.colour, 0.005 * look.dot * width, look.opacity)
-        yield float(near) + 0.02 * width, dot
+        dot = Dots(place, look.colour, 0.005 * look.dot * window.side, look.opacity)
+        yield float(near) + 0.02 * window.width, dot
 
 
-def _each(shape: Shape, look: Look, view: View) -> Iterator[Near]:
-    for polygon in shape.polygons:
-        flat, near = view.seen(polygon)
-        shade = float(_brightness(_normal(polygon)[None], view)[0]) if look.shaded else 1.0
-        yield float(near.mean()), Area((flat,), _shaded(look.colour, shade), look.fill)
+def _thick(look: Look, window: Window) -> float:
+    """Return how wide lines are on the sheet [pixels]."""
+    return round(0.01 * look.line * window.side, 3)
 
 
-def _glass(shape: Shape, look: Look, view: View) -> Iterator[Near]:
+def _area(flats: Iterable[Array], colour: str, opacity: float, window: Window) -> Area:
+    """Fill loops of places in the view [m], without corners that would not be seen."""
+    loops = tuple(map(window.place, flats))
+    if sum(map(len, loops)) > MANY:
+        loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
+    return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), colour, opacity)
+
+
+def _each(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
+    bright = _brightness(_normals(shape.polygons), window.view).tolist()
+    for polygon, shade in zip(shape.polygons, bright, strict=True):
+        flat, near = window.view.seen(polygon)
+        colour = _shaded(look.colour, shade) if look.shaded else look.colour
+        yield float(near.mean()), _area([flat], colour, look.fill, window)
+
+
+def _glass(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
     """Draw a clear surface; of many polygons, those that look alike are joined."""
     if len(shape.polygons) <= FEW:
-        yield from _each(shape, look, view)
+        yield from _each(shape, look, window)
         return
-    surface = Surface.of(shape.polygons)
+    surface, view = Surface.of(shape.polygons), window.view
     front = surface.facing(view.camera)
-    bright = _brightness(surface.normals, view)
-    levels = _levels(bright)
+    levels = _levels(_brightness(surface.normals, view))
     nearness = view.seen(surface.corners)[1]
     for side in (False, True):
         near = nearness[(front == side)[surface.owners]]
         depth = float(near.mean()) if len(near) else 0.0
         for level in np.unique(levels[front == side]).tolist():
             loops = joined(surface, (front == side) & (levels == level))
-            flat = tuple(view.seen(loop)[0] for loop in loops)
-            yield depth, Area(flat, _shaded(look.colour, _shade(level)), look.fill)
+            flats = [view.seen(loop)[0] for loop in loops]
+            yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
 
 
-def _solid(shape: Shape, look: Look, view: View) -> Iterator[Near]:
+def _solid(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
     """Draw a convex body: its outline, and on it the sides that face the viewer."""
-    corners = shape.vertices()
-    middle = corners.mean(axis=0)
+    corners, view = shape.vertices(), window.view
     flat, near = view.seen(corners)
     depth = float(near.mean())
-    sides = list[tuple[Array, int]]()
-    for polygon in shape.polygons:
-        normal = _normal(polygon)
-        normal = normal if normal @ (polygon.mean(axis=0) - middle) > 0.0 else -normal
-        if normal @ (view.camera - polygon[0]) > 0.0:
-            sides.append((polygon, int(_levels(_brightness(normal[None], view))[0])))
-    mean = round(float(np.mean([level for _, level in sides] or [SHADES - 1])))
-    yield depth, Area((convex_hull(flat),), _shaded(look.colour, _shade(mean)), look.fill)
-    for level in sorted({level for _, level in sides} - {mean}):
-        alike = tuple(view.seen(polygon)[0] for polygon, other in sides if other == level)
-        yield depth, Area(alike, _shaded(look.colour, _shade(level)), look.fill)
+    middles = np.array([polygon.mean(axis=0) for polygon in shape.polygons])
+    firsts = np.array([polygon[0] for polygon in shape.polygons])
+    normals = _normals(shape.polygons)
+    inward = np.einsum("ij,ij->i", normals, middles - corners.mean(axis=0)) <= 0.0
+    normals[inward] *= -1.0
+    facing = np.flatnonzero(np.einsum("ij,ij->i", normals, view.camera - firsts) > 0.0)
+    levels = _levels(_brightness(normals[facing], view))
+    mean = round(float(levels.mean())) if len(levels) else SHADES - 1
+    yield depth, _area([convex_hull(flat)], _shaded(look.colour, _shade(mean)), look.fill, window)
+    for level in sorted({*levels.tolist()} - {mean}):
+        alike: list[int] = facing[levels == level].tolist()
+        flats = [view.seen(shape.polygons[side])[0] for side in alike]
+        yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
 
 
-def _cone(shape: Shape, look: Look, view: View) -> Iterator[Near]:
+def _cone(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
-    flat, near = view.seen(shape.vertices())
-    for part in (convex_hull(flat), view.seen(rim)[0]):
-        yield float(near.mean()), Area((part,), look.colour, look.fill)
+    flat, near = window.view.seen(shape.vertices())
+    for part in (convex_hull(flat), window.view.seen(rim)[0]):
+        yield float(near.mean()), _area([part], look.colour, look.fill, window)
 
 
-FILLED: dict[Role, Callable[[Shape, Look, View], Iterator[Near]]] = {
+FILLED: dict[Role, Callable[[Shape, Look, Window], Iterator[Near]]] = {
     "object": _glass, "force cone": _cone,
 }  # fmt: skip
 """How areas of some roles are drawn, other than each on its own."""
 
 
-def _normal(polygon: Array) -> Array:
-    """Return the unit normal of a flat polygon; zero if its first corners are in line."""
-    one, two = (polygon[1] - polygon[0]).tolist(), (polygon[2] - polygon[1]).tolist()
-    # written out, because NumPy's function takes twenty times as long for one pair
-    normal = np.array([
-        one[1] * two[2] - one[2] * two[1],
-        one[2] * two[0] - one[0] * two[2],
-        one[0] * two[1] - one[1] * two[0],
-    ])  # fmt: skip
-    return normal / max(float(np.linalg.norm(normal)), np.finfo(np.float64).tiny)
+def _normals(polygons: Sequence[Array]) -> Array:
+    """Return unit normals of flat polygons, (k, 3); zero where first corners are in line."""
+    corners = np.array([polygon[:3] for polygon in polygons])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.maximum(lengths, np.finfo(np.float64).tiny)
 
 
 def _brightness(normals: Array, view: View) -> Array:
@@ -362,16 +522,16 @@ def _shaded(colour: str, shade: float) -> str:
     return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
 
 
-def _line(line: Array, look: Look, view: View, width: float) -> Iterator[Near]:
-    flat, near = view.seen(line)
-    thick = 0.01 * look.line * width
+def _line(line: Array, look: Look, window: Window) -> Iterator[Near]:
+    flat, near = window.view.seen(line)
+    nearer, thick = 0.005 * look.line * window.width, _thick(look, window)
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
         length = float(np.linalg.norm(end - start))
         if length > 0.0:
-            for low, high in _spans(length / width, look):
+            for low, high in _spans(length / window.width, look):
                 ends = np.array([start + low * (end - start), start + high * (end - start)])
-                depth = float(first + 0.5 * (low + high) * (last - first)) + 0.5 * thick
-                yield depth, Line((ends,), look.colour, thick, look.opacity)
+                depth = float(first + 0.5 * (low + high) * (last - first)) + nearer
+                yield depth, Line((window.place(ends),), look.colour, thick, look.opacity)
 
 
 def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:

@@ -1,37 +1,80 @@
-"""Draws a grasp in the style of the paper, or an object alone."""
+"""Draws a grasp in the style of the paper's figures, or an object alone: shapes, and their picture.
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from itertools import groupby
+The object is drawn as glass. Outside of it, each finger is a long bar. Inside of it, each contact
+has its friction cone and, within that, the force cone that the construction used. Lines of force
+run through the focus points. For a pencil the plane of each pair of fingers is shown too, for a
+regulus the ruled surface on which the lines lie. Pictures and web pages draw these shapes.
+
+That ruled surface is swept by the transversals of three pairwise skew lines: through each point of
+the first, exactly one line meets the other two, the intersection of the planes that the point spans
+with them. They sweep a hyperboloid of one sheet. Every line that depends linearly on the three,
+such as the fourth line of force, meets all of them, and so lies on it too (Sudsang & Ponce 1995,
+section 2.2).
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross
-from grasp_core.errors import InputError
+from grasp_core.arrays import Array, Indices, cross
+from grasp_core.cones.spanning import angles_between
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import path_of, value_of
+from grasp_core.kinds import Friction, instance, path_of, value_of
+from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
-from grasp_core.values import Grasp
-from scenes.drawing.drawings import check_drawn, drawing_of, glass, numbers_of, view_of
-from scenes.drawing.hands import PosedHand, posed_hand
-from scenes.drawing.painting import LOOKS, Part, Role, Shape, extent_of, painted
-from scenes.drawing.panels import ROW, Entry, Kind, keyed, thinned
-from scenes.drawing.sheets import (
-    FINGERS,
-    NEUTRAL,
-    Area,
-    Dots,
-    Line,
-    Mark,
-    Sheet,
-    closed,
-    format_of,
-    numbered,
+from grasp_core.solvers.ties import SAME_SHARE, first_best
+from grasp_core.values import Contact, Grasp
+from scenes.drawing.hands import PosedHand, hand_shapes, numbers_behind, posed_hand, view_of_hand
+from scenes.drawing.painting import (
+    LOOKS,
+    POLYGON,
+    Extent,
+    Role,
+    Shape,
+    View,
+    Window,
+    approaches,
+    best_view,
+    feature_edges,
+    painted,
 )
-from scenes.drawing.views import Extent, View
+from scenes.drawing.panels import ROW, Entry, Kind, keyed
+from scenes.drawing.sheets import FINGERS, NEUTRAL, Sheet, closed, format_of, numbered
+
+RULINGS = 40
+PARALLEL = 1e-9
+"""Least length of the cross product that gives the direction of a transversal, relative to the
+squared reach."""
+BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
+"""Length and radius of a finger's bar, in finger sizes."""
+NUMBER_BEYOND = 0.12
+"""Distance of a finger's number from the end of its bar, in finger sizes."""
+CONE_LENGTH = 0.42
+"""Length of a cone's sides, in finger sizes."""
+STOUT = 1.3
+"""Finger size over the radius of a ball of the object's volume: compact objects have fingers in
+proportion to their radius, and long or thin ones fingers in proportion to how thick they are."""
+BEYOND = 0.2
+"""Length by which a line is drawn past the points it connects, in object radii."""
+REACH = 0.95
+"""Radius around the object's centre within which the ruled surface of a regulus is drawn, in object
+radii."""
+FARTHEST = 4.0
+"""Greatest length of a line of force, and greatest distance from the centre at which a focus still
+has its plane drawn, in object radii; the foci of built-in objects are within three."""
+SLACK_RAD = 1e-6
+"""Angle by which rounding may make a force cone exceed its friction cone [rad]."""
+MOST_TRIANGLES = 2500
+"""Largest number of triangles drawn for the object; finer surfaces are simplified first."""
+SIDES = 20
+"""Number of corners of the polygons that replace circles."""
+
 
 SIDE = 500
 """Width of a picture, and its height without the key [pixels]."""
@@ -41,21 +84,226 @@ picture's width."""
 FINGER_LABELS = tuple((str(finger), colour) for finger, colour in enumerate(FINGERS))
 MOST_NUMBERED = 20
 """Largest number of faces that have their numbers on a picture of the object."""
-POLYGON = 3
-MANY = 60
-"""Number of corners of an area above which those that are not seen are left out."""
 AZIMUTH_DEG, ELEVATION_DEG = 35.0, 28.0
 """The view of an object without fingers [deg]."""
-MARGIN = 0.04
-"""Width of the empty margin, as a share of the picture's width."""
-FARTHEST = 2.0
-"""Distance from the object's centre beyond which points may be cut off, in object radii."""
 EXPLAINED: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
     "ruled surface", "hand",
 )  # fmt: skip
-WHOLE: tuple[Role, ...] = ("hand", "fingertip")
-"""Roles that are drawn whole, however far from the object they are."""
+
+
+def rulings(points: Array, directions: Array, center: Array, reach: float) -> tuple[Array, ...]:
+    """Cut the transversals of three lines to segments in a ball, (2, 3) each, in their order."""
+    segments = list[Array]()
+    for along in np.linspace(-reach, reach, RULINGS):
+        start = points[0] + along * directions[0]
+        planes = np.cross(points[1:3] - start, directions[1:3])
+        way = np.cross(planes[0], planes[1])
+        length = float(np.linalg.norm(way))
+        if length > PARALLEL * reach**2:
+            way = way / length
+            middle = float((center - start) @ way)
+            room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
+            if room > 0.0:
+                ends = middle - math.sqrt(room), middle + math.sqrt(room)
+                segments.append(np.array([start + end * way for end in ends]))
+    return tuple(segments)
+
+
+def between(segments: Sequence[Array]) -> tuple[Array, ...]:
+    """Make the quadrilaterals between neighbouring segments, each (4, 3)."""
+    quads = list[Array]()
+    for one, two in pairwise(segments):
+        turned = two if (one[1] - one[0]) @ (two[1] - two[0]) > 0.0 else two[::-1]
+        quads.append(np.array([one[0], one[1], turned[1], turned[0]]))
+    return tuple(quads)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """A grasp on its object, with straight fingers or in a hand, as shapes that can be drawn."""
+
+    body: Polyhedron
+    grasp: Grasp
+    friction: float
+    """Coulomb coefficient of the friction cones."""
+    held: PosedHand | None = None
+    """The hand in the place of bars, force cones and lines; friction cones are where it touches."""
+
+    def __post_init__(self) -> None:
+        check_on_faces(self.body, self.grasp)
+        value_of(Friction, self.friction, "friction")
+
+    def shapes(self) -> tuple[Shape, ...]:
+        """List the shapes of the object and of the grasp."""
+        shown = self._straight() if self.held is None else self._by_hand(self.held)
+        return (*glass(self.body), *shown)
+
+    def numbers(self) -> Array:
+        """Return where the fingers' numbers are written, behind their bars or tips, (k, 3) [m]."""
+        if self.held is not None:
+            return numbers_behind(self.held)
+        beyond = (BAR_LENGTH + NUMBER_BEYOND) * finger_size(self.body)
+        return self.grasp.positions - beyond * approaches(self.grasp)
+
+    def view(self) -> View:
+        """Choose a view in which the grasp is seen well, or the hand in it."""
+        if self.held is not None:
+            return view_of_hand(self.body, self.held)
+        return best_view(self.body, self.grasp)
+
+    def sheet(self, view: View | None = None, *, legend: bool = False) -> Sheet:
+        """Draw the grasp in the style of the paper, with the hand in it if there is one."""
+        if view is not None:
+            instance(view, View, "view", "View.of_angles makes one")
+        value_of(bool, legend, "legend")
+        name = f"Grasp {self.grasp.id} of {self.body.name}"
+        if self.held is not None:
+            name += f" with the hand {self.held.hand.name}"
+        shapes, view = self.shapes(), view or self.view()
+        sheet = sheet_of(shapes, self.body, view, name, numbers=self.numbers(), side=SIDE)
+        if not legend:
+            return sheet
+        marks, rows = keyed(_entries(shapes), 20.0, SIDE, SIDE - 30.0)
+        return Sheet(SIDE, SIDE + ROW * (rows + 0.5), sheet.name, (*sheet.marks, *marks))
+
+    def _straight(self) -> Iterator[Shape]:
+        grasp, size = self.grasp, finger_size(self.body)
+        half_angle = math.atan(self.friction)
+        for finger, (contact, cone, inward) in enumerate(
+            zip(grasp.contacts, grasp.force_cones, approaches(grasp), strict=True)
+        ):
+            yield Shape("finger", finger, polygons=bar(contact.position, inward, size))
+            yield self._friction_cone(contact, finger)
+            lean = float(angles_between(cone.axis, contact.normal))
+            if lean + cone.half_angle <= half_angle + SLACK_RAD:
+                yield Shape("force cone", finger, polygons=cone_sides(
+                    contact.position, cone.axis, cone.half_angle, CONE_LENGTH * size
+                ))  # fmt: skip
+            yield from self._region(finger)
+        yield from self._regulus() if grasp.family == "regulus" else self._lines_to_foci()
+        yield Shape("contact", points=grasp.positions)
+
+    def _by_hand(self, held: PosedHand) -> Iterator[Shape]:
+        for finger, contact in enumerate(held.contacts):
+            yield self._friction_cone(contact, finger)
+        for finger in range(len(self.grasp.contacts)):
+            yield from self._region(finger)
+        yield from hand_shapes(held)
+        yield Shape("contact", points=held.positions)
+
+    def _friction_cone(self, contact: Contact, finger: int) -> Shape:
+        tip, length = contact.position, CONE_LENGTH * finger_size(self.body)
+        rim = cone_rim(tip, contact.normal, math.atan(self.friction), length)
+        spokes = [np.array([tip, corner]) for corner in rim[::5]]
+        return Shape("friction cone", finger, lines=(closed(rim), *spokes))
+
+    def _region(self, finger: int) -> Iterator[Shape]:
+        region = self.grasp.regions[finger].polygon
+        if len(region) >= POLYGON:
+            yield Shape("region", finger, polygons=(region,))
+
+    def _lines_to_foci(self) -> Iterator[Shape]:
+        grasp, radius, middle = self.grasp, self.body.radius, self.body.center_of_mass
+        beyond, points = BEYOND * radius, grasp.focus_points
+        foci = np.repeat(points, len(grasp.contacts) // len(points), axis=0)
+        yield Shape("focus", points=points)
+        for finger, (start, focus) in enumerate(zip(grasp.positions, foci, strict=True)):
+            length = min(float(np.linalg.norm(focus - start)) + beyond, FARTHEST * radius)
+            line = np.array([start, start + length * _unit(focus - start)])
+            yield Shape("line of force", finger, lines=(line,))
+        away = np.linalg.norm(points - middle, axis=1)
+        if grasp.family == "pencil" and away.max() <= FARTHEST * radius:
+            one, two = points
+            along, x = beyond * _unit(two - one), grasp.positions
+            ends = np.array([one - along, two + along])
+            quads = (np.array([x[first], ends[0], x[first + 1], ends[1]]) for first in (0, 2))
+            yield Shape("plane", polygons=tuple(quads), lines=(ends,))
+
+    def _regulus(self) -> Iterator[Shape]:
+        radius, middle = self.body.radius, self.body.center_of_mass
+        starts, ways = self.grasp.positions, self.grasp.witness.directions
+        ruled = rulings(starts, ways, middle, REACH * radius)
+        yield Shape("ruled surface", polygons=between(ruled), lines=ruled)
+        for finger, (start, way) in enumerate(zip(starts, ways, strict=True)):
+            ahead = max(float((middle - start) @ way), 0.0)
+            line = np.array([start, start + (2.0 * ahead + BEYOND * radius) * way])
+            yield Shape("line of force", finger, lines=(line,))
+
+
+def finger_size(body: Polyhedron) -> float:
+    """Return the length by which bars and cones are measured [m]: at most the object's radius."""
+    return float(min(body.radius, STOUT * math.cbrt(0.75 * body.volume / math.pi)))
+
+
+def glass(body: Polyhedron) -> tuple[Shape, ...]:
+    """Return the shapes of the object: its surface, and the edges at which it is bent."""
+    if body.patches is None:
+        panes = edged = tuple(piece[::-1] for face in body.faces for piece in face.pieces)
+    else:  # a fine surface keeps the edges of its own triangles
+        panes = tuple(coarse(body.vertices, body.triangles))
+        edged = tuple(body.vertices[body.triangles])
+    return Shape("object", polygons=panes), Shape("edge", lines=tuple(feature_edges(edged)))
+
+
+def coarse(vertices: Array, triangles: Indices) -> Array:
+    """Return the triangles of a surface, (t, 3, 3) [m], fewer and larger ones if they are many."""
+    # vertices are joined on a grid, each to the mean of its cell, which does not tear the surface;
+    # triangles that then have no area are dropped
+    if len(triangles) <= MOST_TRIANGLES:
+        return vertices[triangles]
+    cells = math.sqrt(MOST_TRIANGLES) / 2.0
+    low = vertices.min(axis=0)
+    size = float((vertices.max(axis=0) - low).max()) / cells
+    places = np.floor((vertices - low) / size).astype(np.int64)
+    _, owners = np.unique(places, axis=0, return_inverse=True)
+    owners = owners.reshape(-1)
+    counts = np.bincount(owners)
+    middles = np.stack([np.bincount(owners, axis) / counts for axis in vertices.T], axis=1)
+    joined = owners[triangles]
+    a, b, c = joined.T
+    joined = joined[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(joined, axis=1), axis=0, return_index=True)
+    return middles[joined[np.sort(first)]]
+
+
+def bar(tip: Array, inward: Array, size: float) -> tuple[Array, ...]:
+    """Return the polygons of a finger of a given size that stands on a point."""
+    return tube(tip, tip - BAR_LENGTH * size * inward, BAR_RADIUS * size)
+
+
+def _unit(vector: Array) -> Array:
+    return vector / max(float(np.linalg.norm(vector)), np.finfo(np.float64).tiny)
+
+
+def ring(center: Array, axis: Array, radius: float) -> Array:
+    """Return points of a circle around a unit axis, (SIDES, 3)."""
+    # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
+    side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
+    side /= np.linalg.norm(side)
+    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    return center + radius * around
+
+
+def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
+    """Make the sides and the two ends of a round bar between two points."""
+    axis = (end - start) / np.linalg.norm(end - start)
+    low, high = ring(start, axis, radius), ring(end, axis, radius)
+    sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
+    return (*sides, low[::-1], high)
+
+
+def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
+    """Return the circle at the wide end of a cone with sides of a given length, (SIDES, 3)."""
+    height = length * math.cos(half_angle)
+    return ring(tip + height * axis, axis, length * math.sin(half_angle))
+
+
+def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tuple[Array, ...]:
+    """Make the triangles between the tip of a cone and its rim."""
+    rim = cone_rim(tip, axis, half_angle, length)
+    return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))
 
 
 def write_picture(
@@ -123,107 +371,24 @@ def grasp_figure(
     Raises:
         InputError: As for `write_picture`.
     """
-    held = held_by(hand, reach, grasp)
-    return grasp_sheet(body, grasp, friction, view=view, legend=legend, held=held)
-
-
-def grasp_sheet(
-    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
-    legend: bool = False, held: PosedHand | None = None,
-) -> Sheet:  # fmt: skip
-    """Draw a grasp in the style of the paper, or with the hand in it."""
-    check_drawn(body, grasp, friction, view)
-    value_of(bool, legend, "legend")
-    name = f"Grasp {grasp.id} of {body.name}"
-    if held is not None:
-        name += f" with the hand {held.hand.name}"
-    shapes, numbers = drawing_of(body, grasp, friction, held), numbers_of(body, grasp, held)
-    view = view or view_of(body, grasp, held)
-    sheet = sheet_of(shapes, body, view, name, numbers=numbers, side=SIDE)
-    if not legend:
-        return sheet
-    marks, rows = keyed(_entries(shapes), 20.0, SIDE, SIDE - 30.0)
-    return Sheet(SIDE, SIDE + ROW * (rows + 0.5), sheet.name, (*sheet.marks, *marks))
+    drawing = Drawing(body, grasp, friction, posed_hand(hand, reach, grasp))
+    return drawing.sheet(view, legend=legend)
 
 
 def sheet_of(
-    shapes: Sequence[Shape], extent: Extent, view: View, name: str, *,
-    numbers: Array | None = None, side: int,
-    labels: Sequence[tuple[str, str]] = FINGER_LABELS,
+    shapes: Sequence[Shape], extent: Extent, view: View, name: str, *, side: int,
+    numbers: Array | None = None, labels: Sequence[tuple[str, str]] = FINGER_LABELS,
 ) -> Sheet:  # fmt: skip
     """Draw shapes on a square sheet, with labels at the places of numbers, (k, 3) [m]."""
     places = np.empty((0, 3)) if numbers is None else numbers
-    low, high = frame_around(shapes, places, extent, view)
-    scale = side / float(high[0] - low[0])
-    parts = painted(shapes, view, float(high[0] - low[0]))
-
-    def place(points: Array) -> Array:
-        return np.array([0.0, side]) + np.array([scale, -scale]) * (points - low)
-
+    window = Window.around(shapes, places, extent, view, side)
     radius = max(NUMBER, NUMBER_SHARE * side)
     marks = [
         mark
-        for (text, colour), middle in zip(labels, place(view.seen(places)[0]), strict=False)
+        for (text, colour), middle in zip(labels, window.seen(places)[0], strict=False)
         for mark in numbered(middle, radius, text, colour)
     ]
-    drawn = _together(_on_sheet(part, place, scale) for part in parts)
-    return Sheet(side, side, name, (*drawn, *marks))
-
-
-def _on_sheet(part: Part, place: Callable[[Array], Array], scale: float) -> Mark:
-    match part:
-        case Dots():
-            return replace(part, points=place(part.points), radius=scale * part.radius)
-        case Line():
-            width = round(scale * part.width, 3)
-            return replace(part, lines=tuple(map(place, part.lines)), width=width)
-        case Area():
-            loops = tuple(map(place, part.loops))
-            if sum(map(len, loops)) > MANY:
-                loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
-            return replace(part, loops=tuple(loop for loop in loops if len(loop) >= POLYGON))
-
-
-def _together(marks: Iterable[Mark]) -> Iterable[Mark]:
-    """Join lines that follow one another and look alike."""
-    for look, alike in groupby(
-        marks, key=lambda mark: (mark.colour, mark.width, mark.opacity)
-        if isinstance(mark, Line) else None
-    ):  # fmt: skip
-        if look is None:
-            yield from alike
-        else:
-            lines = tuple(line for mark in alike if isinstance(mark, Line) for line in mark.lines)
-            yield Line(lines, *look)
-
-
-def held_by(hand: Hand | None, reach: HandReach | None, grasp: Grasp) -> PosedHand | None:
-    """Take a hand in its pose from what a user gave; None if nothing was given."""
-    if hand is None and reach is None:
-        return None
-    if hand is None or reach is None:
-        missing = "hand" if hand is None else "reach"
-        raise InputError(
-            f"hand and reach must be given together, got no {missing}: "
-            "reach = gc.reach_with(hand, body, grasp, friction)"
-        )
-    return posed_hand(hand, reach, grasp)
-
-
-def frame_around(
-    shapes: Sequence[Shape], numbers: Array, body: Extent, view: View
-) -> tuple[Array, Array]:
-    """Return two opposite corners of a square around the drawing in a view, (2,) each [m]."""
-    points = np.vstack([extent_of(shapes), numbers])
-    distances = np.linalg.norm(points - body.center_of_mass, axis=1)
-    whole = [np.full(len(shape.vertices()), shape.role in WHOLE) for shape in shapes]
-    hand = np.concatenate([*whole, np.full(len(numbers), any(each.any() for each in whole))])
-    near = (distances <= FARTHEST * body.radius) | hand
-    flat, _ = view.seen(points[near])
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    half = 0.5 * (1.0 + 2.0 * MARGIN) * float((high - low).max())
-    middle = 0.5 * (low + high)
-    return middle - half, middle + half
+    return Sheet(side, side, name, (*painted(shapes, window), *marks))
 
 
 def _entries(shapes: Sequence[Shape]) -> list[Entry]:

@@ -2,14 +2,14 @@
 
 Compiling all that a plan needs takes a minute of one core, once, and what reaches with a hand half
 a minute more. Each call here uses some kernels on a small example, so that their loops are kept;
-two processes that make different calls compile different loops, but for a few that both need.
+two processes that make different calls compile different loops, but for a few that both need. Where
+a call fails, its loops are compiled when they are needed.
 """
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import wait
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,27 +19,22 @@ from grasp_core.compiled import is_kept
 from grasp_core.cones.tilting import toward
 from grasp_core.kinds import Family
 from grasp_core.planning.planner import plan
-from grasp_core.processes import local_processes
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.qp import least_distance
 from scenes.example_objects import example_object
+from sim_validate.kit.processes import each
 
 OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""
 CONTACTS = OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0)
 FRICTION = 0.5
-Calls: TypeAlias = Sequence[Callable[[], object]]
 
 
-@dataclass(frozen=True, slots=True)
-class Loops:
-    """Kernels, and the calls that compile them, in two halves that take equally long."""
-
-    kernels: Sequence[str]
+class Loops(NamedTuple):
     """Some kernels whose loops are kept once all calls were made, without package and ending."""
-    here: Calls
-    beside: Calls
-    """Calls for another process."""
+
+    kernels: tuple[str, ...]
+    calls: tuple[Callable[[], object], ...]
 
 
 def _planned(*families: Family) -> None:
@@ -95,9 +90,8 @@ def _hand_reach() -> None:
 PLANNING = Loops(
     ("families.placing", "families.regulus", "closure.critical_friction",
      "quality.ferrari_canny"),
-    (partial(_planned, "concurrent", "pencil"),),
-    # first what the other half needs late
     (
+        partial(_planned, "concurrent", "pencil"),
         partial(least_distance, CONTACTS[0][:3], -np.ones((1, 3))),
         partial(force_closure, *CONTACTS, FRICTION), partial(critical_friction, *CONTACTS),
         partial(_planned, "regulus"), partial(ferrari_canny, *CONTACTS, FRICTION, torque_scale=1.0),
@@ -105,14 +99,11 @@ PLANNING = Loops(
     ),
 )  # fmt: skip
 """What compiles the loops that plans need."""
-REACHING = Loops(
-    ("hands.collisions", "hands.pose"), (_hand_checks,), (_hand_posing,)
-)  # fmt: skip
+REACHING = Loops(("hands.collisions", "hands.pose"), (_hand_checks, _hand_posing))
 """What compiles the loops that put hands to contacts."""
 EVERYTHING = Loops(
     (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.search"),
-    (*PLANNING.here, _hand_checks, _hand_posing, _hand_reach, _regions, _clearance),
-    (*PLANNING.beside, _best),
+    (*PLANNING.calls, *REACHING.calls, _best, _hand_reach, _regions, _clearance),
 )
 """What compiles all loops that there are."""
 
@@ -128,16 +119,10 @@ def must_compile(loops: Loops, jobs: int) -> bool:
 
 def compile_loops(loops: Loops, jobs: int = 2) -> None:
     """Compile loops, or load what is kept, in this process and in another."""
-    if jobs < 2:  # noqa: PLR2004 - this process and another
-        for call in (*loops.here, *loops.beside):
-            call()
-        return
-    with local_processes(1) as other:
-        calls = [other.submit(_made, call) for call in loops.beside]
-        for call in loops.here:
-            call()
-        wait(calls)  # where the other process fails, loops are compiled when they are needed
+    for _ in each(_made, loops.calls, jobs=min(jobs, 2)):
+        pass
 
 
 def _made(call: Callable[[], object]) -> None:
-    call()
+    with suppress(Exception):
+        call()

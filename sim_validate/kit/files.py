@@ -22,7 +22,6 @@ import zipfile
 from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, Self, TypeAlias, TypeVar
 
@@ -305,6 +304,10 @@ MARK = ".graspproof-report"
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
 ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
 """Pattern of a grasp's id, as plans name grasps; people give other ids to contacts of their own."""
+OF_REPORT = (
+    INDEX, *STATIC, "object-*.js", f"{GRASPS}/*.html", f"{PICTURES}/*.svg", f"{CLIPS}/*.webp",
+)  # fmt: skip
+"""Patterns of the files of a report, the first page first."""
 PAGES = ("", GRASPS, PICTURES, CLIPS)
 PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in PAGES))
 """Subfolders into which commands write."""
@@ -379,15 +382,8 @@ def remove_report(folder: Path) -> None:
 
 def remove_pages(folder: Path) -> None:
     """Remove the pages of a report, the first page first; its mark stays."""
-    _remove(
-        chain(
-            (folder / name for name in (INDEX, *STATIC)),
-            folder.glob("object-*.js"),
-            folder.glob(f"{GRASPS}/*.html"),
-            folder.glob(f"{PICTURES}/*.svg"),
-            folder.glob(f"{CLIPS}/*.webp"),
-        )
-    )
+    for pattern in OF_REPORT:
+        _remove(folder.glob(pattern))
     for kind in (GRASPS, PICTURES, CLIPS):
         part = folder / kind
         if part.is_dir() and not any(part.iterdir()):

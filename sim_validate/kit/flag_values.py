@@ -6,7 +6,7 @@ A TOML file of settings becomes flags of an equivalent command line. Examples of
 here, too, as `--help` shows them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast, get_args, get_origin
@@ -117,14 +117,14 @@ def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]
     if at + 1 >= len(words):
         raise FlagsError("--config needs the path of a TOML file after it")
     rest = words[:at] + words[at + 2 :]
-    known = {flag.name: flag for flag in flags_of(commands.get(rest[0]))} if rest else {}
-    flags = _read(Path(words[at + 1]), known)
-    command = COMMAND_WORDS.get(rest[0], 1) if rest else 0
-    return [*rest[:command], *flags, *rest[command:]]
+    flags = _read(Path(words[at + 1]), commands.get(rest[0]) if rest else None)
+    first = next((place for place, word in enumerate(rest) if word.startswith("-")), len(rest))
+    return [*rest[:first], *flags, *rest[first:]]
 
 
-def flags_from(settings: Mapping[str, Any], known: Mapping[str, Flag]) -> list[str]:
+def flags_from(settings: Mapping[str, Any], command: Any) -> list[str]:
     """Turn settings into the words of an equivalent command line; tables hold groups of flags."""
+    known = {flag.name: flag for flag in flags_of(command)}
     words = list[str]()
     for name, value in _named(settings):
         flag = known.get(name.replace("-", "_"))
@@ -142,7 +142,7 @@ def _named(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
             yield prefix + name, value
 
 
-def _read(path: Path, known: Mapping[str, Flag]) -> list[str]:
+def _read(path: Path, command: Any) -> list[str]:
     """Read a file of settings as words of a command line."""
     # imported only when there is a file to read
     from sim_validate.kit.files import read_tables
@@ -152,24 +152,26 @@ def _read(path: Path, known: Mapping[str, Flag]) -> list[str]:
     except InputError as error:
         raise InputError(f"--config {error}") from error
     try:
-        return flags_from(settings, known)
+        return flags_from(settings, command)
     except InputError as error:
         raise type(error)(f"--config {path}: {error}") from None
 
 
 def _as_flags(flag: Flag, value: Any) -> list[str]:
-    words = "--" + flag.name.replace("_", "-")
-    if any(isinstance(part, dict) for item in _items(value) for part in _items(item)):
+    word, items = "--" + flag.name.replace("_", "-"), _items(value)
+    if any(isinstance(part, dict) for item in items for part in _items(item)):
         raise InputError(f"{flag.name}: expected a value or a list, got a table")
     if isinstance(value, bool):
-        return [words] if value else []
+        return [word] if value else []
     if listed(flag.kind) is not None:
-        return [words, ",".join(map(str, _items(value)))]
-    return [word for item in _items(value) for word in (words, *map(str, _items(item)))]
+        return [word, ",".join(map(str, items))]
+    if UseAppendAction in get_args(flag.kind)[1:]:
+        return [part for item in items for part in (word, *map(str, _items(item)))]
+    return [word, *map(str, items)]
 
 
-def _items(value: Any) -> list[Any]:
-    return cast("list[Any]", value) if isinstance(value, list) else [value]
+def _items(value: Any) -> Sequence[Any]:
+    return cast("Sequence[Any]", value) if isinstance(value, list | tuple) else [value]
 
 
 EXAMPLES = """\

@@ -19,7 +19,7 @@ import sys
 import threading
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -226,7 +226,22 @@ def _require_listener(address: str) -> None:
 def dask_workers(workers: int, address: str | None) -> Generator[Cluster]:
     """Start or join a Dask cluster."""
     distributed = _imported("distributed", "dask")
-    with _dask_client(distributed, workers, address) as client:
+    with ExitStack() as stack:
+        if address is None:
+            settings = {"distributed.scheduler.allowed-failures": 0}
+            with importlib.import_module("dask").config.set(settings):
+                cluster = stack.enter_context(distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, memory_limit=0,
+                    dashboard_address=ANY_PORT, silence_logs=50,
+                ))  # fmt: skip
+            where = {"address": cluster}
+        else:
+            where = {"scheduler_file" if Path(address).is_file() else "address": address}
+        try:
+            client = stack.enter_context(distributed.Client(timeout=ANSWER_S, **where))
+        except (OSError, ValueError) as error:
+            raise InputError(f"--address {address}: no Dask scheduler answers ({error})") from error
+        client.wait_for_workers(1)
         threads: dict[str, int] = client.nthreads()
         if any(count > 1 for count in threads.values()):
             raise InputError(
@@ -235,28 +250,6 @@ def dask_workers(workers: int, address: str | None) -> Generator[Cluster]:
             )
         executor = client.get_executor(pure=False, retries=0)
         yield Cluster(max(1, len(threads)), ("KilledWorker",), executor.submit)
-
-
-@contextmanager
-def _dask_client(distributed: Any, workers: int, address: str | None) -> Generator[Any]:
-    if address is None:
-        settings = {"distributed.scheduler.allowed-failures": 0}
-        with importlib.import_module("dask").config.set(settings):
-            cluster = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, memory_limit=0,
-                dashboard_address=ANY_PORT, silence_logs=50,
-            )  # fmt: skip
-        with cluster, distributed.Client(cluster) as client:
-            yield client
-        return
-    where = {"scheduler_file" if Path(address).is_file() else "address": address}
-    try:
-        client = distributed.Client(timeout=ANSWER_S, **where)
-    except (OSError, ValueError) as error:
-        raise InputError(f"--address {address}: no Dask scheduler answers ({error})") from error
-    with client:
-        client.wait_for_workers(1)
-        yield client
 
 
 def _imported(module: str, extra: str) -> Any:

@@ -11,11 +11,16 @@ border of W in its weakest direction; in a plane that holds this direction, the 
 line that touches the disc and the projection.
 
 A trial's charts show how far object and fingers moved, and how hard fingers pushed. Points of
-simulated over predicted values should lie on the line of equal values.
+simulated over predicted values should lie on the line of equal values. A trial that was predicted
+to hold and did not, or the reverse, contradicts the analysis or the simulation. As in `validate`,
+neither is counted for loads within `AGREEMENT` of their limit and for trials that prove nothing,
+such as those that diverged.
 """
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,12 +28,12 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.errors import InputError
-from grasp_core.kinds import Quantity, value_of
+from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
-from scenes.drawing.drawings import check_drawn
+from scenes.drawing.painting import View
 from scenes.drawing.panels import (
     ROW,
     SMALL,
@@ -37,9 +42,8 @@ from scenes.drawing.panels import (
     Scale,
     marker,
     thinned,
-    ticks_between,
-    ticks_in,
 )
+from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import (
     BAD,
     FINGERS,
@@ -61,11 +65,11 @@ from scenes.drawing.sheets import (
     levels_of,
     outlined,
 )
-from scenes.drawing.views import View, best_view
 from scenes.settings import FingerSettings
+from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Replayed
-from sim_validate.closure.verdict import AGREEMENT
-from sim_validate.report.agreement import Agreement
+from sim_validate.closure.verdict import AGREEMENT, Verdict, WrenchVerdict
+from sim_validate.engine.traces import LET_GO, Outcome
 
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
@@ -123,47 +127,33 @@ def margin_figure(
     Raises:
         InputError: The grasp does not lie on the body, or is not in force closure at this friction.
     """
-    panels = margin_panels(body, grasp, friction, max_normal_force_n=max_normal_force_n)
-    return beside(panels)
+    return beside(margin_panels(Drawing(body, grasp, friction), max_normal_force_n))
 
 
-def margin_panels(
-    body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
-) -> tuple[Sheet, Sheet]:
+def margin_panels(drawing: Drawing, max_normal_force_n: float) -> tuple[Sheet, Sheet]:
     """Draw the panels of `margin_figure` as sheets of their own."""
-    forces, torques = margins(body, grasp, friction, max_normal_force_n=max_normal_force_n)
+    forces, torques = margins(drawing, max_normal_force_n)
     return _map(forces, "force", "N"), _map(torques, "torque", "mN m")
 
 
-def margins(
-    body: Polyhedron, grasp: Grasp, friction: float, *, max_normal_force_n: float = USUAL_PUSH_N
-) -> tuple[Array, Array]:
+def margins(drawing: Drawing, max_normal_force_n: float) -> tuple[Array, Array]:
     """Compute the largest force [N] and torque [mN m] resisted, (LATITUDES, LONGITUDES) each."""
-    check_drawn(body, grasp, friction)
-    value_of(Quantity, max_normal_force_n, "max_normal_force_n")
-    certificate = force_closure(grasp, friction=friction)
-    if certificate.forces is None:
+    grasp, friction, body = drawing.grasp, drawing.friction, drawing.body
+    largest = value_of(Quantity, max_normal_force_n, "max_normal_force_n")
+    if not force_closure(grasp, friction=friction).closed:
         raise InputError(
             f"{grasp.id} is not in force closure at friction {friction:g}, so it resists nothing "
             f"in some direction; draw it at a friction above {grasp.critical_friction:.4g}"
         )
-    ways = np.zeros((LATITUDES * LONGITUDES, 6))
-    ways[:, :3] = directions_of_map().reshape(-1, 3)
-    forces = _limits(body, grasp, friction, max_normal_force_n, ways)
-    ways = np.roll(ways, 3, axis=1) * body.radius
-    torques = _limits(body, grasp, friction, max_normal_force_n, ways)
-    return forces, MILLI * body.radius * torques
-
-
-def _limits(
-    body: Polyhedron, grasp: Grasp, friction: float, largest: float, wrenches: Array
-) -> Array:
+    ways, still = directions_of_map().reshape(-1, 3), np.zeros((LATITUDES * LONGITUDES, 3))
+    wrenches = np.vstack([np.hstack([ways, still]), np.hstack([still, body.radius * ways])])
     different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
     found = wrench_limits(
         grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
     )
-    limits = np.array([each.limit for each in found])
-    return limits[same.reshape(-1)].reshape(LATITUDES, LONGITUDES)
+    limits = np.array([each.limit for each in found])[same.reshape(-1)]
+    forces, torques = limits.reshape(2, LATITUDES, LONGITUDES)
+    return forces, MILLI * body.radius * torques
 
 
 def _nodes() -> tuple[Array, Array]:
@@ -219,14 +209,12 @@ def _scale(low: float, high: float) -> Iterator[Mark]:
     ends = f"{low:.3g}", f"{high:.3g}"
     yield Words(EDGE, top + 20.0, ends[0], "start", SMALL)
     yield Words(WIDTH - EDGE, top + 20.0, ends[1], "end", SMALL)
-    inside = [tick for tick in ticks_in(low, high) if low < tick < high] if high > low else []
-    between = [
-        tick for tick in inside if APART < (tick - low) / (high - low) < 1.0 - APART
-    ]  # fmt: skip
-    for tick in between:
-        x = EDGE + long * (tick - low) / (high - low)
-        yield ink_line([(x, top + 10.0), (x, top + 13.0)])
-        yield Words(x, top + 20.0, f"{tick:g}", "middle", SMALL)
+    for tick in Scale(low, high).ticks() if high > low else ():
+        share = (tick - low) / (high - low)
+        if APART < share < 1.0 - APART:
+            x = EDGE + long * share
+            yield ink_line([(x, top + 10.0), (x, top + 13.0)])
+            yield Words(x, top + 20.0, f"{tick:g}", "middle", SMALL)
     y = top + 40.0
     yield outlined([circle(np.array([EDGE + 6.0, y]), 5.0)], BAD, 2.5)
     yield Words(EDGE + 18.0, y, f"least: {low:.3g}", size=SMALL)
@@ -275,20 +263,19 @@ def wrench_figure(
     Raises:
         InputError: The grasp does not lie on the body, or the friction is out of range.
     """
-    return beside(wrench_panels(body, grasp, friction, view=view))
+    return beside(wrench_panels(Drawing(body, grasp, friction), view))
 
 
-def wrench_panels(
-    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
-) -> tuple[Sheet, Sheet, Sheet]:
+def wrench_panels(drawing: Drawing, view: View | None = None) -> tuple[Sheet, Sheet, Sheet]:
     """Draw the panels of `wrench_figure` as sheets of their own."""
-    check_drawn(body, grasp, friction, view)
-    view = view or best_view(body, grasp)
+    if view is not None:
+        instance(view, View, "view", "View.of_angles makes one")
+    body, (right, up, _) = drawing.body, (view or drawing.view()).axes
     quality = ferrari_canny(
-        grasp, friction=friction, center=body.center_of_mass, torque_scale=body.radius
-    )
+        drawing.grasp, friction=drawing.friction, center=body.center_of_mass,
+        torque_scale=body.radius,
+    )  # fmt: skip
     wrenches, radius = quality.wrenches, quality.upper
-    right, up = view.axes[0], view.axes[1]
     still = np.zeros(3)
     closed = "weakest direction" if radius > 0.0 else "not in force closure: zero is outside"
     scale = f"torques over {1e3 * body.radius:.3g} mm"
@@ -347,7 +334,7 @@ def _shadow(
     x, y = (Scale(float(each - half), float(each + half)) for each in middle)
     panel = Panel(PLACE[0], PLACE[1], PLACE[2], PLACE[2], x, y)
     disc = circle(np.zeros(2), ball)
-    marks = [*panel.frame(ticks_in(x.low, x.high), ticks_in(y.low, y.high))]
+    marks = [*panel.frame(x.ticks(), y.ticks())]
     area = thinned(panel.at(*border.T))
     marks += [Area((area,), GOOD, 0.25), outlined([area], GOOD), *_hatched(panel, ball)]
     marks += [outlined([panel.at(*disc.T)], INK, 1.2)]
@@ -410,7 +397,7 @@ def _moved(found: Replayed, threshold_m: float) -> Sheet:
     steps = 10.0 ** np.arange(-4, math.log10(highest), 2)
     slips = list(zip(FINGERS, trace.slips_m.T, strict=False))
     marks = [
-        *panel.frame(ticks_in(panel.x.low, panel.x.high, 4), steps.tolist()),
+        *panel.frame(panel.x.ticks(4), steps.tolist()),
         *(panel.curve(trace.times_s, MICRO * slip, colour) for colour, slip in slips),
         panel.curve(trace.times_s, MICRO * trace.displacements_m, INK, 1.8),
         panel.level(MICRO * threshold_m, BAD),
@@ -429,7 +416,7 @@ def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str
     panel = _panel(times, Scale(low, top if limit is None else MOST_SHARE * limit[0]))
     curves = list(zip(FINGERS, values.T, strict=False))
     marks = [
-        *panel.frame(ticks_in(panel.x.low, panel.x.high, 4), ticks_in(panel.y.low, panel.y.high)),
+        *panel.frame(panel.x.ticks(4), panel.y.ticks()),
         *(panel.curve(times, np.where(np.isfinite(each), each, np.nan), colour)
           for colour, each in curves),
         panel.upright(0.0, NEUTRAL, dashed=True),
@@ -455,6 +442,86 @@ def friction_used(pushes: Array, friction: Array) -> Array:
     return np.where(pushing, tangential / safe, np.nan)
 
 
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Predicted and simulated values of one quantity, such as the critical friction."""
+
+    quantity: str
+    pairs: tuple[tuple[float, float], ...]
+    below: int = 0
+    """Number of grasps that held even at the least friction tried, so no value was found."""
+
+    def differ(self) -> tuple[bool, ...]:
+        """Whether each pair differs by more than is allowed."""
+        return tuple(abs(two - one) > AGREEMENT * one for one, two in self.pairs)
+
+    @property
+    def worst(self) -> float:
+        """Largest relative difference between prediction and simulation; 0 without pairs."""
+        shares = [abs(two - one) / one if one > 0.0 else math.inf for one, two in self.pairs]
+        return max(shares, default=0.0)
+
+
+def frictions_in(verdicts: Iterable[Verdict]) -> Agreement:
+    """Compare critical frictions; a simulated zero means that the least one tried sufficed."""
+    found = [verdict.critical_friction for verdict in verdicts]
+    measured = [(each.predicted, each.simulated) for each in found if each.simulated is not None]
+    pairs = tuple(pair for pair in measured if pair[1])
+    return Agreement("critical friction", pairs, len(measured) - len(pairs))
+
+
+def limits_in(verdicts: Iterable[Verdict]) -> Agreement:
+    """Compare the sizes of the largest wrenches that were resisted."""
+    pairs = tuple(
+        (size * trial.predicted_limit, size * trial.simulated_limit)
+        for verdict in verdicts
+        for trial in verdict.wrenches
+        if trial.simulated_limit is not None and math.isfinite(trial.predicted_limit)
+        for size in [wrench_size(verdict, trial)]
+    )
+    return Agreement("largest wrench [N], torques over grasp size", pairs)
+
+
+def wrench_size(verdict: Verdict, trial: WrenchVerdict) -> float:
+    """Compute the size of a trial's wrench [N], with torques divided by the grasp's size."""
+    force, torque = np.reshape(trial.wrench, (2, 3))
+    return math.hypot(*force, *(torque / verdict.scale.grasp_size_m))
+
+
+def quadrants_in(verdicts: Sequence[Verdict]) -> Counter[str]:
+    """Count trials of grasps and of negative controls by what was predicted and what happened.
+
+    Nothing resists the loads of a control.
+    """
+    counts = Counter[str]()
+    for verdict in verdicts:
+        counts.update(_place(trial, resisted(trial)) for trial in verdict.wrenches)
+        for control in verdict.controls:
+            counts.update(_place(trial, False) for trial in control.tried)
+    return counts
+
+
+def resisted(trial: WrenchVerdict) -> bool | None:
+    """Tell whether a load is predicted to be resisted; None if it is too near its limit."""
+    limit = trial.predicted_limit
+    return None if abs(limit - 1.0) <= AGREEMENT else limit > 1.0
+
+
+def as_predicted(trial: WrenchVerdict) -> bool:
+    """Tell whether a trial ended as predicted, or in a way that the prediction leaves open."""
+    wanted = resisted(trial)
+    ends = (Outcome.HELD, *LET_GO) if wanted is None else (Outcome.HELD,) if wanted else LET_GO
+    return trial.hold.outcome in ends
+
+
+def _place(trial: WrenchVerdict | ControlTrial, wanted: bool | None) -> str:
+    outcome = trial.hold.outcome
+    if wanted is None or outcome not in (Outcome.HELD, *LET_GO):
+        return "neither"
+    held = "held" if outcome is Outcome.HELD else "let_go"
+    return f"{'resisted' if wanted else 'not_resisted'}_{held}"
+
+
 def fidelity_panel(agreement: Agreement) -> Sheet:
     """Draw simulated over predicted values of a quantity on logarithmic axes."""
     name = f"{agreement.quantity}: simulated over predicted"
@@ -469,10 +536,9 @@ def fidelity_panel(agreement: Agreement) -> Sheet:
     ends = np.array([0.7 * pairs.min(), 1.4 * pairs.max()])
     scale = Scale(float(ends[0]), float(ends[1]), log=True)
     panel = Panel(*PAIRS_PLACE, scale, scale)
-    ticks = ticks_between(scale.low, scale.high)
     low, high = (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends
     band = np.vstack([panel.at(ends, low), panel.at(ends, high)[::-1]])
-    marks: list[Mark] = [*panel.frame(ticks, ticks), Area((band,), NEUTRAL, 0.3)]
+    marks: list[Mark] = [*panel.frame(scale.ticks(), scale.ticks()), Area((band,), NEUTRAL, 0.3)]
     marks.append(Line((panel.at(ends, ends),), NEUTRAL, 1.0))
     key = [Entry("identity", NEUTRAL), Entry(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
     off = np.array(agreement.differ())

@@ -20,7 +20,7 @@ from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_trial_clip
 from scenes.drawing.pages import turntable_page
-from scenes.drawing.pictures import grasp_sheet
+from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
@@ -32,8 +32,8 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id
 from sim_validate.report.report import Report, write_report
-from sim_validate.report.run_folder import GRASPS, folder_of, reaches_beside
-from sim_validate.report.sections import held_in, why_not_held
+from sim_validate.report.run_folder import GRASPS, RunFolder, folder_of, reaches_beside
+from sim_validate.report.sections import why_not_held
 
 COMING, RESTING = 60, 20
 """Number of clip frames in which fingers come in, and in which they then stay."""
@@ -58,23 +58,26 @@ def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
         _in_viewer(_scene(saved, grasp, friction), grasp, reporter)
         reporter.document({"id": grasp.id, "files": []})
         return Exit.GOOD
-    reaches = reaches_beside(path, saved) if command.hand else None
-    held = held_in(reaches, grasp)
-    if reaches is not None and held is None:
-        reporter.warn(f"the hand is not shown: {why_not_held(reaches, grasp)}")
-    files = list[str]()
+    reaches = reaches_beside(path.parent, saved) if command.hand else None
+    found = RunFolder(path.parent, saved, friction, reaches=reaches).of(grasp)
+    if reaches is not None and found.held is None:
+        reporter.warn(f"the hand is not shown: {why_not_held(found)}")
+    drawing, files = Drawing(saved.body, grasp, friction, found.held), list[str]()
 
     def keep(path: Path) -> None:
         reporter.say(f"wrote {path}")
         files.append(str(path))
 
     if command.picture is not None:
-        sheet = grasp_sheet(saved.body, grasp, friction, legend=True, held=held)
-        keep(sheet.write(command.picture))
+        keep(drawing.sheet(legend=True).write(command.picture))
     if command.page is not None:
-        keep(write_text(command.page, turntable_page(saved.body, grasp, friction, held)))
+        keep(write_text(command.page, turntable_page(drawing)))
     if command.clip is not None:
-        keep(write_closing_clip(_scene(saved, grasp, friction), grasp, command.clip))
+        scene = _scene(saved, grasp, friction)
+        joints = closing(scene)
+        azimuths = np.linspace(0.0, SWING_DEG, len(joints))
+        angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])
+        keep(write_clip(scene, joints, command.clip, grasp.id, angles_deg=angles))
     reporter.document({"id": grasp.id, "files": files})
     return Exit.GOOD
 
@@ -102,14 +105,6 @@ def _in_viewer(scene: Scene, grasp: Grasp, reporter: Reporter) -> None:
             f"MuJoCo's viewer failed with exit code {ended}; show the grasp with --picture, "
             "--page or --clip"
         )
-
-
-def write_closing_clip(scene: Scene, grasp: Grasp, path: Path) -> Path:
-    """Write a clip in which fingers come in to their contacts while the camera moves around."""
-    joints = closing(scene)
-    azimuths = np.linspace(0.0, SWING_DEG, len(joints))
-    angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])
-    return write_clip(scene, joints, path, grasp.id, angles_deg=angles)
 
 
 def closing(scene: Scene) -> Array:
@@ -163,8 +158,14 @@ MICRO = 1e6
 
 def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     """Simulate a recorded trial again and compare its outcome with that in the file."""
-    wanted = Wanted(command.grasp, command.control, command.trial, command.grasps)
-    recorded = _recorded(command.source, wanted)
+    if command.trial is not None and command.control is not None:
+        raise InputError(
+            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
+            "give only one of them"
+        )
+    source = command.source
+    read = recorded_in_dataset if (source / MANIFEST).is_file() else recorded_in
+    recorded = read(source, Wanted(command.grasp, command.control, command.trial, command.grasps))
     found = replayed(recorded, command.wrench)
     said = recorded.outcome_of(found.name)
     _show(recorded, found, said, reporter)
@@ -172,18 +173,6 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
     beside = {"recorded_outcome": said, "files": [str(path) for path in files]}
     reporter.document({"name": recorded.name, **record_of(found), **beside})
     return Exit.GOOD if found.hold.outcome.value == said else Exit.NEGATIVE
-
-
-def _recorded(source: Path, wanted: Wanted) -> Recorded:
-    """Read a contact set from a `verdicts.json`, the folder of a run, or a dataset."""
-    if wanted.trial is not None and wanted.control is not None:
-        raise InputError(
-            "--trial chooses a repeat of the grasp with noise, --control a negative control: "
-            "give only one of them"
-        )
-    if source.is_dir() and (source / MANIFEST).is_file():
-        return recorded_in_dataset(source, wanted)
-    return recorded_in(source, wanted)
 
 
 def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Reporter) -> None:

@@ -1,25 +1,77 @@
 """Turns the folder of a run into a folder of pages that open from disk and need no network."""
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from functools import partial
+from itertools import chain, islice
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, cast
 
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.cones.spanning import angles_between
+from grasp_core.figures import figures, table
+from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import Count, Number, function, path_of, value_of
-from scenes.drawing.pages import as_text, object_data
+from grasp_core.provenance import versions
+from grasp_core.values import Grasp
+from scenes.drawing.pages import (
+    NOTHING,
+    Fact,
+    as_text,
+    filled,
+    grasp_data,
+    grasp_facts,
+    number,
+    object_data,
+    text_of,
+)
+from scenes.drawing.pictures import Drawing
+from scenes.drawing.sheets import night_style, svg_of
+from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.kit import files
 from sim_validate.kit.processes import available_cores, each
-from sim_validate.report import pages
-from sim_validate.report.drawn_grasps import Drawn, Task, draw, tasks_of
-from sim_validate.report.run_folder import RunFolder, folder_of, runs_in
+from sim_validate.planning.asked_objects import GRASPS
+from sim_validate.planning.best import MEASURES, Best, Rated
+from sim_validate.protocols.verdict import Totals
+from sim_validate.report import sections
+from sim_validate.report.cards import Card, Paged, cards_to_draw, draw, largest_push
+from sim_validate.report.charts import (
+    as_predicted,
+    fidelity_panel,
+    frictions_in,
+    limits_in,
+    quadrants_in,
+    wrench_size,
+)
+from sim_validate.report.run_folder import BAD, GOOD, Findings, RunFolder, folder_of, runs_in
+from sim_validate.report.sections import Record
 
+ASSETS = Path(__file__).parent / "assets"
+MILLI, PERCENT = 1e3, 100.0
+FAMILIES = {
+    "concurrent": "the lines of force meet in one point",
+    "pencil": "two pairs of lines, which meet in points of a common line",
+    "regulus": "the lines of force are skew and lie on one ruled surface",
+}
+SPAN = (
+    "half-angle of the widest cones around the normals of which any choice of directions "
+    "positively spans space; 0: none do, and the force cones lean"
+)
+TRIAL_FIGURES = tuple(each for each in figures(WrenchVerdict) if each.name != "outcome")
+"""Figures of a trial in the columns behind its outcome."""
+SAID_ABOVE = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
+"""Figures of a verdict that the page says in other places."""
+FOCUS = "where lines of force meet, in the object's frame"
+ROWS = 20
+"""Largest number of grasps in the table of what is possible."""
 FIRST = 4
 """Number of cards that are drawn before the first page is written for the first time; it is written
 again whenever twice as many are drawn, and at the end."""
-
-Runs: TypeAlias = tuple[RunFolder, ...]
 
 
 def _nothing(*_: object) -> None:
@@ -81,33 +133,38 @@ def write_report(
     runs = tuple(run.first(limit) for run in runs_in(folder))
     files.require_report_folder(out)
     with files.new_pages(out) as place:
-        cards = list(_cards(runs, place, clips))
+        cards = list(cards_to_draw(runs, clips))
         ready = ready if place == out else _nothing
         report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
     return replace(report, index=out / files.INDEX)
 
 
 def _written(
-    cards: Sequence[tuple[pages.Card, Task]], runs: Runs, out: Path, jobs: int,
+    cards: Sequence[Card], runs: Sequence[RunFolder], out: Path, jobs: int,
     progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
 ) -> Report:  # fmt: skip
     for name in files.STATIC:
-        write_text(out / name, pages.style() if name == files.STYLE else pages.asset(name))
-    for number, run in enumerate(runs):
+        rules = f"{night_style()}\n" if name == files.STYLE else ""  # of charts on dark screens
+        write_text(out / name, f"{text_of(name, ASSETS)}{rules}")
+    for place, run in enumerate(runs):
         data = as_text(object_data(run.saved.body))
-        write_text(out / f"object-{number}.js", f"window.graspproofObject = {data};\n")
-    tasks = [task for _, task in cards]
-    names = [None, *(f"{task.name}.html" for task in tasks), None]
-    shown = list[pages.Card]()
+        write_text(out / f"object-{place}.js", f"window.graspproofObject = {data};\n")
+    tasks = [replace(card, copies=()) for card in cards]
+    names = [None, *(f"{card.name}.html" for card in cards), None]
+    shown = list[Card]()
     no_clip, next_index = "", min(FIRST, len(cards))
-    results = chain(each(draw, tasks[:FIRST], jobs=1), each(draw, tasks[FIRST:], jobs=jobs))
-    for (card, _), drawn in zip(cards, results, strict=True):
+    drawing = partial(draw, out)
+    results = chain(each(drawing, tasks[:FIRST], jobs=1), each(drawing, tasks[FIRST:], jobs=jobs))
+    for card, drawn in zip(cards, results, strict=True):
         around = names[len(shown)], names[len(shown) + 2]
-        shown.append(_pages_of(card, drawn, out, around))
+        shown.append(replace(card, drawn=drawn))
+        write_text(out / card.page, grasp_page(card.found, shown[-1], around))
+        for copy in card.copies:
+            write_text(out / copy.page, grasp_page(copy.found, card, copy=copy))
         no_clip = no_clip or drawn.no_clip
         if len(shown) == next_index:
             waiting = len(cards) - len(shown)
-            index = write_text(out / files.INDEX, pages.index_page(runs, shown, waiting))
+            index = write_text(out / files.INDEX, index_page(runs, shown, waiting))
             if next_index == FIRST and waiting:
                 ready(index, len(shown), len(cards))
             next_index = min(2 * next_index, len(cards))
@@ -116,33 +173,256 @@ def _written(
     return Report(out / files.INDEX, grasps, no_clip, len(cards))
 
 
-def _cards(runs: Runs, out: Path, clips: int) -> Iterator[tuple[pages.Card, Task]]:
-    for number, run in enumerate(runs):
-        prefix = f"{number}-" if len(runs) > 1 else ""
-        grasps = run.saved.grasps
-        classes = pages.cards_of(run)
-        firsts = [grasps[each.first] for each in classes]
-        for found, task in zip(classes, tasks_of(run, firsts, out, prefix, clips), strict=True):
-            copies = tuple(
-                pages.Copy(grasps[place].id, f"{files.GRASPS}/{prefix}{grasps[place].id}.html",
-                     pages.MIRRORED if place in found.mirrored else pages.ROTATED)
-                for place in found.places if place != found.first
-            )  # fmt: skip
-            script, path = f"object-{number}.js", f"{files.GRASPS}/{task.name}.html"
-            yield pages.Card(run, grasps[found.first], script, path, copies), task
+def grasp_page(
+    found: Findings, card: Card, around: tuple[str | None, str | None] = (None, None),
+    copy: Paged | None = None,
+) -> str:  # fmt: skip
+    """Write the text of the page about one grasp: that of a card, or a copy, which has no pictures.
 
-
-def _pages_of(
-    card: pages.Card, drawn: Drawn, out: Path, around: tuple[str | None, str | None]
-) -> pages.Card:
-    """Write the page of a card's grasp, and those of its copies, which have no pictures."""
-    grasps = {grasp.id: grasp for grasp in card.run.saved.grasps}
-    text = pages.grasp_page(
-        card.run, card.grasp, card.script, drawn, neighbours=around, copies=card.copies
+    It leads to the pages before and after it, and from a copy to the grasp that is drawn.
+    """
+    run, verdict = found.run, found.verdict
+    size = None if verdict is None else verdict.scale.grasp_size_m
+    return filled(
+        "grasp.html",
+        ASSETS,
+        found=found,
+        card=card,
+        copy=copy,
+        around=around,
+        drawn=card.drawn if copy is None else None,
+        push=largest_push(verdict),
+        executed=sections.execution_section(found),
+        reached=sections.reach_section(found),
+        facts=list(_facts(found)),
+        contacts=list(_contacts(found.shown)),
+        sizes={  # by which torques are divided: the object's radius, the grasp's size
+            "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
+            "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
+        },
+        trial_columns=[(each.shown.heading, each.meaning) for each in TRIAL_FIGURES],
+        trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
+        commands=list(_commands(found)),
+        drawing=as_text(grasp_data(Drawing(run.saved.body, found.shown, run.friction, found.held))),
     )
-    write_text(out / card.page, text)
-    for copy in card.copies:
-        first = pages.Copy(card.grasp.id, card.page, copy.kind)
-        text = pages.grasp_page(card.run, grasps[copy.id], card.script, first=first)
-        write_text(out / copy.page, text)
-    return replace(card, picture=drawn.hand or drawn.picture)
+
+
+def _facts(found: Findings) -> Iterable[Fact]:
+    run, grasp, verdict = found.run, found.grasp, found.verdict
+    planned = run.saved.friction
+    at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
+    yield "Family", grasp.family, FAMILIES[grasp.family]
+    simulated = None if verdict is None else verdict.simulated_critical_friction
+    in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
+    yield from grasp_facts(run.saved.body, grasp, at_plan=at_plan, in_simulation=in_simulation)
+    yield from possible_facts(run.possible, grasp.id)
+    yield "Normals span up to", f"{number(math.degrees(grasp.span_angle))}°", SPAN
+    for place, focus in enumerate(grasp.focus_points):
+        name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
+        yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
+    if verdict is not None:
+        yield from sections.facts_of(verdict, SAID_ABOVE)
+        if (repeats := verdict.robustness) is not None:
+            low, high = repeats.interval
+            said = f"held {repeats.held} of {len(repeats.trials)} times"
+            yield "With noise", said, f"95 % interval of the share held: {low:.2f} to {high:.2f}"
+
+
+def possible_facts(best: Best | None, grasp: str) -> Iterable[Fact]:
+    """Yield the share that a grasp reaches of what a search has bounded."""
+    share = None if best is None else best.shares.get(grasp)
+    if best is None or share is None:
+        return
+    what, unit = MEASURES[best.measure]
+    yield (
+        "Share of the possible", f"{PERCENT * share:.1f} %",
+        f"{what}, over the bound {number(best.bound)}{unit} for all contacts "
+        f"at least {number(MILLI * best.clearance_m)} mm from edges; grasps nearer to edges "
+        "may exceed it",
+    )  # fmt: skip
+
+
+def _contacts(grasp: Grasp) -> Iterable[Record]:
+    for face, contact, cone, region in zip(
+        grasp.faces, grasp.contacts, grasp.force_cones, grasp.regions, strict=True
+    ):
+        lean = math.degrees(float(angles_between(cone.axis, contact.normal)))
+        half = math.degrees(cone.half_angle)
+        yield {
+            "face": face,
+            "position": millimetres(contact.position),
+            "normal": ", ".join(f"{part + 0.0:.3f}" for part in np.round(contact.normal, 3)),
+            "cone": f"{half:.1f}°, leans {lean:.1f}°",
+            "region": region.kind,
+            "disc": NOTHING if region.kind == "point" else number(MILLI * region.inscribed_radius),
+        }
+
+
+def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
+    size, limit, found = wrench_size(verdict, trial), trial.predicted_limit, trial.simulated_limit
+    return {
+        "name": trial.name,
+        "wrench": ", ".join(f"{part + 0.0:.3g}" for part in trial.wrench),
+        "share": "" if not limit else f"{100.0 / limit:.0f} %",
+        "limit": number(size * limit if math.isfinite(limit) else None),
+        "simulated": number(None if found is None else size * found),
+        "friction": number(trial.required_friction, 3),
+        "outcome": trial.hold.outcome.value.replace("_", " "),
+        "tone": GOOD if as_predicted(trial) else BAD,
+        "figures": [each.cell(trial) for each in TRIAL_FIGURES],
+    }
+
+
+def _commands(found: Findings) -> Iterable[str]:
+    run, grasp = found.run, found.grasp
+    asked = f"--grasp {shlex.quote(grasp.id)}"
+    other = "" if run.friction == run.saved.friction else f" --friction {run.friction:g}"
+    yield f"graspproof view {GRASPS} {asked}{other}"
+    if found.verdict is not None:
+        yield f"graspproof replay . {asked} --out replay"
+        for name in (each.control.name for each in found.verdict.controls):
+            yield f"graspproof replay . {asked} --control {shlex.quote(name)} --out replay"
+    if run.executions is not None and found.executed is not None:
+        yield sections.execute_command(run.executions, GRASPS, grasp.id)
+    yield from sections.reach_commands(found, GRASPS)
+
+
+def millimetres(point: Array) -> str:
+    """Write a point for people, to hundredths of millimetres."""
+    return ", ".join(f"{part + 0.0:.2f}" for part in np.round(MILLI * point, 2))
+
+
+def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 0) -> str:
+    """Write the text of the report's first page."""
+    verdicts = [verdict for run in runs for verdict in run.tested or ()]
+    executed = [run.executions for run in runs if run.executions and run.executions.grasps]
+    cards = [_card(each) for each in shown]
+    frictions, limits = frictions_in(verdicts), limits_in(verdicts)
+    found = [frictions, limits] if limits.pairs else [frictions]
+    return filled(
+        "index.html",
+        ASSETS,
+        names=", ".join(dict.fromkeys(run.saved.body.name for run in runs)),
+        runs=runs,
+        reached=[sections.described_reaches(run.reaches) for run in runs],
+        about=[list(_about(run)) for run in runs],
+        cards=cards,
+        waiting=waiting,
+        hands=any(run.reaches is not None for run in runs),
+        by_hand=any(card["by_hand"] is not None for card in cards),
+        choices={
+            name: sorted({str(card[name]) for card in cards})
+            for name in ("object", "family", "verdict")
+        },
+        tried=bool(verdicts),
+        quadrants=quadrants_in(verdicts),
+        agreements=found,
+        fidelity=[svg_of(fidelity_panel(each)) for each in found] if verdicts else [],
+        limits=bool(limits.pairs),
+        mismatches=[f"{each.id}: {line}" for each in verdicts for line in each.mismatches],
+        controls=_controls(verdicts),
+        executions=[sections.described_executions(each) for each in executed],
+        executed_columns=[
+            (each.shown.heading, each.meaning) for each in sections.EXECUTION_FIGURES
+        ],
+        judged=_judged(runs),
+        possible=[
+            {"object": run.saved.body.name, **_described_possible(run.possible)}
+            for run in runs
+            if run.possible is not None
+        ],
+    )  # fmt: skip
+
+
+def _judged(runs: Sequence[RunFolder]) -> Record | None:
+    """Return a table of how many grasps each published test accepts, for each object."""
+    judged = [(run.saved.body.name, run.judgements) for run in runs if run.judgements is not None]
+    totals = [(name, each) for name, found in judged for each in found.summary.values()]
+    columns, rows = table([each for _, each in totals], Totals)
+    named = [(*row[:1], name, *row[1:]) for (name, _), row in zip(totals, rows, strict=True)]
+    return {"columns": (*columns[:1], "object", *columns[1:]), "rows": named} if totals else None
+
+
+def _described_possible(best: Best) -> Record:
+    (what, unit), name = MEASURES[best.measure], best.grasp.id
+    proved = f"by the proof in {best.proof}" if best.proof else "whose proof was not kept"
+    distinct = {each.id: each for each in reversed(best.rated)}
+    ranked = sorted(distinct.values(), key=lambda each: (-each.quality[0], each.id))
+    columns, rows = table(ranked[:ROWS], Rated)
+    return {
+        "said": (
+            f"Best is {name}: {number(best.quality[0])}{unit} of {what}. No four contacts at "
+            f"least {number(MILLI * best.clearance_m)} mm from edges exceed "
+            f"{number(best.bound)}{unit} at friction {number(best.friction)}, {proved}; "
+            f"{PERCENT * best.gap:.1f} % are between the two."
+        ),
+        "columns": columns,
+        "rows": rows,
+        "more": max(0, len(ranked) - ROWS),
+    }
+
+
+def _card(card: Card) -> dict[str, Any]:
+    found, run, grasp = card.found, card.found.run, card.found.grasp
+    said, tone = found.said
+    simulated = None if found.reached is None else found.reached.simulated
+    return {
+        "grasp": grasp,
+        "page": card.page,
+        "copies": card.copies,
+        "object": run.saved.body.name,
+        "family": grasp.family,
+        "picture": card.drawn.hand or card.drawn.picture if card.drawn else "",
+        "verdict": said,
+        "tone": tone,
+        "radius_mm": round(MILLI * grasp.radius, 6),
+        "share": run.possible.shares.get(grasp.id) if run.possible else None,
+        "executed": sections.execution_row(found.executed) if run.executions else None,
+        "reached": sections.said_of_reach(found) if run.reaches else None,
+        "weakest": None if found.verdict is None else _weakest(found.verdict),
+        "by_hand": None if simulated is None else simulated.weakest_n,
+    }
+
+
+def _weakest(verdict: Verdict) -> float | None:
+    """Find the smallest wrench limit of a grasp [N], with torques divided by the grasp's size."""
+    found = [trial.predicted_limit * wrench_size(verdict, trial) for trial in verdict.wrenches]
+    return min(filter(math.isfinite, found), default=None)
+
+
+def _about(run: RunFolder) -> Iterable[tuple[str, str]]:
+    body = run.saved.body
+    yield "object", f"{len(body.faces)} faces, radius {MILLI * body.radius:.4g} mm"
+    yield "content_sha256", body.content_sha256
+    yield "friction", f"{run.friction:g}"
+    yield "seed", str(run.saved.seed)
+    for first in islice(run.tested or (), 1):
+        asked = {"setup": first.setup, "agenda": first.agenda, "scale": first.scale}
+        yield from _lines({name: record_of(each) for name, each in asked.items()})
+    if run.executions is not None:
+        used = {"friction": run.executions.friction, **record_of(run.executions.settings)}
+        yield from _lines({"execution": used})
+    if run.reaches is not None:
+        yield from sections.reach_settings(run.reaches)
+    found = versions() if run.tested is None else run.tested.versions
+    for name, version in found.items():
+        yield f"version of {name}", str(version)
+
+
+def _lines(tables: Mapping[str, Any], where: str = "") -> Iterator[tuple[str, str]]:
+    """Yield each setting in tables inside each other with its place."""
+    for name, value in tables.items():
+        if isinstance(value, dict):
+            yield from _lines(cast("Mapping[str, Any]", value), f"{where}{name}.")
+        else:
+            yield f"{where}{name}", str(value)
+
+
+def _controls(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    kinds = dict[str, dict[str, Any]]()
+    for verdict in verdicts:
+        for control in verdict.controls:
+            name = control.control.name.replace("_", " ")
+            kind = kinds.setdefault(name, {"name": name, "let_go": 0, "held": 0, "undecided": 0})
+            kind["let_go" if control.let_go else "held" if control.held else "undecided"] += 1
+    return list(kinds.values())

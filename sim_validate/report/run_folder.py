@@ -1,98 +1,177 @@
-"""Reads the folder of a run: its grasps, verdicts, executions, regions, and a hand's poses."""
+"""Reads the folder of a run, its grasps and all results, and says how tests of a grasp ended."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
+from grasp_core.files.records import RecordFile
 from grasp_core.grasp_tables import ById, Named
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
+from scenes.drawing.hands import PosedHand, posed_hand
 from sim_validate.closure.verdict import Verdict, Verdicts
+from sim_validate.engine.traces import LET_GO, Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.kit.files import REACHES
 from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best import Best
-from sim_validate.planning.regions import Regions
+from sim_validate.planning.regions import GraspRegions, Regions
 from sim_validate.protocols.verdict import Judgements
-from sim_validate.report.agreement import BAD, said_of_both
 
 if TYPE_CHECKING:
-    from sim_validate.hands.reaches import Reaches
+    from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-File = TypeVar("File", Verdicts, Executions, Regions, Judgements, Best)
+GOOD, BAD, QUIET = "good", "bad", "quiet"
+FAILED, LOST = "failed", "lost"
+"""Word that begins how many trials were not survived, and the one word for it."""
+File = TypeVar("File", bound=RecordFile)
 Item = TypeVar("Item", bound=Named)
-
-
-def about_grasp(results: ById[Item] | None, name: str) -> Item | None:
-    """Return what a file of results has about a grasp; None if it has nothing, or is missing."""
-    return next((each for each in results if each.id == name), None) if results else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunFolder:
-    """What `plan`, `validate`, `execute`, `regions` and `reach` have written into one folder."""
+    """What `plan`, `validate`, `execute`, `regions` and `reach` have written into one folder.
+
+    What is None has no file. Iteration yields what there is about each grasp.
+    """
 
     path: Path
     saved: Plan
     friction: float
     """Friction at which the grasps were tested; if they were not, at which they were planned."""
-    tested: Verdicts | None
-    """Verdicts on the grasps; None if no grasp was tested."""
-    certified: Regions | None
-    """Certified regions of the grasps; None if the file does not exist."""
-    executions: Executions | None
-    """Grasps as a robot executes them; None if the file does not exist."""
+    tested: Verdicts | None = None
+    certified: Regions | None = None
+    executions: Executions | None = None
     reaches: "Reaches | None" = None
     judgements: Judgements | None = None
     possible: Best | None = None
     left_out: int = 0
     """Number of grasps in the files that `saved` leaves out."""
 
+    def __iter__(self) -> "Iterator[Findings]":
+        return map(self.of, self.saved.grasps)
+
+    def of(self, grasp: Grasp) -> "Findings":
+        """Return what there is about one grasp, without all that there is about others."""
+        tested, executions, reaches = self.tested, self.executions, self.reaches
+        alone = replace(
+            self, saved=replace(self.saved, grasps=(grasp,)), judgements=None,
+            tested=tested and tested[:0], executions=executions and executions[:0],
+            reaches=reaches and reaches[:0], certified=self.certified and self.certified[:0],
+        )  # fmt: skip
+        return Findings(
+            alone, grasp, _about(tested, grasp), _about(executions, grasp), _about(reaches, grasp),
+            _about(self.certified, grasp),
+        )  # fmt: skip
+
     def first(self, limit: int | None) -> "RunFolder":
         """Keep some of the run's grasps, those with problems before others, and all verdicts."""
         grasps = self.saved.grasps
         if limit is None or len(grasps) <= limit:
             return self
-        chosen = {
-            grasp.id for grasp in sorted(grasps, key=lambda each: not self.alarms(each.id))[:limit]
-        }
+        found = sorted(self, key=lambda each: not each.alarming)[:limit]
+        chosen = {each.grasp.id for each in found}
         kept = tuple(grasp for grasp in grasps if grasp.id in chosen)
         return replace(self, saved=replace(self.saved, grasps=kept), left_out=len(grasps) - limit)
-
-    def said(self, name: str) -> tuple[str, str]:
-        """Say in words how the tests of a grasp ended, with the tone: good, bad or neither."""
-        return said_of_both(self.verdict(name), self.executions, self.executed(name))
-
-    def alarms(self, name: str) -> bool:
-        """Tell whether the verdict on a grasp is a problem, or its execution lost the object."""
-        return self.said(name)[1] == BAD
-
-    def verdict(self, name: str) -> Verdict | None:
-        """Return the verdict on a grasp; None if the grasp was not tested."""
-        return about_grasp(self.tested, name)
-
-    def executed(self, name: str) -> ExecutedGrasp | None:
-        """Return what the execution of a grasp found; None if the grasp was not executed."""
-        return about_grasp(self.executions, name)
-
-    def shown(self, grasp: Grasp) -> Grasp:
-        """Return a grasp with its certified regions, if it has any that may be drawn."""
-        found = about_grasp(self.certified, grasp.id) if self.shades else None
-        return replace(grasp, regions=found.regions) if found and found.regions else grasp
 
     @property
     def shades(self) -> bool:
         """Whether certified regions may be drawn: they are for the friction of the verdicts."""
         return self.certified is not None and self.certified.friction <= self.friction
 
+
+def _about(results: ById[Item] | None, grasp: Grasp) -> Item | None:
+    """Return what a file of results has about a grasp; None if it has nothing, or is missing."""
+    return next((each for each in results or () if each.id == grasp.id), None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """What a run found about one grasp; it is None where there is nothing."""
+
+    run: RunFolder
+    """The run with this grasp alone, and with files that say nothing about any."""
+    grasp: Grasp
+    verdict: Verdict | None
+    executed: ExecutedGrasp | None
+    reached: "ReachedGrasp | None"
+    certified: GraspRegions | None
+
     @property
-    def verdicts_path(self) -> Path:
-        """Path of the verdicts, which error messages name."""
-        return self.path / Verdicts.FILE
+    def said(self) -> tuple[str, str]:
+        """How its tests ended, in words, with the tone: good, bad or neither."""
+        return said_of_both(self.verdict, self.run.executions, self.executed)
+
+    @property
+    def alarming(self) -> bool:
+        """Whether its verdict is a problem, or its execution lost the object."""
+        return self.said[1] == BAD
+
+    @property
+    def shown(self) -> Grasp:
+        """The grasp with its certified regions, if it has any that may be drawn."""
+        found = self.certified if self.run.shades else None
+        regions = None if found is None else found.regions
+        return replace(self.grasp, regions=regions) if regions else self.grasp
+
+    @property
+    def held(self) -> PosedHand | None:
+        """The hand in the pose in which it stands in the grasp."""
+        reaches, found = self.run.reaches, self.reached
+        if reaches is None or found is None or not found.reach.reached:
+            return None
+        return posed_hand(reaches.hand, found.reach, self.grasp)
+
+
+def said_of(verdict: Verdict | None) -> tuple[str, str]:
+    """Say in words what the verdict on a grasp is, and of which kind: good, bad or quiet."""
+    if verdict is None:
+        return "not validated", QUIET
+    outcome = verdict.outcome.value.replace("_", " ")
+    if verdict.outcome not in (Outcome.HELD, *LET_GO):
+        return outcome, BAD
+    if verdict.mismatches:
+        return "contradicts the analysis", BAD
+    if any(control.held for control in verdict.controls):
+        return "a negative control held", BAD
+    if not verdict.controls_let_go:
+        return "a negative control is undecided", BAD
+    return outcome, GOOD if verdict.held else BAD
+
+
+def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
+    """Say in words how the execution of a grasp ended, with the tone: good, bad or neither."""
+    if found is None:
+        return "not executed", QUIET
+    if found.execution is None:
+        return "no squeeze", BAD
+    if not found.controls_let_go:
+        return "a negative control held", BAD
+    if not found.execution.trials:
+        return "no trial is possible", BAD
+    if lost := found.execution.lost:
+        return f"{FAILED} {len(lost)} of {len(found.execution.trials)} trials", BAD
+    return "survived", GOOD
+
+
+def said_of_both(
+    verdict: Verdict | None, executions: Executions | None, found: ExecutedGrasp | None
+) -> tuple[str, str]:
+    """Say in words how a grasp ended in the test of its closure and, if any was, in its execution.
+
+    Gives the words, and the tone: good, bad or neither; bad if either ending is.
+    """
+    closure, tone = said_of(verdict)
+    if executions is None:
+        return closure, tone
+    ended, other = said_of_execution(found)
+    tones = {tone, other}
+    worst = next(each for each in (BAD, GOOD, QUIET) if each in tones)
+    return f"closure: {closure}; execution: {LOST if ended.startswith(FAILED) else ended}", worst
 
 
 def folder_of(path: Path) -> Path:
@@ -128,22 +207,19 @@ def _run(path: Path) -> RunFolder:
         tested=tried,
         certified=_read(path, Regions, saved),
         executions=_read(path, Executions, saved),
-        reaches=reaches_beside(path / GRASPS, saved),
+        reaches=reaches_beside(path, saved),
         judgements=_read(path, Judgements, saved),
         possible=_read(path, Best, saved),
     )
 
 
-def reaches_beside(grasps: Path, saved: Plan) -> "Reaches | None":
-    """Read where a hand stands in grasps from the folder of their file."""
-    path = grasps.with_name(REACHES)
-    if not path.is_file():
+def reaches_beside(folder: Path, saved: Plan) -> "Reaches | None":
+    """Read where a hand stands in the grasps of a folder."""
+    if not (folder / REACHES).is_file():
         return None
     from sim_validate.hands.reaches import Reaches  # runs without a hand need none
 
-    found = Reaches.read(path)
-    _check_about(path, found, saved)
-    return found
+    return _read(folder, Reaches, saved)
 
 
 def _read(folder: Path, kind: type[File], saved: Plan) -> File | None:

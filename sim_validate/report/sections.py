@@ -2,9 +2,9 @@
 
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -12,9 +12,7 @@ from grasp_core.declared import counted
 from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
 from grasp_core.hands.hand import HANDS
-from grasp_core.values import Grasp
-from scenes.drawing.hands import PosedHand, posed_hand
-from scenes.drawing.pages import number
+from scenes.drawing.pages import Fact, number
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     ExecutionControl,
@@ -23,15 +21,17 @@ from sim_validate.execution.verdict import (
     multiple_in_words,
     totals_in_words,
 )
-from sim_validate.report.agreement import BAD, GOOD, QUIET, Record, said_of_execution
-from sim_validate.report.run_folder import RunFolder, about_grasp
+from sim_validate.hands.flags import Reach
+from sim_validate.kit.command_flags import Execute
+from sim_validate.kit.flag_values import flags_from
+from sim_validate.report.run_folder import BAD, GOOD, QUIET, Findings, said_of_execution
 from sim_validate.settings import ExecutionSettings
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-Fact = tuple[str, str, str]
-"""Name, value and meaning of a figure."""
+Record: TypeAlias = Mapping[str, Any]
+"""What a template fills in, by name."""
 REASONS = {
     "collision": "a collision",
     "limit": "a joint's limit",
@@ -39,6 +39,8 @@ REASONS = {
     "no closure": "no three contacts close",
 }
 """Words for what was in the way."""
+EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
+"""Figures of executed grasps, but for the id, which leads to a grasp's page."""
 FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
 SAID_ABOVE = ("grasp", "id")
 """Figures that the page has in its title."""
@@ -47,30 +49,23 @@ ALWAYS = ("mass_kg", "seed")
 """Settings of executions whose usual value depends on the object or on the plan."""
 
 
-def held_in(reaches: "Reaches | None", grasp: Grasp) -> PosedHand | None:
-    """Return the hand in the pose in which it stands in a grasp."""
-    found = about_grasp(reaches, grasp.id)
-    if reaches is None or found is None or not found.reach.reached:
-        return None
-    return posed_hand(reaches.hand, found.reach, grasp)
-
-
-def why_not_held(reaches: "Reaches", grasp: Grasp) -> str:
+def why_not_held(found: Findings) -> str:
     """Say why there is no hand to draw in a grasp."""
-    found = about_grasp(reaches, grasp.id)
-    if found is None:
-        return f"reaches.json holds nothing about {grasp.id}; `graspproof reach` looks for a pose"
-    return f"{grasp.id}: {found.reach.explanation}"
+    name, reached = found.grasp.id, found.reached
+    if reached is None:
+        return f"reaches.json holds nothing about {name}; `graspproof reach` looks for a pose"
+    return f"{name}: {reached.reach.explanation}"
 
 
-def said_of_reach(reaches: "Reaches | None", grasp: Grasp) -> tuple[str, str]:
+def said_of_reach(found: Findings) -> tuple[str, str]:
     """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
+    reached, reaches = found.reached, found.run.reaches
     if reaches is None:
         return "", QUIET
-    found, name = about_grasp(reaches, grasp.id), reaches.hand.name
-    if found is None:
+    name = reaches.hand.name
+    if reached is None:
         return f"{name}: not asked", QUIET
-    reach, held, executed = found.reach, found.simulated, found.executed
+    reach, held, executed = reached.reach, reached.simulated, reached.executed
     if not reach.reached:
         return f"{name}: not reached, {REASONS[reach.reason]}", QUIET
     within = reach.within_regions or ()
@@ -86,15 +81,6 @@ def said_of_reach(reaches: "Reaches | None", grasp: Grasp) -> tuple[str, str]:
         said.append(f"survived {kept} of {len(executed.trials)} trials")
     lost = executed is not None and not all(trial.survived for trial in executed.trials)
     return ", ".join(said), BAD if lost or (held is not None and not held.held) else GOOD
-
-
-def held_by_hand(reaches: "Reaches | None", grasp: Grasp) -> float | None:
-    """Return the weakest wrench that a hand resists in a grasp [N]; None if it was not simulated.
-
-    Torques count over the object's radius.
-    """
-    found = about_grasp(reaches, grasp.id)
-    return None if found is None or found.simulated is None else found.simulated.weakest_n
 
 
 def described_reaches(reaches: "Reaches | None") -> str:
@@ -117,18 +103,18 @@ def reach_settings(reaches: "Reaches") -> Iterable[tuple[str, str]]:
         yield "hand.torque_limits_n_m", ", ".join(f"{limit:g}" for limit in stated)
 
 
-def reach_section(reaches: "Reaches | None", grasp: Grasp) -> Record | None:
+def reach_section(found: Findings) -> Record | None:
     """Build the section about the hand in a grasp; None where no hand was asked for."""
-    found = about_grasp(reaches, grasp.id)
-    if reaches is None or found is None:
+    reached, reaches = found.reached, found.run.reaches
+    if reaches is None or reached is None:
         return None
-    said, tone = said_of_reach(reaches, grasp)
+    said, tone = said_of_reach(found)
     return {
         "hand": reaches.hand.name,
         "said": said.partition(": ")[2],
         "tone": tone,
-        "facts": list(_reach_facts(reaches, found)),
-        "explanation": found.reach.explanation,
+        "facts": list(_reach_facts(reaches, reached)),
+        "explanation": reached.reach.explanation,
     }
 
 
@@ -136,11 +122,11 @@ def _reach_facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
     if found.reach.reached:
         names = reaches.finger_names(found.reach)
         yield "Fingers used", ", ".join(f"{k}: {name}" for k, name in enumerate(names)), FINGERS
-    yield from _figures(found, "")
+    yield from _of_hand(found)
     if found.simulated is not None:
-        yield from _figures(found.simulated, "With its motors: ")
+        yield from _of_hand(found.simulated, "With its motors: ")
     if (executed := found.executed) is not None:
-        yield from _figures(executed, "Executed with the hand: ")
+        yield from _of_hand(executed, "Executed with the hand: ")
         if executed.reason is not None:
             yield "Not executed", executed.reason, ""
         yield from _enough(executed)
@@ -151,23 +137,29 @@ def _enough(found: ExecutedGrasp) -> Iterable[Fact]:
         yield "What would be enough", str(found.enough), ""
 
 
-def _figures(record: object, part: str) -> Iterable[Fact]:
-    """Yield the figures that a record has, but for the grasp that the page is about."""
+def facts_of(record: object, but: Sequence[str]) -> Iterable[Fact]:
+    """Yield the figures that a record has, but for those that the page says in other places."""
     for each in figures(type(record)):
-        if each.name not in SAID_ABOVE and each.of(record) is not None:
-            heading = f"{part}{each.shown.heading}"
-            yield heading[:1].upper() + heading[1:], each.cell(record), each.meaning
+        if each.name not in but and each.of(record) is not None:
+            yield each.shown.heading, each.cell(record), each.meaning
 
 
-def reach_commands(reaches: "Reaches | None", grasp: Grasp, path: str) -> Sequence[str]:
+def _of_hand(record: object, part: str = "") -> Iterable[Fact]:
+    for heading, cell, meaning in facts_of(record, SAID_ABOVE):
+        said = f"{part}{heading}"
+        yield f"{said[0].upper()}{said[1:]}", cell, meaning
+
+
+def reach_commands(found: Findings, path: str) -> Sequence[str]:
     """Write the shell command that seeks the pose again; none for a hand from a file."""
-    if reaches is None or reaches.hand.name not in HANDS or grasp.id not in reaches:
+    reaches = found.run.reaches
+    if reaches is None or reaches.hand.name not in HANDS or found.reached is None:
         return []
     asked, usual = reaches.asked, type(reaches.asked)()
-    words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", grasp.id]
+    words = ["graspproof", "reach", path, "--hand", reaches.hand.name, "--grasp", found.grasp.id]
     words += ["--friction", repr(reaches.friction)]
     numbers = replace(asked, regions=usual.regions, table_down=usual.table_down)
-    words += _changed_flags(numbers, usual)
+    words += flags_from(_changed(numbers, usual), Reach)
     words += [] if asked.table_down is None else ["--table", *map(repr, asked.table_down)]
     words += [] if asked.regions else ["--contacts-only"]
     return [shlex.join(words)]
@@ -177,19 +169,13 @@ def execution_row(found: ExecutedGrasp | None) -> Record:
     """Build the cells about one grasp in the table of the first page, and on its card."""
     said, tone = said_of_execution(found)
     least = 0.0 if found is None else found.least_predicted_loss
-    listed = execution_figures()
     return {
         "said": said,
         "tone": tone,
         "loss": multiple_in_words(least),
         "least_loss": "Infinity" if math.isinf(least) else f"{least:.6g}",  # as scripts read it
-        "cells": [(NONE if found is None else each.cell(found), "") for each in listed],
+        "cells": [(NONE if found is None else each.cell(found), "") for each in EXECUTION_FIGURES],
     }
-
-
-def execution_figures() -> Sequence[Figure]:
-    """Return the figures of executed grasps, but for the id, which leads to a grasp's page."""
-    return figures(ExecutedGrasp)[1:]
 
 
 def described_executions(executions: Executions) -> str:
@@ -198,19 +184,19 @@ def described_executions(executions: Executions) -> str:
     return " ".join(f"{line[0].upper()}{line[1:]}." for line in totals_in_words(executions) + ended)
 
 
-def execution_section(run: RunFolder, name: str) -> Record | None:
+def execution_section(found: Findings) -> Record | None:
     """Build the section about the execution of a grasp; None where no grasp was executed."""
-    if run.executions is None:
+    executed, executions = found.executed, found.run.executions
+    if executions is None:
         return None
-    found = run.executed(name)
-    said, tone = said_of_execution(found)
-    execution = None if found is None else found.execution
+    said, tone = said_of_execution(executed)
+    execution = None if executed is None else executed.execution
     trials, controls = ((), ()) if execution is None else (execution.trials, execution.controls)
     return {
         "said": said,
         "tone": tone,
-        "facts": list(_execution_facts(run.executions, found)),
-        "reason": None if found is None else found.reason,
+        "facts": list(_execution_facts(executions, executed)),
+        "reason": None if executed is None else executed.reason,
         "trials": records_table(trials, ExecutionTrial),
         "controls": records_table(controls, ExecutionControl),
         "skipped": () if execution is None else execution.skipped,
@@ -222,27 +208,14 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     words = ["graspproof", "execute", path, "--grasp", grasp_id]
     words += ["--friction", repr(executions.friction)]
     usual = ExecutionSettings(executions.settings.object_kg).used
-    return shlex.join([*words, *_changed_flags(executions.settings, usual, ALWAYS)])
+    changed = _changed(executions.settings, usual, ALWAYS)
+    return shlex.join([*words, *flags_from(changed, Execute)])
 
 
-def _changed_flags(settings: Any, usual: Any, always: Sequence[str] = ()) -> list[str]:
-    """Write flags for settings that are not the usual ones, and for some others."""
-    changed = {name: value for name, value in asdict(settings).items()
-               if name in always or value != getattr(usual, name)}  # fmt: skip
-    return [
-        word for name, value in changed.items()
-        for word in (f"--{name.replace('_', '-')}", *_words(value))
-    ]  # fmt: skip
-
-
-def _words(value: object) -> list[str]:
-    """Write the value of a flag: several numbers stand apart, names of trials have commas."""
-    if not isinstance(value, tuple):
-        return [repr(value)]
-    parts = cast("tuple[object, ...]", value)
-    if all(isinstance(part, str) for part in parts):
-        return [",".join(map(str, parts))]
-    return [repr(part) for part in parts]
+def _changed(settings: Any, usual: Any, always: Sequence[str] = ()) -> Record:
+    """Return the settings that are not the usual ones, and some others."""
+    return {name: value for name, value in asdict(settings).items()
+            if name in always or value != getattr(usual, name)}  # fmt: skip
 
 
 def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Iterable[Fact]:
@@ -258,7 +231,7 @@ def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Ite
         return
     sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))
     yield "Squeeze, finger by finger", f"{sizes} N", ""
-    for figure in execution_figures():
+    for figure in EXECUTION_FIGURES:
         yield figure.shown.heading, figure.cell(found), figure.meaning
     yield from _enough(found)
 

@@ -93,7 +93,7 @@ def test_a_report_that_fails_leaves_no_half_of_it(tmp_path, monkeypatch, capsys)
     def full(*_):
         raise OSError(28, "No space left on device", "index.html")
 
-    monkeypatch.setattr("sim_validate.report.pages.index_page", full)
+    monkeypatch.setattr("sim_validate.report.report.index_page", full)
     assert main([*RUN[:-1], "--out", str(tmp_path / "a")]) == 0
     assert "no report: index.html: No space left on device" in capsys.readouterr().err
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [

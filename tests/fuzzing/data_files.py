@@ -27,7 +27,7 @@ from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.command_flags import Run
 from sim_validate.kit.files import tables_of_toml
-from sim_validate.kit.flag_values import flags_from, flags_of
+from sim_validate.kit.flag_values import flags_from
 from sim_validate.planning.regions import Regions
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text
@@ -280,7 +280,6 @@ unit = "mm"
 [noise]
 shift = 0.02
 """
-KNOWN = {flag.name: flag for flag in flags_of(Run)}
 
 
 def _same_flags(data: bytes, found: list[str]) -> None:
@@ -327,6 +326,6 @@ TARGETS = (
            lambda data: DatasetConfig.of_table(tables_of_toml(text_of(data))),
            lambda: [config_to_toml(DatasetConfig(objects=("wedge",))).encode()], _same_config,
            "toml"),
-    Target("flags", lambda data: flags_from(tables_of_toml(text_of(data)), KNOWN), lambda: [FLAGS],
+    Target("flags", lambda data: flags_from(tables_of_toml(text_of(data)), Run), lambda: [FLAGS],
            _same_flags, "toml"),
 )  # fmt: skip

@@ -11,8 +11,8 @@ import pytest
 
 import scenes
 from grasp_core.planning.request import FAMILIES
+from scenes.drawing.painting import View
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
-from scenes.drawing.views import View
 from scenes.example_objects import example_object
 from sim_validate import main as commands
 from sim_validate.kit import processes
@@ -194,6 +194,17 @@ def test_a_table_of_a_config_file_sets_a_group_of_flags(here, capsys):
     (here / "c.toml").write_text("[patches]\nmost = 3\n")
     assert main(["inspect", "wedge.stl", "--config", "c.toml"]) == Exit.USAGE
     assert "--patches.most must be a whole number from 4 up to 200" in capsys.readouterr().err
+
+
+def test_a_vector_of_a_config_file_sets_one_flag(here, capsys):
+    import trimesh
+
+    body = scenes.example_object("wedge")
+    trimesh.Trimesh(body.vertices, body.triangles).export(here / "wedge.stl")
+    (here / "c.toml").write_text("center_of_mass_m = [0.001, 0.0, -0.002]\n")
+    words = ["inspect", "wedge.stl", "--unit", "m", "--json", "--config", "c.toml"]
+    assert main(words) == Exit.GOOD
+    assert json.loads(capsys.readouterr().out)["center_of_mass_m"] == [0.001, 0.0, -0.002]
 
 
 @pytest.mark.usefixtures("here")

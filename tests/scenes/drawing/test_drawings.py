@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.drawing.drawings import (
+from scenes.drawing.painting import Shape
+from scenes.drawing.pictures import (
     BAR_LENGTH,
     MOST_TRIANGLES,
+    Drawing,
     cone_sides,
-    drawing_of,
     finger_size,
     glass,
     ring,
     rulings,
     tube,
 )
-from scenes.drawing.painting import Shape, extent_of
 from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
 
@@ -33,7 +33,7 @@ def case(request):
     """A body, a grasp of a family, the friction, and what is drawn."""
     name, friction, family = request.param
     body, (grasp,) = grasps(name, friction, 1, (family,))
-    return body, grasp, friction, drawing_of(body, grasp, friction)
+    return body, grasp, friction, Drawing(body, grasp, friction).shapes()
 
 
 def of_role(shapes, role):
@@ -88,14 +88,14 @@ def test_lines_of_force_are_inside_the_cones_and_pass_the_foci(case):
 
 def test_force_cones_that_do_not_fit_are_left_out():
     body, (grasp,) = grasps("wedge", 0.5, 1, ("pencil",), "tilted")
-    assert len(of_role(drawing_of(body, grasp, 0.5), "force cone")) == 4
-    assert not of_role(drawing_of(body, grasp, 0.1), "force cone")
+    assert len(of_role(Drawing(body, grasp, 0.5).shapes(), "force cone")) == 4
+    assert not of_role(Drawing(body, grasp, 0.1).shapes(), "force cone")
 
 
 def test_far_foci_do_not_make_far_lines():
     body, (grasp,) = grasps("double-wedge-bar", 0.3, 1, ("pencil",))
     far = replace(grasp, focus_points=body.center_of_mass + 1e6 * np.eye(3)[:2])
-    shapes = drawing_of(body, far, 0.3)
+    shapes = Drawing(body, far, 0.3).shapes()
     assert not of_role(shapes, "plane")
     for line in of_role(shapes, "line of force"):
         assert np.linalg.norm(line.lines[0][1] - line.lines[0][0]) <= 5.0 * body.radius
@@ -103,7 +103,7 @@ def test_far_foci_do_not_make_far_lines():
 
 def test_planes_of_a_pencil_hold_both_contacts_and_both_foci():
     body, (grasp,) = grasps("double-wedge-bar", 0.3, 1, ("pencil",))
-    (planes,) = of_role(drawing_of(body, grasp, 0.3), "plane")
+    (planes,) = of_role(Drawing(body, grasp, 0.3).shapes(), "plane")
     for first, plane in zip((0, 2), planes.polygons, strict=True):
         points = np.vstack([plane, grasp.focus_points, grasp.positions[first : first + 2]])
         flatness = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[2]
@@ -137,7 +137,7 @@ def test_what_is_round_is_round():
     circle = ring(np.ones(3), axis, 2.0)
     np.testing.assert_allclose(np.linalg.norm(circle - 1.0, axis=1), 2.0)
     np.testing.assert_allclose((circle - 1.0) @ axis, 0.0, atol=1e-12)
-    sides = extent_of([Shape("finger", polygons=tube(np.zeros(3), 5.0 * axis, 0.5))])
+    sides = Shape("finger", polygons=tube(np.zeros(3), 5.0 * axis, 0.5)).vertices()
     np.testing.assert_allclose(np.linalg.norm(np.cross(sides, axis), axis=1), 0.5)
     rim = np.array(cone_sides(np.zeros(3), axis, 0.3, 2.0))[:, 1]
     np.testing.assert_allclose(np.linalg.norm(rim, axis=1), 2.0)

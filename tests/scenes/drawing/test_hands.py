@@ -18,7 +18,7 @@ from scenes.drawing.hands import (
     parts_of,
     view_of_hand,
 )
-from scenes.drawing.pictures import grasp_sheet, write_picture
+from scenes.drawing.pictures import Drawing, write_picture
 from scenes.drawing.sheets import Dots, Words
 from tests.grasp_core.hands.gripping import plain_hand
 from tests.scenes.drawing.standing import FRICTION, ROUNDING, held, standing
@@ -133,7 +133,7 @@ def test_the_view_shows_every_contact_of_this_grasp():
 
 def test_the_picture_is_whole_and_holds_the_hand():
     body, grasp, _, _ = standing()
-    sheet = grasp_sheet(body, grasp, FRICTION, held=held(), legend=True)
+    sheet = Drawing(body, grasp, FRICTION, held()).sheet(legend=True)
     assert_whole(sheet)
     points = np.vstack([
         loop for mark in sheet.marks if not isinstance(mark, Words | Dots)

@@ -12,11 +12,19 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_hull
-from scenes.drawing import pictures
-from scenes.drawing.drawings import BAR_RADIUS, drawing_of, glass
-from scenes.drawing.painting import LOOKS, Shape, Surface, outline, painted
+from scenes.drawing.painting import (
+    FORESHORTENED,
+    LOOKS,
+    Shape,
+    Surface,
+    View,
+    Window,
+    best_view,
+    outline,
+    painted,
+)
 from scenes.drawing.panels import width_of
-from scenes.drawing.pictures import grasp_figure, write_picture
+from scenes.drawing.pictures import BAR_RADIUS, Drawing, glass, grasp_figure, write_picture
 from scenes.drawing.sheets import (
     ASSETS,
     BAD,
@@ -33,12 +41,12 @@ from scenes.drawing.sheets import (
     png_of,
     rgb,
 )
-from scenes.drawing.views import FORESHORTENED, View, best_view
 from tests.scenes.drawing.whole import assert_whole
 from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
 
 FRONT = View.of_angles(0.0, 0.0, scenes.example_object("box"))
+SHEET = Window(FRONT, np.array([-1.0, -1.0]), 2.0, 100.0)
 
 
 @pytest.fixture(scope="module")
@@ -90,18 +98,18 @@ def square(nearness, role="region", finger=0):
 
 
 def test_what_is_in_front_is_drawn_later():
-    patches = painted([square(0.3, finger=1), square(-0.3, finger=0)], FRONT, 2.0)
+    patches = painted([square(0.3, finger=1), square(-0.3, finger=0)], SHEET)
     assert [patch.fill for patch in patches] == [FINGERS[0], FINGERS[1]]
 
 
 def test_lines_are_as_wide_and_as_long_as_they_say():
     ends = np.array([FRONT.center - FRONT.axes[0], FRONT.center + FRONT.axes[0]])
     for role, share in (("friction cone", 1.0), ("line of force", 0.5)):
-        parts = painted([Shape(role, 0, lines=(ends,))], FRONT, 2.0)
+        parts = list(painted([Shape(role, 0, lines=(ends,))], SHEET))
         lengths = [np.linalg.norm(np.diff(line, axis=0)) for part in parts for line in part.lines]
-        assert sum(lengths) == pytest.approx(2.0 * share, rel=0.05)
+        assert sum(lengths) == pytest.approx(100.0 * share, rel=0.05)
         widths = [part.width for part in parts]
-        np.testing.assert_allclose(widths, 0.02 * LOOKS[role].line, rtol=1e-9)
+        np.testing.assert_allclose(widths, LOOKS[role].line, rtol=1e-9)
 
 
 SEEN_BY = {
@@ -142,9 +150,9 @@ def test_every_finger_is_seen(name, family, monkeypatch):
     body, (grasp,) = grasps(name, 0.5, 1, (family,), cones="tilted")
     whole = pixels_of(grasp_figure(body, grasp, 0.5, legend=False))
     for finger in range(4):
-        shapes = [shape for shape in drawing_of(body, grasp, 0.5)
+        shapes = [shape for shape in Drawing(body, grasp, 0.5).shapes()
                   if (shape.role, shape.finger) != ("finger", finger)]  # fmt: skip
-        monkeypatch.setattr(pictures, "drawing_of", lambda *_, left=shapes: left)
+        monkeypatch.setattr(Drawing, "shapes", lambda _, left=shapes: left)
         figure = grasp_figure(body, grasp, 0.5, legend=False)
         monkeypatch.undo()
         changed = np.abs(whole - pixels_of(figure)).max(axis=2) > 0.15
@@ -180,9 +188,10 @@ def test_a_curved_body_has_an_outline_and_no_seams():
     heights = (lines.reshape(-1, 3) - body.center_of_mass) @ view.axes[2] / body.radius
     # the camera is nine radii away: the tangents touch at a ninth, here to an edge's length
     assert np.abs(heights - 1.0 / 9.0).max() < 0.2
-    areas = [part for part in painted((surface,), view, 2.0) if isinstance(part, Area)]
+    window = Window.around([surface], np.empty((0, 3)), body, view, 500.0)
+    areas = [part for part in painted((surface,), window) if isinstance(part, Area)]
     assert 2 <= len(areas) <= 14  # two sides, at most seven shades each
-    flat, _ = view.seen(surface.vertices())
+    flat, _ = window.seen(surface.vertices())
     covered = sum(abs(signed(loop)) for area in areas for loop in area.loops)
     assert covered == pytest.approx(2.0 * abs(signed(convex_hull(flat))), rel=0.35)
 

@@ -8,8 +8,7 @@ import pytest
 
 from sim_validate.main import main
 from sim_validate.planning.best import Best
-from sim_validate.report.pages import possible_facts
-from sim_validate.report.report import write_report
+from sim_validate.report.report import possible_facts, write_report
 from tests.sim_validate.changing import changed
 
 

@@ -10,6 +10,7 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.closure.wrench_sets import WrenchSet
 from scenes.drawing.panels import thinned
+from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import BAD, GOOD, LEVELS, Area, Dots, Image, png_of, svg_of
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Recorded, replayed
@@ -17,23 +18,21 @@ from sim_validate.closure.verdict import WrenchVerdict
 from sim_validate.engine.rig import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome
-from sim_validate.report.agreement import (
+from sim_validate.report.charts import (
     Agreement,
     as_predicted,
-    frictions_in,
-    limits_in,
-    quadrants_in,
-)
-from sim_validate.report.charts import (
     directions_of_map,
     fidelity_panel,
     friction_used,
+    frictions_in,
+    limits_in,
     margin_figure,
     margin_panels,
     margins,
     motion_panels,
     on_map,
     pixels,
+    quadrants_in,
     shadow_of,
     wrench_panels,
 )
@@ -106,7 +105,7 @@ def test_a_map_is_of_unit_vectors_with_x_in_the_middle():
 
 def test_the_map_shows_what_is_resisted(wedge):
     body, grasp = wedge
-    shown = margins(body, grasp, FRICTION, max_normal_force_n=7.0)
+    shown = margins(Drawing(body, grasp, FRICTION), 7.0)
     ways = directions_of_map().reshape(-1, 3)
     rng = np.random.default_rng(0)
     for place in rng.integers(len(ways), size=6):
@@ -125,7 +124,7 @@ def test_without_closure_there_is_no_map(wedge):
     body, grasp = wedge
     with pytest.raises(gc.InputError, match=r"not in force closure at friction 0\.001"):
         margin_figure(body, grasp, 0.001)
-    titles = [words.text for words in wrench_panels(body, grasp, 0.001)[0].words()]
+    titles = [words.text for words in wrench_panels(Drawing(body, grasp, 0.001))[0].words()]
     assert any("not in force closure" in title for title in titles)
 
 
@@ -193,11 +192,10 @@ def test_trials_are_counted_by_what_was_predicted_and_what_happened(known):
                  (1.01, "slipped", None), (0.99, "held", None)], ["slipped"]),
         verdict(known, [(0.5, "lost_contact", None), (0.0, "slipped", None)], ["held", "diverged"]),
     ])  # fmt: skip
-    assert counted.resisted_held == 1
-    assert counted.resisted_let_go == 1
-    assert counted.not_resisted_held == 2
-    assert counted.not_resisted_let_go == 3
-    assert counted.neither == 3  # two are too near their limits, as for `validate`
+    assert counted == {
+        "resisted_held": 1, "resisted_let_go": 1, "not_resisted_held": 2, "not_resisted_let_go": 3,
+        "neither": 3,  # two are too near their limits, as for `validate`
+    }  # fmt: skip
 
 
 def test_trials_end_as_predicted_or_as_they_might():
@@ -248,9 +246,8 @@ def test_a_trial_that_blew_up_is_drawn(trial):
 
 
 def test_the_scale_of_a_map_ends_at_its_least_and_largest_value(wedge):
-    for sheet, values in zip(
-        margin_panels(*wedge, FRICTION), margins(*wedge, FRICTION), strict=True
-    ):
+    drawing = Drawing(*wedge, FRICTION)
+    for sheet, values in zip(margin_panels(drawing, 10.0), margins(drawing, 10.0), strict=True):
         said = [words.text for words in sheet.words()]
         assert {f"{values.min():.3g}", f"{values.max():.3g}", f"least: {values.min():.3g}"} <= {
             *said
@@ -285,8 +282,8 @@ def test_the_pixels_of_a_map_are_where_its_directions_are():
 def test_labels_of_charts_are_whole(kind, wedge, trial):
     pairs = ((0.013, 0.013), (0.4, 0.41))
     sheets = {
-        "wrenches": lambda: wrench_panels(*wedge, FRICTION),
-        "margins": lambda: margin_panels(*wedge, FRICTION),
+        "wrenches": lambda: wrench_panels(Drawing(*wedge, FRICTION)),
+        "margins": lambda: margin_panels(Drawing(*wedge, FRICTION), 10.0),
         "motion": lambda: motion_panels(trial, 1e-5),
         "fidelity": lambda: [
             fidelity_panel(Agreement("critical friction", pairs)),

@@ -12,7 +12,7 @@ from scenes.drawing.pages import UNITS
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.report.pages import cards_of
+from sim_validate.report.cards import cards_of
 from sim_validate.report.report import FIRST, write_report
 from sim_validate.report.run_folder import runs_in
 from tests.sim_validate.changing import slipped

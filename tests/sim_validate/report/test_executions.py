@@ -29,12 +29,11 @@ from sim_validate.execution.verdict import (
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject
 from sim_validate.main import main
-from sim_validate.report import drawn_grasps
+from sim_validate.report import cards
 from sim_validate.report import report as reports
-from sim_validate.report.agreement import said_of_both
-from sim_validate.report.drawn_grasps import Drawn
+from sim_validate.report.cards import Drawn
 from sim_validate.report.report import write_report
-from sim_validate.report.run_folder import runs_in
+from sim_validate.report.run_folder import runs_in, said_of_both
 from sim_validate.report.sections import execute_command
 from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.changing import changed, slipped
@@ -100,7 +99,7 @@ def copy(run, tmp_path):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """Pages without their pictures, which take a second."""
-    monkeypatch.setattr(reports, "draw", lambda task: Drawn(f"pictures/{task.name}", None, None))
+    monkeypatch.setattr(reports, "draw", lambda _, card: Drawn(f"pictures/{card.name}"))
 
 
 def cells_of(page, heading):
@@ -181,7 +180,7 @@ def test_grasps_that_were_lost_are_drawn_first(run):
     """The second grasp is the only one that survives."""
     (folder,) = runs_in(run)
     ids = [grasp.id for grasp in folder.saved.grasps]
-    assert [folder.alarms(name) for name in ids] == [True, False, True]
+    assert [found.alarming for found in folder] == [True, False, True]
     assert [grasp.id for grasp in folder.first(2).saved.grasps] == [ids[0], ids[2]]
 
 
@@ -235,7 +234,7 @@ def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
         path.parent.mkdir(exist_ok=True)
         path.write_text(name)
 
-    monkeypatch.setattr(drawn_grasps, "film", film)
+    monkeypatch.setattr(cards, "film", film)
     report = write_report(copy, tmp_path / "out", jobs=1, limit=1, clips=1).index.parent
     clips = {path.name: path.read_text() for path in (report / "clips").iterdir()}
     first = load_grasps(copy / "grasps.json").grasps[0].id

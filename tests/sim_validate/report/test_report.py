@@ -18,8 +18,8 @@ from sim_validate.closure.verdict import Verdicts
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.report.agreement import said_of
 from sim_validate.report.report import write_report
+from sim_validate.report.run_folder import said_of
 from tests.sim_validate.changing import changed, changed_verdicts, slipped
 
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
