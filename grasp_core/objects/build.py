@@ -24,7 +24,7 @@ from grasp_core.arrays import Array, Indices, frozen, real_array
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mesh_files.limits import MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.polygons import check_corners, single_rounding, too_many
-from grasp_core.objects.booleans import Solid, hull
+from grasp_core.objects.booleans import hull
 from grasp_core.objects.curved_patches import flat_patches
 from grasp_core.objects.planar_faces import (
     MAX_FACES,
@@ -37,7 +37,7 @@ from grasp_core.objects.sheets import check_bounds, outward_sheets
 from grasp_core.objects.shells import check_volume
 from grasp_core.objects.sound_surface import sound_surface
 from grasp_core.objects.surface import Face, SoundSurface, Surface
-from grasp_core.objects.triangles import Edges
+from grasp_core.objects.triangles import Mesh
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
@@ -73,14 +73,15 @@ def build(
     off = single_rounding(points) if rounding is None else rounding
     blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
     most, largest = choices.max_parts, choices.largest_part
-    found = sound_surface(points, corners, blur, most_parts=most, largest_part=largest, known=known)
+    mesh = Mesh(points, corners)
+    found = sound_surface(mesh, blur, most_parts=most, largest_part=largest, known=known)
     slack = planar_slack(extent, blur)
     groups = _planar_groups(found, slack, blur, choices)
-    fault = Edges.of(found.corners).fault()
+    fault = found.edges.fault()
     if groups is not None and fault:
         raise fault
     if found.surface.closed:
-        check_bounds(found.points, found.corners)
+        check_bounds(found)
     else:
         found = outward_sheets(found, largest_part=largest)
     patches = None
@@ -88,23 +89,23 @@ def build(
         patches = choices.patches
         faces, said = _patched(found, fault, patches)
     else:
-        faces = tuple(planar_face(found.points, found.corners[group], slack) for group in groups)
+        faces = tuple(planar_face(found, group, slack) for group in groups)
         said = _uneven(found, groups, faces, PLANAR * extent)
-    center = _given_center(found.points, center_of_mass)
+    center = _given_center(found.vertices, center_of_mass)
     surface = found.surface
     if known is None:
         surface = replace(surface, center_given=center is not None)
-    solid = Solid(found.points, found.corners) if surface.closed else hull(found.points)
+    solid = found if surface.closed else hull(found.vertices)
     check_volume(solid)
     volume, middle, inertia = mass_properties(solid, center)
     return {
-        "vertices": found.points,
-        "triangles": found.corners,
+        "vertices": found.vertices,
+        "triangles": found.triangles,
         "faces": faces,
         "volume": volume,
         "center_of_mass": middle,
         "inertia": inertia,
-        "content_sha256": content_hash(found.points, found.corners),
+        "content_sha256": content_hash(found.vertices, found.triangles),
         "patches": patches,
         "surface": surface,
         "notes": (*surface.notes(), *said),
@@ -116,7 +117,7 @@ def _uneven(
 ) -> list[str]:
     """Say how far corners are off the planes of their faces, if that is more than usual [m]."""
     off = max(
-        float(np.abs((found.points[found.corners[group]] - face.centroid) @ face.normal).max())
+        float(np.abs((found.corners[group] - face.centroid) @ face.normal).max())
         for group, face in zip(groups, faces, strict=True)
     )
     if off <= usual:
@@ -153,9 +154,7 @@ def _planar_groups(
         return None
     automatic = choices.faces == "auto"
     most = MAX_FACES if automatic else choices.max_faces
-    groups = coplanar_groups(
-        found.points, found.corners, slack, blur=0.5 * blur, caps=found.surface.caps, most=most
-    )
+    groups = coplanar_groups(found, slack, blur=0.5 * blur, caps=found.surface.caps, most=most)
     if automatic and len(groups) > most:
         return None
     if len(groups) > choices.max_faces:
@@ -170,7 +169,7 @@ def _planar_groups(
 def _patched(
     found: SoundSurface, fault: MeshError | None, limits: PatchLimits
 ) -> tuple[tuple[Face, ...], list[str]]:
-    patches = flat_patches(found.points, found.corners, limits, found.surface.caps)
+    patches = flat_patches(found, limits, found.surface.caps)
     if len(patches) < FINGERS:
         raise MeshError(
             MeshRefusal.NOT_FLAT,
@@ -238,12 +237,12 @@ def content_hash(points: Array, corners: Indices) -> str:
     return digest.hexdigest()
 
 
-def mass_properties(solid: Solid, center: Array | None = None) -> tuple[float, Array, Array]:
+def mass_properties(solid: Mesh, center: Array | None = None) -> tuple[float, Array, Array]:
     """Compute volume [m^3], centre (3,) [m], inertia (3, 3) [kg m^2] about it, at 1 kg/m^3.
 
     The centre is that of uniform density, unless it is given.
     """
-    a, b, c = solid.vertices[solid.triangles].transpose(1, 0, 2)
+    a, b, c = solid.corners.transpose(1, 0, 2)
     areas = np.cross(b - a, c - b)  # normals, as long as twice the area
     total = a + b + c
     volume = float((areas[:, 0] * total[:, 0]).sum()) / 6.0

@@ -41,7 +41,7 @@ from grasp_core.geometry.polygons import (
 )
 from grasp_core.mesh_files.limits import PatchLimits
 from grasp_core.objects.surface import Face
-from grasp_core.objects.triangles import NO_CAPS, Plane, Triangles
+from grasp_core.objects.triangles import NO_CAPS, Mesh, Plane
 from grasp_core.solvers.ties import first_best, graded, largest_first, ranks, surpassing
 
 SMOOTHING = 10
@@ -57,12 +57,9 @@ BORDER_GAP = 1e-9
 object's extent."""
 
 
-def flat_patches(
-    vertices: Array, triangles: Indices, limits: PatchLimits, caps: Indices = NO_CAPS
-) -> tuple[Face, ...]:
+def flat_patches(surface: Mesh, limits: PatchLimits, caps: Indices = NO_CAPS) -> tuple[Face, ...]:
     """Find the largest nearly flat patches of a surface, those with the largest discs first."""
-    surface = Triangles.of(vertices, triangles)
-    extent = float(np.ptp(vertices, axis=0).max())
+    extent = surface.extent
     depth = limits.depth * extent
     found: list[tuple[float, Face]] = []
     radii: list[float] = []
@@ -103,7 +100,7 @@ class _Group(NamedTuple):
     area: float
 
 
-def _groups(surface: Triangles, spread: float, depth: float, caps: Indices) -> list[_Group]:
+def _groups(surface: Mesh, spread: float, depth: float, caps: Indices) -> list[_Group]:
     smooth, normals = _smoothed(surface), surface.normals
     flatness: Array = np.einsum("ti,ti->t", smooth, normals)
     flat_first = np.argsort(-graded(flatness, FLATNESS_DIGITS), kind="stable")
@@ -128,7 +125,7 @@ def _groups(surface: Triangles, spread: float, depth: float, caps: Indices) -> l
     return [groups[place] for place in largest_first([group.area for group in groups])]
 
 
-def _smoothed(surface: Triangles) -> Array:
+def _smoothed(surface: Mesh) -> Array:
     """Average normals over neighbouring triangles, weighted by area, (t, 3)."""
     weighted = surface.normals * surface.areas[:, None]
     inner = surface.across >= 0
@@ -140,9 +137,7 @@ def _smoothed(surface: Triangles) -> Array:
     return weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-300)
 
 
-def _patch(
-    surface: Triangles, group: Indices, normal: Array, gap: float
-) -> tuple[float, Face] | None:
+def _patch(surface: Mesh, group: Indices, normal: Array, gap: float) -> tuple[float, Face] | None:
     """Fit a convex polygon that a group covers once; also return its largest disc's radius [m]."""
     frame = plane_frame(normal)
     origin = surface.corners[group].mean(axis=(0, 1))

@@ -16,7 +16,7 @@ from grasp_core.geometry.polygons import (
 )
 from grasp_core.objects.booleans import triangulate
 from grasp_core.objects.surface import Face
-from grasp_core.objects.triangles import NO_CAPS, Plane, Triangles, border_loops, crosses_of
+from grasp_core.objects.triangles import NO_CAPS, Mesh, Plane, border_loops, crosses_of
 from grasp_core.solvers.ties import largest_first
 
 MAX_FACES = 200
@@ -43,8 +43,7 @@ def planar_slack(extent: float, flatness_m: float) -> float:
 
 
 def coplanar_groups(
-    vertices: Array,
-    triangles: Indices,
+    mesh: Mesh,
     distance: float,
     *,
     angle: float = ANGLE,
@@ -63,8 +62,7 @@ def coplanar_groups(
     what has grown. A triangle thinner than the distance limit has no meaningful normal, so only its
     distance counts.
     """
-    table = Triangles.of(vertices, triangles)
-    corners, normals, areas = table.corners, table.normals, table.areas
+    corners, normals, areas = mesh.corners, mesh.normals, mesh.areas
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     sliver = 2.0 * areas <= distance * longest
     heights = np.where(sliver, 1.0, 2.0 * areas) / longest
@@ -76,7 +74,7 @@ def coplanar_groups(
         off = np.abs((corners[some] - origin) @ normal).max(axis=1)
         return (tilt <= tilts[some]) & (off <= distance)
 
-    found = table.groups(
+    found = mesh.groups(
         largest_first(2.0 * areas),
         lambda seed: (normals[seed], corners[seed, 0]),
         fit,
@@ -87,9 +85,9 @@ def coplanar_groups(
     return sorted(members, key=lambda group: int(group[0]))
 
 
-def planar_face(vertices: Array, triangles: Indices, slack: float) -> Face:
+def planar_face(mesh: Mesh, group: Indices, slack: float) -> Face:
     """Outline the planar face of a group of coplanar triangles of an outward mesh."""
-    corners = vertices[triangles]
+    corners = mesh.corners[group]
     crosses = crosses_of(corners)
     outward = crosses.sum(axis=0)
     normal = -outward / np.linalg.norm(outward)
@@ -98,8 +96,8 @@ def planar_face(vertices: Array, triangles: Indices, slack: float) -> Face:
     frame = plane_frame(normal)
 
     found = [
-        without_straight_corners((vertices[loop[::-1]] - origin) @ frame, slack)
-        for loop in border_loops(triangles)
+        without_straight_corners((mesh.vertices[loop[::-1]] - origin) @ frame, slack)
+        for loop in border_loops(mesh.triangles[group])
     ]
     loops = [found[place] for place in largest_first([signed_area(loop) for loop in found])]
     area, centroid = area_and_centroid(loops)

@@ -27,7 +27,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.objects.shells import SMALL, left_out
 from grasp_core.objects.surface import SoundSurface
-from grasp_core.objects.triangles import NO_CAPS, Edges, components, numbered, triangle_areas
+from grasp_core.objects.triangles import NO_CAPS, Edges, Mesh, components, numbered
 
 CERTAIN = 0.4
 """Least mean winding number on an open surface that is taken for outward: half a ball has 0.3."""
@@ -35,10 +35,10 @@ NEAR = 0.25
 """Largest distance from 1/2 of the winding number on a part that bounds the solid."""
 
 
-def check_bounds(points: Array, corners: Indices) -> None:
+def check_bounds(surface: Mesh) -> None:
     """Refuse a closed surface if more than next to nothing of it does not bound the solid."""
-    places = sampled(triangle_areas(points, corners))
-    off = float((np.abs(winding_on(points[corners], places) - 0.5) > NEAR).mean())
+    winding = winding_on(surface.corners, sampled(surface.areas))
+    off = float((np.abs(winding - 0.5) > NEAR).mean())
     if off > SMALL:
         raise _crossing(off)
 
@@ -46,22 +46,22 @@ def check_bounds(points: Array, corners: Indices) -> None:
 def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
     """Orient the parts of an open surface outwards."""
     # parts connect across edges of two triangles
-    points, corners = found.points, found.corners
-    across = Edges.of(corners).neighbours()
-    here, side = np.nonzero(across >= 0)
-    label = numbered(len(corners), np.column_stack([here, across[here, side]]))
-    areas, said = triangle_areas(points, corners), list[str]()
-    whole, count = float(areas.sum()), int(label.max()) + 1
+    here, side = np.nonzero(found.across >= 0)
+    links = np.column_stack([here, found.across[here, side]])
+    label, said = numbered(len(found.triangles), links), list[str]()
+    mesh, whole, count = Mesh(found.vertices, found.triangles), found.areas.sum(), label.max() + 1
     if largest_part:
-        kept = label == np.bincount(label, weights=areas).argmax()
-        corners, areas, label = corners[kept], areas[kept], np.zeros(int(kept.sum()), np.int64)
-    sizes = np.bincount(label, weights=areas)
-    winding = _winding_of_parts(points, corners, areas, label)
+        kept = label == np.bincount(label, weights=mesh.areas).argmax()
+        mesh = Mesh(mesh.vertices, mesh.triangles[kept])
+        label = np.zeros(len(mesh.triangles), np.int64)
+    sizes = np.bincount(label, weights=mesh.areas)
+    winding = _winding_of_parts(mesh, label)
     turn = winding * (1.0 if sizes @ winding > 0.0 else -1.0) < -NEAR
     turn ^= bool(sizes @ winding < 0.0)
     if turn.any():
-        corners = np.where(turn[label][:, None], corners[:, ::-1], corners)
-        winding = _winding_of_parts(points, corners, areas, label)
+        turned = np.where(turn[label][:, None], mesh.triangles[:, ::-1], mesh.triangles)
+        mesh = Mesh(mesh.vertices, turned)
+        winding = _winding_of_parts(mesh, label)
         said.append(f"{int(turn.sum())} of {len(sizes)} parts of the open surface were inside out; "
                     "their triangles were turned")  # fmt: skip
     sound = np.abs(winding - 0.5) <= NEAR
@@ -76,21 +76,20 @@ def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
             f"number on it is {mean:.2f}, expected 0.5 but for what holes are missing, at least "
             f"{CERTAIN}; close the surface, or leave out all but its largest part (--largest-part)",
         )
-    corners = corners[sound[label]]
     dropped = unsound + 1.0 - float(sizes.sum()) / whole if largest_part else unsound
-    if (apart := count - int(sound.sum())) > 0:
+    if (apart := int(count - sound.sum())) > 0:
         said.append(left_out(apart, dropped))
-    used, local = np.unique(corners, return_inverse=True)
-    return found.mended(points[used], local.reshape(-1, 3), NO_CAPS, max(dropped, 0.0), said)
+    used = mesh.with_triangles(mesh.triangles[sound[label]])
+    return found.mended(used, NO_CAPS, max(dropped, 0.0), said)
 
 
-def _winding_of_parts(points: Array, corners: Indices, areas: Array, label: Indices) -> Array:
+def _winding_of_parts(mesh: Mesh, label: Indices) -> Array:
     """Average the winding number over samples of each part, (parts,); 0 for parts not looked at."""
-    places = sampled(areas)
+    places = sampled(mesh.areas)
     _, first = np.unique(label, return_index=True)
     unseen = first[~np.isin(np.arange(len(first)), label[places])]
-    places = np.concatenate([places, unseen[: MOST_ANGLES // len(corners)]])
-    found = winding_on(points[corners], places)
+    places = np.concatenate([places, unseen[: MOST_ANGLES // len(mesh.triangles)]])
+    found = winding_on(mesh.corners, places)
     sums, counts = (
         np.bincount(label[places], weights=weight, minlength=len(first))
         for weight in (found, np.ones(len(places)))

@@ -16,7 +16,7 @@ from grasp_core.arrays import Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.objects.booleans import Solid, intersection_volume, union
 from grasp_core.objects.surface import SoundSurface
-from grasp_core.objects.triangles import Edges, crosses_of, triangle_areas
+from grasp_core.objects.triangles import Mesh, crosses_of
 
 OVERLAP = 1e-6
 """Volume shared by two parts, relative to the whole, above which they overlap; parts that only
@@ -32,7 +32,7 @@ THIN = 4e-6
 """Width of a slit, relative to the extent, which rounding in single precision may leave."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Body(Solid):
     """A body with its cavities."""
 
@@ -40,7 +40,7 @@ class _Body(Solid):
 
     @property
     def area(self) -> float:
-        return float(triangle_areas(self.vertices, self.triangles).sum())
+        return float(self.areas.sum())
 
     def joined(self, other: "_Body") -> "_Body":
         return _Body(
@@ -52,46 +52,44 @@ class _Body(Solid):
     def turned(self) -> "_Body":
         return _Body(self.vertices, self.triangles[:, ::-1], self.marks)
 
-    def parts(self, label: Indices) -> "list[_Body]":
-        """Split the body into the parts that triangles belong to, numbered (t,)."""
-        parts = list[_Body]()
+    def parts(self) -> "list[_Body]":
+        """Split the body into parts that share no edge."""
+        label, parts = self.edges.parts(), list[_Body]()
         for part in range(int(label.max()) + 1):
             mine = label == part
-            used, local = np.unique(self.triangles[mine], return_inverse=True)
-            parts.append(_Body(self.vertices[used], local.reshape(-1, 3), self.marks[mine]))
+            used = self.with_triangles(self.triangles[mine])
+            parts.append(_Body(used.vertices, used.triangles, self.marks[mine]))
         return parts
 
 
 def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSurface:
     """Orient the shells of a closed surface outwards, and make one solid of them."""
-    corners, said = found.corners, list[str]()
-    whole = Solid(found.points, corners)
-    check_volume(whole)
-    if whole.volume < 0.0:
-        corners = corners[:, ::-1]
+    triangles, said = found.triangles, list[str]()
+    check_volume(found)
+    if found.volume < 0.0:
+        triangles = triangles[:, ::-1]
         said.append("the mesh was inside out; its triangles were turned")
-    label = Edges.of(corners).parts()
-    if (count := int(label.max()) + 1) > most:
+    whole = _Body(found.vertices, triangles, np.arange(len(triangles)))
+    shells = whole.parts()
+    if (count := len(shells)) > most:
         raise MeshError(
             MeshRefusal.SEPARATE,
             f"the mesh has {count} parts, more than the limit of {most}; give one solid",
         )
-    as_it_is = found.mended(found.points, corners, found.surface.caps, 0.0, said)
+    as_it_is = found.mended(whole, found.surface.caps, 0.0, said)
     if count == 1:
         return as_it_is
-    shells = _Body(found.points, corners, np.arange(len(corners))).parts(label)
     try:
-        kept, dropped, changed = _of_many(shells, abs(whole.volume), largest_part=largest_part)
+        kept, dropped, changed = _of_many(shells, abs(found.volume), largest_part=largest_part)
     except InputError as error:
         if isinstance(error, MeshError):
             raise
         raise MeshError(MeshRefusal.NON_MANIFOLD, f"parts cannot be compared: {error}") from error
     if not changed:
         return as_it_is
-    used, local = np.unique(kept.triangles, return_inverse=True)
     is_cap = np.flatnonzero(np.isin(kept.marks, found.surface.caps))
-    points, corners = kept.vertices[used], local.reshape(-1, 3)
-    return found.mended(points, corners, is_cap, dropped, [*said, *changed])
+    used = kept.with_triangles(kept.triangles)
+    return found.mended(used, is_cap, dropped, [*said, *changed])
 
 
 def _of_many(
@@ -130,8 +128,7 @@ def _sorted_out(
     shells: list[_Body], slack: float, said: list[str]
 ) -> tuple[list[_Body], list[_Body], MeshError | None]:
     """Give each cavity to its body; return bodies, parts that cannot be used, and the reason."""
-    thinnest = [THINNEST * float(np.ptp(s.vertices, axis=0).max()) ** 3 for s in shells]
-    flat = [s for s, least in zip(shells, thinnest, strict=True) if abs(s.volume) <= least]
+    flat = [s for s in shells if abs(s.volume) <= THINNEST * s.extent**3]
     bodies = [s for s in shells if s not in flat and s.volume > 0.0]
     bad: list[_Body] = flat
     why: MeshError | None = None
@@ -190,9 +187,7 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
     if len(bodies) == 1:
         return bodies
     solid, marks = union(bodies, [body.marks for body in bodies])
-    label = Edges.of(solid.triangles).parts()
-    shells = _Body(solid.vertices, solid.triangles, marks).parts(label)
-    found = _with_cavities(shells, slack)
+    found = _with_cavities(_Body(solid.vertices, solid.triangles, marks).parts(), slack)
     if len(found) == len(bodies):
         return bodies
     if max(map(thin_share, found)) > CLEAN:
@@ -217,10 +212,9 @@ def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
     return bodies
 
 
-def check_volume(solid: Solid) -> None:
+def check_volume(solid: Mesh) -> None:
     """Refuse a solid that encloses almost no volume."""
-    extent = float(np.ptp(solid.vertices, axis=0).max())
-    if abs(solid.volume) < THINNEST * extent**3:
+    if abs(solid.volume) < THINNEST * solid.extent**3:
         message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
@@ -232,9 +226,8 @@ def thin_share(solid: Solid) -> float:
     that it shows along the axis, each wall counted, less what slits and walls thinner than the step
     hide. The largest share of the three axes is returned.
     """
-    step = THIN * float(np.ptp(solid.vertices, axis=0).max())
-    corners = solid.vertices[solid.triangles]
-    seen = 0.25 * np.abs(crosses_of(corners)).sum(axis=0)
+    step = THIN * solid.extent
+    seen = 0.25 * np.abs(crosses_of(solid.corners)).sum(axis=0)
     left = [
         solid.volume - intersection_volume(solid, solid.moved(step * axis)) for axis in np.eye(3)
     ]

@@ -20,11 +20,11 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.polygons import plane_frame
-from grasp_core.objects.booleans import Solid, triangulate
+from grasp_core.objects.booleans import triangulate
 from grasp_core.objects.sheets import wound_alike
 from grasp_core.objects.shells import one_solid
 from grasp_core.objects.surface import SoundSurface, Surface
-from grasp_core.objects.triangles import Edges, components, triangle_areas
+from grasp_core.objects.triangles import Mesh, components
 
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""
@@ -37,8 +37,7 @@ keeps 6e-8, and vertices that were equal before are equal to the last bit."""
 
 
 def sound_surface(
-    vertices: Array,
-    triangles: Indices,
+    given: Mesh,
     flatness_m: float,
     *,
     most_parts: int,
@@ -47,93 +46,86 @@ def sound_surface(
 ) -> SoundSurface:
     """Make one surface of triangles."""
     if known is None:
-        points, corners, said = _joined(vertices, triangles, flatness_m, most_parts)
+        mesh, said = _joined(given, flatness_m, most_parts)
         surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
-        if Edges.of(corners).fault():
-            corners, surface = _capped(points, corners, surface)
+        if mesh.edges.fault():
+            mesh, surface = _capped(mesh, surface)
     else:  # vertices that were kept apart may be equal, where a united solid touches itself
-        points, corners, _ = welded(vertices, triangles, reach=-1.0)
-        surface = known
-        if len(known.caps) and known.caps.max() >= len(corners):
+        mesh, _ = welded(given, reach=-1.0)
+        surface, count = known, len(mesh.triangles)
+        if len(known.caps) and known.caps.max() >= count:
             raise InputError(
-                f"caps must be numbers of triangles below {len(corners)}, got {known.caps.max()}"
+                f"caps must be numbers of triangles below {count}, got {known.caps.max()}"
             )
     # a volume is enclosed where edges are run along as often in both directions
-    closed = not Edges.of(corners).balance.any()
-    found = SoundSurface(points, corners, replace(surface, closed=closed))
+    closed = not mesh.edges.balance.any()
+    found = SoundSurface(mesh.vertices, mesh.triangles, replace(surface, closed=closed))
     return one_solid(found, most=most_parts, largest_part=largest_part) if closed else found
 
 
-def _joined(
-    vertices: Array, triangles: Indices, flatness_m: float, most_parts: int
-) -> tuple[Array, Indices, list[str]]:
+def _joined(given: Mesh, flatness_m: float, most_parts: int) -> tuple[Mesh, list[str]]:
     """Weld close vertices, and wind triangles like their neighbours; also say what was changed."""
-    points, corners, dropped = welded(vertices, triangles)
+    mesh, dropped = welded(given)
     said = [f"dropped {dropped} triangles without area"] if dropped else []
-    fault = Edges.of(corners).fault()
+    fault = mesh.edges.fault()
     if fault and fault.reason is MeshRefusal.WINDING:
-        wound = wound_alike(corners, triangle_areas(points, corners))
+        wound = wound_alike(mesh.triangles, mesh.areas)
         if wound is None:
             raise MeshError(
                 MeshRefusal.WINDING,
                 "the surface has only one side, so its triangles cannot be wound alike; repair it "
                 "in a modelling program",
             )
-        corners, turned = wound
+        triangles, turned = wound
+        mesh = Mesh(mesh.vertices, triangles)
         said.append(f"triangles wound against their neighbours were turned, {turned.sum()} in all")
-        fault = Edges.of(corners).fault()
+        fault = mesh.edges.fault()
     if fault and fault.reason is MeshRefusal.NON_MANIFOLD:
-        apart = _welded_apart(vertices, triangles, most_parts)
-        if apart is not None:
-            points, corners = apart
+        mesh = _welded_apart(given, most_parts) or mesh
     elif fault and flatness_m:
-        closer, joined, _ = welded(points, corners, 0.5 * flatness_m)
-        if Edges.of(joined).fault() is None:
-            points, corners = closer, joined
+        closer, _ = welded(mesh, 0.5 * flatness_m)
+        if closer.edges.fault() is None:
+            mesh = closer
             said.append("vertices that rounding had moved apart were joined")
-    return points, corners, said
+    return mesh, said
 
 
-def _welded_apart(vertices: Array, triangles: Indices, most: int) -> tuple[Array, Indices] | None:
+def _welded_apart(given: Mesh, most: int) -> Mesh | None:
     """Weld each part of a file by itself, since parts that touch are no longer apart once welded.
 
     Parts share no vertex in the file. None if there is one part, more than `most`, or if a part
     does not bound a solid.
     """
+    vertices, triangles = given.vertices, given.triangles
     sides = np.column_stack([triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()])
     _, label = np.unique(components(len(vertices), sides)[triangles[:, 0]], return_inverse=True)
     if not 1 <= label.max() < most:
         return None
-    points, corners, count = list[Array](), list[Indices](), 0
-    for part in range(int(label.max()) + 1):
-        mine, local, _ = welded(vertices, triangles[label == part])
-        if Edges.of(local).fault() is not None:
-            return None
-        points.append(mine)
-        corners.append(local + count)
-        count += len(mine)
-    return np.concatenate(points), np.concatenate(corners)
+    parts = [welded(Mesh(vertices, triangles[label == part]))[0] for part in range(label.max() + 1)]
+    if any(part.edges.fault() for part in parts):
+        return None
+    counts = [len(part.vertices) for part in parts]
+    joined = [part.triangles + sum(counts[:place]) for place, part in enumerate(parts)]
+    return Mesh(np.concatenate([part.vertices for part in parts]), np.concatenate(joined))
 
 
-def _capped(points: Array, corners: Indices, surface: Surface) -> tuple[Indices, Surface]:
-    caps = caps_of(points, corners)
+def _capped(mesh: Mesh, surface: Surface) -> tuple[Mesh, Surface]:
+    caps = caps_of(mesh)
     if caps is None:
-        return corners, surface
-    whole = np.concatenate([corners, caps.triangles])
-    volume = abs(Solid(points, whole).volume)
+        return mesh, surface
+    whole = Mesh(mesh.vertices, np.concatenate([mesh.triangles, caps.triangles]))
+    volume = abs(whole.volume)
     if not (volume > 0.0 and caps.hidden <= KNOWN * volume):
-        return corners, surface
+        return mesh, surface
     # a cap that is thinner than rounding is a crack between triangles that meet, not a hole
-    areas = triangle_areas(points, caps.triangles)
-    sides = points[caps.triangles] - points[np.roll(caps.triangles, 1, axis=1)]
-    longest = np.linalg.norm(sides, axis=2).max(axis=1)
-    crack = 1e-6 * float(np.ptp(points, axis=0).max())
-    wide = 2.0 * areas > max(crack, surface.flatness_m) * longest
+    corners = mesh.vertices[caps.triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    wide = 2.0 * caps.areas > max(1e-6 * mesh.extent, surface.flatness_m) * longest
     holes = np.unique(caps.hole_of[wide])
     cracks = ("cracks between triangles that meet were closed",) * (len(holes) < len(caps.widths))
     return whole, replace(
         surface,
-        caps=len(corners) + np.flatnonzero(wide),
+        caps=len(mesh.triangles) + np.flatnonzero(wide),
         holes=len(holes),
         largest_hole_m=float(caps.widths[holes].max(initial=0.0)),
         volume_error=caps.hidden / volume,
@@ -146,20 +138,24 @@ class Caps(NamedTuple):
 
     triangles: Indices  # vertex indices, wound like the surface around them, (c, 3)
     widths: Array  # largest distance between two corners of each hole, (h,) [m]
+    areas: Array  # areas of the triangles, (c,) [m^2]
     hole_of: Indices  # number of the hole that each triangle closes, (c,)
     hidden: float  # largest volume by which the caps may differ from the true surface [m^3]
 
 
-def caps_of(points: Array, corners: Indices) -> Caps | None:
+def caps_of(mesh: Mesh) -> Caps | None:
     """Close the holes of a surface; None if it has none, or its open edges do not form loops."""
-    loops = Edges.of(corners).open_loops()
+    loops, points = mesh.edges.open_loops(), mesh.vertices
     if not loops:
         return None
-    triangles = [_cap(points, loop) for loop in loops]
+    caps = [Mesh(points, _cap(points, loop)) for loop in loops]
     widths = np.array([_width(points[loop]) for loop in loops])
-    areas = np.array([triangle_areas(points, each).sum() for each in triangles])
-    hole_of = np.repeat(np.arange(len(loops)), [len(each) for each in triangles])
-    return Caps(np.concatenate(triangles), widths, hole_of, float(areas @ widths) / 3.0)
+    hidden = float(np.array([each.areas.sum() for each in caps]) @ widths) / 3.0
+    hole_of = np.repeat(np.arange(len(loops)), [len(each.triangles) for each in caps])
+    return Caps(
+        np.concatenate([each.triangles for each in caps]), widths,
+        np.concatenate([each.areas for each in caps]), hole_of, hidden,
+    )  # fmt: skip
 
 
 def _cap(points: Array, loop: list[int]) -> Indices:
@@ -194,14 +190,12 @@ def _width(places: Array) -> float:
     return float(np.linalg.norm(places[:, None] - places[None], axis=2).max())
 
 
-def welded(
-    points: Array, corners: Indices, reach: float | None = None
-) -> tuple[Array, Indices, int]:
+def welded(mesh: Mesh, reach: float | None = None) -> tuple[Mesh, int]:
     """Join close vertices, drop unused ones and collapsed triangles; also count the latter."""
-    used, corners = np.unique(corners, return_inverse=True)
-    points, corners = points[used], corners.reshape(-1, 3)
+    mesh = mesh.with_triangles(mesh.triangles)
+    points, corners = mesh.vertices, mesh.triangles
     if reach is None:
-        reach = WELD * float(np.ptp(points, axis=0).max())
+        reach = WELD * mesh.extent
     try:
         links = close_pairs(points, reach) if reach >= 0.0 else np.empty((0, 2), dtype=np.int64)
     except InputError as error:
@@ -213,7 +207,7 @@ def welded(
     whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     if not whole.any():
         raise MeshError(MeshRefusal.ZERO_VOLUME, "no triangle has an area; export a solid")
-    return points, corners[whole], int((~whole).sum())
+    return Mesh(points, corners[whole]), int((~whole).sum())
 
 
 GENERAL = np.array([0.41421, 0.56714, 0.69315])

@@ -10,9 +10,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices, Point, Polygon, Shape, UnitVector
+from grasp_core.arrays import Indices, Point, Polygon, Shape, UnitVector
 from grasp_core.declared import Declared, counted, summary
 from grasp_core.kinds import LARGEST, NotNegative, Number, Range
+from grasp_core.objects.triangles import Mesh
 from grasp_core.values import RIGHT_ANGLE
 
 Places = Annotated[Indices, Shape(None, whole=True)]
@@ -98,16 +99,14 @@ class Surface(Declared):
             yield f"the surface is open, so {what} of the convex hull, and a density gives no mass"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SoundSurface:
+@dataclass(frozen=True, eq=False)
+class SoundSurface(Mesh):
     """Welded and consistently wound triangles, with what is known of them."""
 
-    points: Array  # vertices, (n, 3) [m]
-    corners: Indices  # vertex indices, (t, 3)
     surface: Surface
 
     def mended(
-        self, points: Array, corners: Indices, caps: Indices, dropped: float, said: Sequence[str]
+        self, mesh: Mesh, caps: Indices, dropped: float, said: Sequence[str]
     ) -> "SoundSurface":
         """Return the surface with other triangles, made by dropping a share and by what is said."""
         known = replace(
@@ -116,4 +115,4 @@ class SoundSurface:
             dropped=max(self.surface.dropped, dropped),
             repairs=(*self.surface.repairs, *said),
         )
-        return SoundSurface(points, corners, known)
+        return SoundSurface(mesh.vertices, mesh.triangles, known)

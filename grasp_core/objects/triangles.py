@@ -7,6 +7,7 @@ never from neighbour to neighbour, so that the facets of a fine sphere cannot cr
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -38,25 +39,57 @@ def areas_and_normals(corners: Array) -> tuple[Array, Array]:
     return 0.5 * lengths, crosses / np.where(lengths > 0.0, lengths, 1.0)[:, None]
 
 
-def triangle_areas(points: Array, corners: Indices) -> Array:
-    """Compute the areas of triangles, (t,) [m^2]."""
-    return 0.5 * np.linalg.norm(crosses_of(points[corners]), axis=1)
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles between vertices, and what follows from them; each is computed once."""
 
+    vertices: Array  # (n, 3) [m]
+    triangles: Indices  # vertex indices, (t, 3)
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Triangles:
-    """Triangles with the areas, normals and neighbours by which groups of them grow."""
+    def with_triangles(self, triangles: Indices) -> "Mesh":
+        """Return some triangles between these vertices, with the vertices that they use."""
+        used, local = np.unique(triangles, return_inverse=True)
+        return Mesh(self.vertices[used], local.reshape(-1, 3))
 
-    corners: Array  # (t, 3, 3) [m]
-    areas: Array  # (t,) [m^2]
-    normals: Array  # unit normals, as the triangles are wound; zero without area, (t, 3)
-    across: Indices  # the one triangle across each edge (k, k+1), (t, 3); -1 where there is none
+    @cached_property
+    def extent(self) -> float:
+        """Largest extent along an axis [m]."""
+        return float(np.ptp(self.vertices, axis=0).max())
 
-    @classmethod
-    def of(cls, vertices: Array, triangles: Indices) -> "Triangles":
-        """Measure the triangles of a mesh."""
-        corners = vertices[triangles]
-        return cls(corners, *areas_and_normals(corners), Edges.of(triangles).neighbours())
+    @cached_property
+    def corners(self) -> Array:
+        """Corners of the triangles, (t, 3, 3) [m]."""
+        return self.vertices[self.triangles]
+
+    @cached_property
+    def _measured(self) -> tuple[Array, Array]:
+        return areas_and_normals(self.corners)
+
+    @property
+    def areas(self) -> Array:
+        """Areas of the triangles, (t,) [m^2]."""
+        return self._measured[0]
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals, as the triangles are wound; zero without area, (t, 3)."""
+        return self._measured[1]
+
+    @property
+    def volume(self) -> float:
+        """Volume that the triangles enclose [m^3]; it is negative where they are inside out."""
+        corners = self.corners - self.vertices.mean(axis=0)
+        return float(np.linalg.det(corners).sum()) / 6.0
+
+    @cached_property
+    def edges(self) -> "Edges":
+        """The edges of the triangles."""
+        return Edges.of(self.triangles)
+
+    @cached_property
+    def across(self) -> Indices:
+        """The one triangle across each edge (k, k+1), (t, 3); -1 where there is none."""
+        return self.edges.neighbours()
 
     def fitted(self, members: Indices) -> Plane:
         """Fit a plane to triangles."""
