@@ -15,7 +15,7 @@ import math
 from bisect import bisect
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from heapq import heapify, heappop, heappush
 from itertools import chain, islice, takewhile
 from typing import TypeAlias
@@ -77,111 +77,8 @@ class Waiting:
 Expanded: TypeAlias = Iterator[Waiting]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BestFirst:
-    """A search over one object's face quadruples for the largest discs of one construction."""
-
-    construction: Construction
-    bounded: AttemptBounds
-    """Bounds the disc radii of attempts on the object's faces by small linear programs."""
-    tally: Tally  # counts quadruples whose bounds prove that they have no grasp at all
-
-    def over(
-        self, blocks: Blocks, places: range, least: Callable[[Construction], float]
-    ) -> Iterator[tuple[Attempt, ...]]:
-        """Yield the attempts on each quadruple whose bound exceeds the threshold, best first."""
-        rooms, make = blocks
-        queue = [
-            Waiting((-float(rooms[place]), BLOCK, (place,)), partial(self._made, make, place))
-            for place in places
-        ]
-        heapify(queue)
-        while queue:  # each turn takes rows from finite tables, at least one
-            head = heappop(queue)
-            # the threshold rises while grasps are found: read it anew
-            worth = least(self.construction)
-            if head.bound <= worth:
-                return
-            if head.expand is None:
-                yield head.attempts()
-                continue
-            for item in head.expand(worth, queue[0].bound if queue else worth):
-                heappush(queue, item)
-
-    def in_rows(self, wide: WideQuadruples, worth: float) -> Iterator[tuple[Attempt, ...]]:
-        """Yield the attempts on quadruples whose bound exceeds `worth`, in the table's order."""
-        for start in range(0, len(wide), SMALLEST_CHUNK):
-            rows = slice(start, start + SMALLEST_CHUNK)
-            coned, bounds = wide.coned(rows).ranked(self.construction)
-            for item in self._tightened(coned, bounds, slice(0, len(coned)), worth):
-                yield item.attempts()
-
-    def _made(
-        self, make: Callable[[int], WideQuadruples], place: int, worth: float, _: float
-    ) -> Expanded:
-        """List a block, and yield one item for it; expanding that chooses cones for some rows."""
-        wide, bounds = make(place).ranked(self.construction, worth)
-
-        def chosen(rows: slice, worth: float) -> Expanded:
-            coned, bounds = wide.coned(rows).ranked(self.construction)
-            closer = coarse(np.asarray(bounds.max(axis=(1, 2), initial=-np.inf)))
-            count = int((closer > worth).sum())
-            tighter = partial(self._tightened, coned.some(np.arange(count)), bounds[:count].copy())
-            yield from _rows(tighter, closer[:count], (place, rows.start), 0, SMALLEST_CHUNK)
-
-        yield from _rows(chosen, coarse(bounds), (place,), 0, SMALLEST_TILT)
-
-    def _tightened(
-        self, coned: ConedQuadruples, bounds: Array, rows: slice, worth: float
-    ) -> Expanded:
-        """Tighten the bounds of some quadruples and yield the ones still above the threshold."""
-        construction, cheap = self.construction, bounds[rows]
-        solved = cheap > worth
-        row, kind, column = np.nonzero(solved)
-        order, at = np.array(construction.orders)[column], rows.start + row
-        tight = np.full(cheap.shape, -np.inf)
-        attempts = Attempts(
-            np.take_along_axis(coned.faces[at], order, axis=1),
-            np.take_along_axis(coned.axes[at, kind], order[:, :, None], axis=1),
-            coned.half_angles[at, kind],
-        )
-        tight[row, kind, column] = self.bounded.of(construction, attempts, worth)
-        # both are upper bounds: the smaller one holds
-        tight = np.minimum(tight, cheap)
-        # no discs even of the least radius: settled here, whatever was found elsewhere
-        none = solved.any(axis=1) & (tight.max(axis=1) <= construction.least)
-        choices = int(solved.transpose(0, 2, 1)[none].sum())
-        excluded = int(none.sum())
-        self.tally.update(tried=excluded, infeasible=excluded, solved=choices)
-        tight[tight <= worth] = -np.inf
-        best = coarse(np.asarray(np.max(tight, axis=(1, 2)), dtype=np.float64))
-        for each in np.flatnonzero(best > -np.inf).tolist():
-            place = rows.start + each
-            faces = tuple(coned.faces[place].tolist())
-            make = partial(coned.attempts, place, construction, tight[each])
-            yield Waiting((-float(best[each]), QUADRUPLE, faces), None, make)
-
-
-def _rows(
-    refined: Callable[[slice, float], Expanded],
-    best: Array,
-    place: tuple[int, ...],
-    start: int,
-    least: int,
-) -> Expanded:
-    """Yield one item for a table's rows from `start` on; expanding it refines some of them.
-
-    These are the rows with bounds above that of the next item, within a chunk's size.
-    """
-
-    def expand(worth: float, beyond: float) -> Expanded:
-        larger = int(np.searchsorted(-best[start:], -beyond))
-        stop = min(start + min(max(larger, least), LARGEST_CHUNK), len(best))
-        yield from refined(slice(start, stop), worth)
-        yield from _rows(refined, best, place, stop, least)
-
-    if start < len(best):
-        yield Waiting((-float(best[start]), TABLE, place), expand)
+def _unasked(_: Certified) -> str:
+    raise AssertionError("parts of a search keep no grasps")
 
 
 @dataclass(slots=True, eq=False)
@@ -200,8 +97,8 @@ class MethodSearch:
     """The grasps, proofs and counts that one method has gathered so far."""
 
     method: Method
-    limit: int | None
-    reached: Callable[[Certified], Certified | str]
+    limit: int | None = None
+    reached: Callable[[Certified], Certified | str] = _unasked
     """Function that returns a grasp with its fingers' ways out, or why they cannot reach it."""
     best: list[Certified] = field(default_factory=list[Certified])
     """At most `limit` grasps, best first."""
@@ -223,13 +120,6 @@ class MethodSearch:
     def full(self) -> bool:
         """Return whether `limit` grasps are kept, so that another one would replace one."""
         return self.limit is not None and len(self.best) == self.limit
-
-    def least(self, construction: Construction) -> float:
-        """Return the merit (disc radius) that a grasp must exceed to enter the best ones."""
-        if self.full and (construction.limits is None or not self.best):
-            return math.inf
-        worst = self.best[-1].placement.merit if self.full else -math.inf
-        return max(worst * (1.0 + SAME_MERIT), construction.least)
 
     def take(self, gathered: Gathered, seconds: float) -> None:
         """Add the proofs and counts of a part, and the time that another process took [s]."""
@@ -266,99 +156,198 @@ def best_first(found: Certified) -> SortKey:
     return -graded(found.placement.merit), four(sorted(found.faces)), found.faces
 
 
-def found_in(
-    construction: Construction,
-    shapes: Shapes,
-    friction: float,
-    blocks: Blocks,
-    places: range,
-    search: MethodSearch,
-) -> Iterator[list[Certified]]:
-    """Try a construction on some of the blocks; yield the grasps found on each quadruple.
+@dataclass(frozen=True, eq=False)
+class FamilySearch:
+    """A search over one object's face quadruples for the grasps of one construction."""
 
-    Whoever keeps them in `search` does so before asking for the next: that raises the threshold.
-    """
-    settling, tally = Settling(construction, shapes), search.gathered.tally
-    best_first = BestFirst(construction, AttemptBounds(shapes), tally)
-    quadruples = _in_order(best_first, blocks, places, search)
-    while group := _next_few(quadruples, search):
-        least = search.least(construction)  # grasps kept meanwhile may have raised it
-        worth = [[each for each in attempts if each.bounds[0] > least] for attempts in group]
-        every = list(chain.from_iterable(worth))
-        found = iter(certified_attempts(settling, friction, every, least, tally))
-        for attempts in worth:
-            here = [one for one in islice(found, len(attempts)) if one is not None]
-            kept = _without_duplicates(here)
-            tally["duplicates"] += len(here) - len(kept)
-            yield kept
+    construction: Construction
+    shapes: Shapes
+    friction: float
+    kept: MethodSearch  # what is found and kept; grasps kept meanwhile raise the threshold
 
+    @cached_property
+    def _bounded(self) -> AttemptBounds:
+        return AttemptBounds(self.shapes)
 
-def _next_few(
-    quadruples: Iterator[tuple[Attempt, ...]], search: MethodSearch
-) -> list[tuple[Attempt, ...]]:
-    """Take the next quadruples, as many as cannot raise the threshold before the last of them."""
-    left = MOST_ATTEMPTS
-    if search.limit is not None:
-        left = min(left, search.limit - len(search.best))
-    group: list[tuple[Attempt, ...]] = []
-    for attempts in quadruples:
-        group.append(attempts)
-        left -= len(attempts)
-        if left <= 0:
-            break
-    return group
+    @cached_property
+    def _settling(self) -> Settling:
+        return Settling(self.construction, self.shapes)
 
+    @property
+    def least(self) -> float:
+        """The merit (disc radius) that a grasp must exceed now to enter the best ones."""
+        full, best = self.kept.full, self.kept.best
+        if full and (self.construction.limits is None or not best):
+            return math.inf
+        worst = best[-1].placement.merit if full else -math.inf
+        return max(worst * (1.0 + SAME_MERIT), self.construction.least)
 
-def _in_order(
-    best_first: BestFirst, blocks: Blocks, places: range, search: MethodSearch
-) -> Iterator[tuple[Attempt, ...]]:
-    """Yield the attempts on each quadruple: over many blocks with a limit, else block by block."""
-    construction, (rooms, make) = best_first.construction, blocks
-    if construction.limits is not None:
-        size = 1 if search.limit is None else TOGETHER
-        for start in range(0, len(places), size):
-            some = places[start : start + size]
-            if float(rooms[some].max()) > search.least(construction):
-                yield from best_first.over(blocks, some, search.least)
-        return
-    for place in places:
-        if search.full:
+    def found_in(self, blocks: Blocks, places: range) -> Iterator[list[Certified]]:
+        """Try the construction on some of the blocks; yield the grasps found on each quadruple.
+
+        Whoever keeps them does so before asking for the next: that raises the threshold.
+        """
+        tally, quadruples = self.kept.gathered.tally, self._in_order(blocks, places)
+        while group := self._next_few(quadruples):
+            least = self.least
+            worth = [[each for each in attempts if each.bounds[0] > least] for attempts in group]
+            found = iter(self.certified([*chain.from_iterable(worth)], least))
+            for attempts in worth:
+                here = [one for one in islice(found, len(attempts)) if one is not None]
+                kept = _without_duplicates(here)
+                tally["duplicates"] += len(here) - len(kept)
+                yield kept
+
+    def _next_few(self, quadruples: Iterator[tuple[Attempt, ...]]) -> list[tuple[Attempt, ...]]:
+        """Take the next quadruples, as many as cannot raise the threshold before the last one."""
+        left, limit = MOST_ATTEMPTS, self.kept.limit
+        if limit is not None:
+            left = min(left, limit - len(self.kept.best))
+        group: list[tuple[Attempt, ...]] = []
+        for attempts in quadruples:
+            group.append(attempts)
+            left -= len(attempts)
+            if left <= 0:
+                break
+        return group
+
+    def _in_order(self, blocks: Blocks, places: range) -> Iterator[tuple[Attempt, ...]]:
+        """Yield the attempts on each quadruple: over many blocks with a limit, or one by one."""
+        rooms, make = blocks
+        if self.construction.limits is not None:
+            size = 1 if self.kept.limit is None else TOGETHER
+            for start in range(0, len(places), size):
+                some = places[start : start + size]
+                if float(rooms[some].max()) > self.least:
+                    yield from self.best_first(blocks, some)
             return
-        wide, _ = make(place).ranked(construction, construction.least)
-        some = best_first.in_rows(wide, construction.least)
-        yield from takewhile(lambda _: not search.full, some)
+        worth = self.construction.least
+        for place in places:
+            if self.kept.full:
+                return
+            wide, _ = make(place).ranked(self.construction, worth)
+            yield from takewhile(lambda _: not self.kept.full, self._in_rows(wide, worth))
+
+    def best_first(self, blocks: Blocks, places: range) -> Iterator[tuple[Attempt, ...]]:
+        """Yield the attempts on each quadruple whose bound exceeds the threshold, best first."""
+        rooms, make = blocks
+        queue = [
+            Waiting((-float(rooms[place]), BLOCK, (place,)), partial(self._made, make, place))
+            for place in places
+        ]
+        heapify(queue)
+        while queue:  # each turn takes rows from finite tables, at least one
+            head = heappop(queue)
+            worth = self.least  # it rises while grasps are found
+            if head.bound <= worth:
+                return
+            if head.expand is None:
+                yield head.attempts()
+                continue
+            for item in head.expand(worth, queue[0].bound if queue else worth):
+                heappush(queue, item)
+
+    def _in_rows(self, wide: WideQuadruples, worth: float) -> Iterator[tuple[Attempt, ...]]:
+        """Yield the attempts on quadruples whose bound exceeds `worth`, in the table's order."""
+        for start in range(0, len(wide), SMALLEST_CHUNK):
+            rows = slice(start, start + SMALLEST_CHUNK)
+            coned, bounds = wide.coned(rows).ranked(self.construction)
+            for item in self._tightened(coned, bounds, slice(0, len(coned)), worth):
+                yield item.attempts()
+
+    def _made(
+        self, make: Callable[[int], WideQuadruples], place: int, worth: float, _: float
+    ) -> Expanded:
+        """List a block, and yield one item for it; expanding that chooses cones for some rows."""
+        wide, bounds = make(place).ranked(self.construction, worth)
+
+        def chosen(rows: slice, worth: float) -> Expanded:
+            coned, bounds = wide.coned(rows).ranked(self.construction)
+            closer = coarse(np.asarray(bounds.max(axis=(1, 2), initial=-np.inf)))
+            count = int((closer > worth).sum())
+            tighter = partial(self._tightened, coned.some(np.arange(count)), bounds[:count].copy())
+            yield from _rows(tighter, closer[:count], (place, rows.start), 0, SMALLEST_CHUNK)
+
+        yield from _rows(chosen, coarse(bounds), (place,), 0, SMALLEST_TILT)
+
+    def _tightened(
+        self, coned: ConedQuadruples, bounds: Array, rows: slice, worth: float
+    ) -> Expanded:
+        """Tighten the bounds of some quadruples and yield the ones still above the threshold."""
+        construction, cheap = self.construction, bounds[rows]
+        solved = cheap > worth
+        row, kind, column = np.nonzero(solved)
+        order, at = np.array(construction.orders)[column], rows.start + row
+        tight = np.full(cheap.shape, -np.inf)
+        attempts = Attempts(
+            np.take_along_axis(coned.faces[at], order, axis=1),
+            np.take_along_axis(coned.axes[at, kind], order[:, :, None], axis=1),
+            coned.half_angles[at, kind],
+        )
+        tight[row, kind, column] = self._bounded.of(construction, attempts, worth)
+        # both are upper bounds: the smaller one holds
+        tight = np.minimum(tight, cheap)
+        # no discs even of the least radius: settled here, whatever was found elsewhere
+        none = solved.any(axis=1) & (tight.max(axis=1) <= construction.least)
+        choices, excluded = int(solved.transpose(0, 2, 1)[none].sum()), int(none.sum())
+        tally = self.kept.gathered.tally
+        tally.update(tried=excluded, infeasible=excluded, solved=choices)
+        tight[tight <= worth] = -np.inf
+        best = coarse(np.asarray(np.max(tight, axis=(1, 2)), dtype=np.float64))
+        for each in np.flatnonzero(best > -np.inf).tolist():
+            place = rows.start + each
+            faces = tuple(coned.faces[place].tolist())
+            make = partial(coned.attempts, place, construction, tight[each])
+            yield Waiting((-float(best[each]), QUADRUPLE, faces), None, make)
+
+    def certified(self, attempts: Sequence[Attempt], least: float) -> list[Certified | None]:
+        """Construct and certify a grasp for each attempt; None where there is none."""
+        ends, tally = self._settling.of(attempts, least), self.kept.gathered.tally
+        tally["tried"] += len(attempts)
+        tally["solved"] += sum(end.solved for end in ends)
+        tally["undecided"] += sum(end.failed for end in ends)
+        tally["infeasible"] += sum(not (end.settled or end.failed) for end in ends)
+        family = self.construction.family
+        candidates = [
+            Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
+            for attempt, end in zip(attempts, ends, strict=True)
+            if end.settled is not None
+        ]
+        certified = certify_each(candidates, self.friction)
+        if candidates:
+            axes = np.array([[cone.axis for cone in each.cones] for each in candidates])
+            angles = np.array([[cone.half_angle for cone in each.cones] for each in candidates])
+            spans = each_cones_positively_span(axes, angles).tolist()
+            certified = [one if span else None for one, span in zip(certified, spans, strict=True)]
+        tally["rejected"] += len(candidates) - sum(one is not None for one in certified)
+        placed = iter(certified)
+        return [None if end.settled is None else next(placed) for end in ends]
 
 
-def certified_attempts(
-    settling: Settling, friction: float, attempts: Sequence[Attempt], least: float, tally: Tally
-) -> list[Certified | None]:
-    """Construct and certify a grasp for each attempt; None where there is none."""
-    ends = settling.of(attempts, least)
-    tally["tried"] += len(attempts)
-    tally["solved"] += sum(end.solved for end in ends)
-    tally["undecided"] += sum(end.failed for end in ends)
-    tally["infeasible"] += sum(not (end.settled or end.failed) for end in ends)
-    family = settling.construction.family
-    candidates = [
-        Candidate(named(family[0], attempt.faces), attempt.faces, family, *end.settled)
-        for attempt, end in zip(attempts, ends, strict=True)
-        if end.settled is not None
-    ]
-    certified = certify_each(candidates, friction)
-    if candidates:
-        axes = np.array([[cone.axis for cone in each.cones] for each in candidates])
-        angles = np.array([[cone.half_angle for cone in each.cones] for each in candidates])
-        spans = each_cones_positively_span(axes, angles).tolist()
-        certified = [one if span else None for one, span in zip(certified, spans, strict=True)]
-    tally["rejected"] += len(candidates) - sum(one is not None for one in certified)
-    placed = iter(certified)
-    return [None if end.settled is None else next(placed) for end in ends]
+def _rows(
+    refined: Callable[[slice, float], Expanded],
+    best: Array,
+    place: tuple[int, ...],
+    start: int,
+    least: int,
+) -> Expanded:
+    """Yield one item for a table's rows from `start` on; expanding it refines some of them.
+
+    These are the rows with bounds above that of the next item, within a chunk's size.
+    """
+
+    def expand(worth: float, beyond: float) -> Expanded:
+        larger = int(np.searchsorted(-best[start:], -beyond))
+        stop = min(start + min(max(larger, least), LARGEST_CHUNK), len(best))
+        yield from refined(slice(start, stop), worth)
+        yield from _rows(refined, best, place, stop, least)
+
+    if start < len(best):
+        yield Waiting((-float(best[start]), TABLE, place), expand)
 
 
 def _without_duplicates(found: list[Certified]) -> list[Certified]:
     """Drop each grasp whose contacts are those of a better one; all are on the same faces."""
-    if len(found) < 2:  # noqa: PLR2004 - nothing to compare
-        return found
     kept: list[Certified] = []
     for one in sorted(found, key=best_first):
         here = one.placement.positions[np.argsort(one.faces)]

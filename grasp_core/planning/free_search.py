@@ -25,7 +25,6 @@ from grasp_core.families.placing import (
     Attempt,
     Cones,
     Construction,
-    Settling,
     chosen_shapes,
     on_true_surface,
     point_regions,
@@ -33,10 +32,9 @@ from grasp_core.families.placing import (
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
-from grasp_core.planning.family_search import Gathered, best_first, certified_attempts
+from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSearch, best_first
 from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, cones_around
 from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
-from grasp_core.planning.result import Tally
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
 Pieces: TypeAlias = tuple[FacePiece, ...]
@@ -241,6 +239,6 @@ def _upgraded(
         )
         for order in construction.orders
     ]
-    settling = Settling(construction, shapes)
-    found = certified_attempts(settling, friction, attempts, construction.least, Tally())
+    search = FamilySearch(construction, shapes, friction, MethodSearch(construction.family))
+    found = search.certified(attempts, construction.least)
     return min((one for one in found if one), key=best_first, default=None)

@@ -30,7 +30,7 @@ from grasp_core.kinds import METHODS, Family, Method
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
 from grasp_core.planning.certify import Certified, LateFigures
-from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
+from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSearch
 from grasp_core.planning.free_search import found_on
 from grasp_core.planning.planned_cones import PlannedCones
 from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
@@ -167,7 +167,7 @@ class PlanSearch:
         gathered = Gathered()
         if isinstance(part, Block):
             # with no limit, no grasp raises the threshold: nothing is kept here
-            search = MethodSearch(part.family, None, _unasked, gathered=gathered)
+            search = MethodSearch(part.family, gathered=gathered)
             places = range(part.place, part.place + 1)
             return Found(gathered, self._constructed(part.family, places, search))
         tried = found_on(self.on, part.quadruples, self.request, gathered, again=part.again)
@@ -182,9 +182,9 @@ class PlanSearch:
         self, family: Family, places: range, search: MethodSearch
     ) -> Iterator[list[Certified]]:
         """Yield the grasps of a construction on each quadruple of some blocks, worth keeping."""
-        construction, shapes = CONSTRUCTIONS[family], self.on.shapes
-        friction, blocks = self.request.friction, self.blocks(family)
-        return found_in(construction, shapes, friction, blocks, places, search)
+        shapes, friction = self.on.shapes, self.request.friction
+        over = FamilySearch(CONSTRUCTIONS[family], shapes, friction, search)
+        return over.found_in(self.blocks(family), places)
 
     def blocks(self, family: Family) -> Blocks:
         """Return the blocks for a construction; without bounds it uses cones around normals."""
@@ -282,10 +282,6 @@ def found_elsewhere(given: bytes, part: Part) -> Found:
 def _search_of(given: bytes) -> PlanSearch:
     # the process that started this one packed it
     return PlanSearch.of(*pickle.loads(given))  # noqa: S301
-
-
-def _unasked(_: Certified) -> str:
-    raise AssertionError("parts of a search keep no grasps")
 
 
 def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
