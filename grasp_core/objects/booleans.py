@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import signed_area
-from grasp_core.objects.triangles import Mesh
+from grasp_core.objects.surface import Mesh
 from grasp_core.solvers.ties import graded, largest_first
 
 GRID_DIGITS = 9

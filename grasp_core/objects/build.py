@@ -25,19 +25,17 @@ from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mesh_files.limits import MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.polygons import check_corners, single_rounding, too_many
 from grasp_core.objects.booleans import hull
-from grasp_core.objects.curved_patches import flat_patches
 from grasp_core.objects.planar_faces import (
     MAX_FACES,
     PLANAR,
     coplanar_groups,
+    flat_patches,
     planar_face,
     planar_slack,
 )
-from grasp_core.objects.sheets import check_bounds, outward_sheets
-from grasp_core.objects.shells import check_volume
+from grasp_core.objects.shells import check_bounds, check_volume, outward_sheets
 from grasp_core.objects.sound_surface import sound_surface
-from grasp_core.objects.surface import Face, SoundSurface, Surface
-from grasp_core.objects.triangles import Mesh
+from grasp_core.objects.surface import Face, Mesh, SoundSurface, Surface
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0

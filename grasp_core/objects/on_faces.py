@@ -26,8 +26,7 @@ from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import nearest_on_segments
 from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.surface import Face
-from grasp_core.objects.triangles import areas_and_normals
+from grasp_core.objects.surface import Face, areas_and_normals
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 

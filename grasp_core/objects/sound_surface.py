@@ -21,10 +21,8 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.booleans import triangulate
-from grasp_core.objects.sheets import wound_alike
-from grasp_core.objects.shells import one_solid
-from grasp_core.objects.surface import SoundSurface, Surface
-from grasp_core.objects.triangles import Mesh, components
+from grasp_core.objects.shells import one_solid, wound_alike
+from grasp_core.objects.surface import Mesh, SoundSurface, Surface, components
 
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""

@@ -33,7 +33,7 @@ from grasp_core.objects.face_pieces import FacePiece, FaceShape, choices_near
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
 from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSearch, best_first
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, cones_around
+from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE, cones_around
 from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
 from grasp_core.values import FaceQuadruple, ForceCone, four
 

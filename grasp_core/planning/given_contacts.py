@@ -22,8 +22,7 @@ from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, plane_frame
 from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.surface import Face
-from grasp_core.objects.triangles import areas_and_normals
+from grasp_core.objects.surface import Face, areas_and_normals
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import (

@@ -32,8 +32,7 @@ from grasp_core.objects.standard_order import Standard, clear_of_edges, standard
 from grasp_core.planning.certify import Certified, LateFigures
 from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSearch
 from grasp_core.planning.free_search import found_on
-from grasp_core.planning.planned_cones import PlannedCones
-from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
+from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.request import FAMILIES, PlanRequest
 from grasp_core.planning.result import Outcomes

@@ -11,8 +11,13 @@ from grasp_core.families.disc_bounds import AttemptBounds, corners_of, disc_limi
 from grasp_core.families.placements import LEAST_RADIUS, PAIRINGS, Attempts
 from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
-from grasp_core.planning.quadruples import all_blocks
+from grasp_core.planning.quadruples import (
+    LEAST_SPAN_ANGLE,
+    NORMAL,
+    TILTED,
+    PlannedCones,
+    all_blocks,
+)
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object

@@ -10,8 +10,8 @@ import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
 from grasp_core.objects.booleans import hull
-from grasp_core.objects.curved_patches import clearest_point, clearing, flat_patches
-from grasp_core.objects.triangles import Mesh
+from grasp_core.objects.planar_faces import clearest_point, clearing, flat_patches
+from grasp_core.objects.surface import Mesh
 from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body, inside, met
 
 ROUNDING = 1e-9

@@ -5,7 +5,7 @@ import trimesh
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import coplanar_groups, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.triangles import Mesh, border_loops
+from grasp_core.objects.surface import Mesh, border_loops
 from scenes.example_objects import example_object
 
 

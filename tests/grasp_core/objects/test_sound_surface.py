@@ -11,7 +11,7 @@ import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.objects.booleans import Solid
 from grasp_core.objects.sound_surface import caps_of
-from grasp_core.objects.triangles import Edges, Mesh
+from grasp_core.objects.surface import Edges, Mesh
 from tests.bad_input import mesh_texts
 
 TURN = trimesh.transformations.rotation_matrix(0.7, [3.0, 1.0, 2.0])[:3, :3]

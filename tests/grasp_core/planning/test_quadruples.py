@@ -11,8 +11,14 @@ from grasp_core.cones.tilting import SLIGHT, tilted_cones, widest_half_angles
 from grasp_core.families.disc_bounds import corners_of, widths_apart
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, TILTED, PlannedCones
-from grasp_core.planning.quadruples import LARGEST_BLOCK, all_blocks, spanning_blocks
+from grasp_core.planning.quadruples import (
+    LARGEST_BLOCK,
+    LEAST_SPAN_ANGLE,
+    TILTED,
+    PlannedCones,
+    all_blocks,
+    spanning_blocks,
+)
 from scenes.example_objects import example_object
 from tests.benchmarks.objects import sphere_hull
 from tests.grasp_core.cones.reference_tilting import lowest_heights
