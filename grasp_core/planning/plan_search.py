@@ -27,8 +27,9 @@ from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
 from grasp_core.families.placing import CONSTRUCTIONS, chosen_shapes
 from grasp_core.kinds import METHODS, Family, Method
+from grasp_core.objects.face_pieces import clear_of_edges, with_halves
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
+from grasp_core.objects.standard_order import Standard, standard
 from grasp_core.planning.certify import Certified, LateFigures
 from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSearch
 from grasp_core.planning.free_search import found_on

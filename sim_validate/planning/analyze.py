@@ -30,7 +30,7 @@ from grasp_core.provenance import versions
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
-from grasp_core.records.contacts_json import ContactSet, Overrides, contact_sets_from_json
+from grasp_core.records.grasps_json import ContactSet, Overrides, contact_sets_from_json
 from grasp_core.solvers.ties import first_best
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter

@@ -17,7 +17,7 @@ from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.figures import figures, table
 from grasp_core.files.records import record_of
-from grasp_core.objects.symmetries import Copies, copies_of
+from grasp_core.objects.standard_order import Copies, copies_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing import pages

@@ -11,8 +11,12 @@ from grasp_core.files.records import RecordFile, record_of
 from grasp_core.files.text_files import text_of
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
-from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
-from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.records.grasps_json import (
+    Overrides,
+    contact_sets_from_json,
+    grasps_from_json,
+    plan_to_json,
+)
 from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
