@@ -91,10 +91,7 @@ class Shape:
             object.__setattr__(self, name, value)
 
     def take(self, value: Any) -> NDArray[Any]:
-        """Return a read-only copy of a value as an array of this shape.
-
-        An array that is read-only and owns its entries is kept as it is.
-        """
+        """Return a read-only copy of a value, or itself if it is read-only and owns its entries."""
         if self._fits(value):
             array = value if value.base is None and not value.flags.writeable else np.array(value)
             array.setflags(write=False)
@@ -129,10 +126,7 @@ class Shape:
         return value
 
     def _fits(self, value: Any) -> bool:
-        """Return whether a value is an array of this shape and type, with entries as they must be.
-
-        Ends are not looked at.
-        """
+        """Return whether a value is an array of this shape and type, with entries as must be."""
         if type(value) is not np.ndarray or value.dtype != (np.int64 if self.whole else np.float64):
             return False
         array: NDArray[Any] = value

@@ -260,11 +260,7 @@ def vector(value: Any) -> str:
 
 
 class InNotebooks:
-    """Base of values that show a picture at the end of a notebook's cell.
-
-    A package that stands on this one draws it: `scenes` hands over a function when it is imported,
-    and values ask for it. Without `scenes` notebooks show `repr`.
-    """
+    """Base of values that show a picture at the end of a notebook's cell, if `scenes` draws one."""
 
     __slots__ = ()
 

@@ -172,10 +172,7 @@ def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tu
 
 
 def scalars(record: object) -> Mapping[str, Any]:
-    """Return the plain entries of a record by name: numbers, words, and numbers of items.
-
-    Those of a flat part are among them, if the record has it.
-    """
+    """Return the plain entries of a record and its flat parts: numbers, words, numbers of items."""
     own, properties = entries(type(record))
     found: dict[str, Any] = {}
     for each in (*own, *properties):

@@ -206,10 +206,7 @@ Measured = Annotated[float, Null(math.nan)]
 
 @lru_cache(maxsize=1024)
 def takes(kind: Any, *, exact: bool = False) -> Take:
-    """Return the function that takes values of a kind: lists as tuples, numbers as Python's.
-
-    If `exact`, nothing is converted: a list is no tuple, and an array has the type that it must.
-    """
+    """Return the function that takes values of a kind in plain form; if `exact`, as they are."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin in COMPOUND:
         return COMPOUND[origin](parts, exact)

@@ -78,11 +78,7 @@ class Processes:
         self, function: Callable[[Task], Result], tasks: Iterable[Task], *,
         here: Callable[[Task], Result] | None = None, ahead: int = AHEAD,
     ) -> Generator[Result]:  # fmt: skip
-        """Yield the result of each task, in their order; this process works with the others.
-
-        It does the tasks of processes that end, too. Takes `here`, a function with the same results
-        for tasks that this process does.
-        """
+        """Yield the result of each task, in order; this process helps, by `here` if that is given."""
         coming, line, mine = iter(tasks), deque[_Asked](), here or function
         try:
             while True:
@@ -168,10 +164,7 @@ class Processes:
 
 @contextmanager
 def local_processes(workers: int, patience_s: float = 0.0) -> Generator[Processes]:
-    """Have processes do tasks during a `with` block, and end them after it, whatever they do.
-
-    Takes `patience_s`, the time [s] after which the first process starts, if work is left for it.
-    """
+    """Have processes do tasks during a `with` block; the first starts after `patience_s` [s]."""
     started = Processes(workers, patience_s)
     try:
         yield started
@@ -229,10 +222,7 @@ def _working_folder() -> str:
 
 
 def send(pipe: IO[bytes], value: Any) -> None:
-    """Send one value, after its length in bytes; the other process gets a copy.
-
-    Contiguous arrays keep their bits and stay read-only: protocol 5 writes their memory as it is.
-    """
+    """Send one value, after its length in bytes; protocol 5 keeps the bits of contiguous arrays."""
     message = pickle.dumps(value, protocol=5)
     pipe.write(LENGTH.pack(len(message)))
     pipe.write(message)
@@ -275,10 +265,7 @@ def _result_of(answer: bytes) -> Any:
 
 
 def main() -> None:
-    """Do the tasks that come through standard input, one after the other, until it ends.
-
-    Errors of a task are answers, too.
-    """
+    """Do the tasks that come through standard input until it ends; errors are answers, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
     gc.set_threshold(COLLECTED_AFTER)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")

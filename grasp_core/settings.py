@@ -89,10 +89,7 @@ def named(
     table: object, known: Collection[str], where: str, what: str = "setting",
     usual: Mapping[str, Any] = NONE_USUAL,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return a table of a file by name, if it is one and nothing in it is unknown.
-
-    Names with their `usual` value are left out.
-    """
+    """Return a table of a file by name, without names of `usual` values; refuse unknown names."""
     start = f"{where}: " if where else ""
     if not isinstance(table, Mapping):
         raise InputError(f"{start}expected a table of {what}s, got {shown(table)}")
@@ -116,10 +113,7 @@ def at(where: str, name: str) -> str:
 
 
 def extended(kind: type[Given], part: Settings, **more: Any) -> Given:
-    """Make settings of a class from those of a class that it extends, and from `more`.
-
-    Settings inside them are extended in the same way.
-    """
+    """Make settings of a class, and those inside, from those of a class that it extends."""
     given: dict[str, Any] = {name: getattr(part, name) for name in types(type(part))} | more
     for name, value in given.items():
         own = inside(types(kind)[name], Settings)
@@ -129,10 +123,7 @@ def extended(kind: type[Given], part: Settings, **more: Any) -> Given:
 
 
 def as_table(settings: Settings) -> dict[str, Any]:
-    """Return the settings of users as the table of a file that gives them when it is read.
-
-    What is None is left out, as TOML has no word for it.
-    """
+    """Return the settings of users as a table of a file, which has no word for None."""
     given = {name: getattr(settings, name) for name in for_users(type(settings))}
     return {
         name: as_table(value) if isinstance(value, Settings) else value

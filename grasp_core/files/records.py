@@ -194,13 +194,7 @@ def _plain(value: Any) -> Any:
 
 
 def from_record(kind: type[Record], found: object, where: str = "", **beside: Any) -> Record:
-    """Make a value of an object of JSON; `where` leads to it, such as 'verdicts[0]'.
-
-    `beside` holds fields that are in no file.
-
-    A key that is unknown or missing, a value that the class refuses, and a recorded property that
-    the other fields contradict are errors that name the field.
-    """
+    """Make a value of an object of JSON at a place such as 'verdicts[0]'; faults name the field."""
     own, properties = entries(kind)
     given = named(found, keys(kind), where, "field")
     taken: dict[str, Any] = {}
@@ -329,10 +323,7 @@ def _told(value: Any) -> str:
 
 
 def _differences(said: Any, ours: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield where a file and its other fields say different things: numbers up to rounding.
-
-    Of sentences only the number counts, which another version may word otherwise.
-    """
+    """Yield where a file contradicts itself: numbers beyond rounding, and numbers of sentences."""
     if isinstance(said, list) and isinstance(ours, list):
         theirs, own = cast("list[Any]", said), cast("list[Any]", ours)
         texts = all(isinstance(each, str) for each in (*theirs, *own))

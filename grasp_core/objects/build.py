@@ -236,10 +236,7 @@ def content_hash(points: Array, corners: Indices) -> str:
 
 
 def mass_properties(solid: Mesh, center: Array | None = None) -> tuple[float, Array, Array]:
-    """Compute volume [m^3], centre (3,) [m], inertia (3, 3) [kg m^2] about it, at 1 kg/m^3.
-
-    The centre is that of uniform density, unless it is given.
-    """
+    """Compute volume, centre unless given (3,), inertia about it (3, 3), at 1 kg/m^3."""
     a, b, c = solid.corners.transpose(1, 0, 2)
     areas = np.cross(b - a, c - b)  # normals, as long as twice the area
     total = a + b + c

@@ -67,10 +67,7 @@ face with rounded corners."""
 
 
 def planar_slack(extent: float, flatness_m: float) -> float:
-    """Return the distance within which corners of an object count as in one plane [m].
-
-    `flatness_m` is the distance that rounding explains.
-    """
+    """Return the distance within which corners count as in one plane, if rounding explains some."""
     return max(PLANAR * extent, flatness_m)
 
 
@@ -181,11 +178,7 @@ def flat_patches(surface: Mesh, limits: PatchLimits, caps: Indices = NO_CAPS) ->
 
 
 def _largest_apart(found: list[tuple[float, Face]], most: int, extent: float) -> tuple[Face, ...]:
-    """Keep the patches with the largest discs, and of equal ones those far from each other.
-
-    A ring has dozens of equal patches, and without this rule the first ones would all be on one
-    side.
-    """
+    """Keep the patches with the largest discs, of equal ones, as a ring has, those far apart."""
     sizes = ranks([-radius for radius, _ in found])
     places = np.array([[*face.normal, *(face.centroid / extent)] for _, face in found])
     nearest, left = np.full(len(found), np.inf), np.ones(len(found), dtype=np.bool_)
@@ -356,10 +349,7 @@ def _nearest(point: Array, segments: Array) -> tuple[Array, Array]:
 
 
 def _ellipse(polygon: Array) -> tuple[Array, Array] | None:
-    """Return a polygon's centre, and the map that turns its second moments into a disc's.
-
-    The result is None for a polygon so slender that rounding would distort the map.
-    """
+    """Return the centre and what turns the second moments into a disc's; None if too slender."""
     _, centre = area_and_centroid([polygon])
     after = np.roll(polygon, -1, axis=0)
     corners = np.concatenate([polygon, 0.5 * (polygon + after)]) - centre

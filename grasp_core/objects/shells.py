@@ -367,10 +367,7 @@ def winding_on(corners: Array, places: Indices) -> Array:
 
 
 def solid_angles(axes: Array, points: Array) -> Array:
-    """Return solid angles of triangles seen from points, signed (Van Oosterom & Strackee 1983).
-
-    Triangles are given by coordinates, corners and number, (3, 3, t); found are (points, t).
-    """
+    """Return signed solid angles of triangles (3, 3, t), coordinates first, (points, t)."""
     x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
     lengths = np.sqrt(x * x + y * y + z * z)
     (ax, bx, cx), (ay, by, cy), (az, bz, cz), (a, b, c) = (
@@ -387,11 +384,7 @@ def solid_angles(axes: Array, points: Array) -> Array:
 
 
 def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.bool_]] | None:
-    """Wind triangles like their neighbours; None if the surface has only one side.
-
-    In each part that connects across edges of two triangles, the larger area keeps its winding.
-    Gives the triangles, and which of them were turned.
-    """
+    """Wind triangles as most of their part by area; also say which turned. None if one-sided."""
     edges = Edges.of(corners)
     across, against = edges.neighbours(), edges.against[edges.place].reshape(-1, 3)
     # each triangle counts twice, as it is and turned; those that are wound alike are linked

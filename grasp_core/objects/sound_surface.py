@@ -89,11 +89,7 @@ def _joined(given: Mesh, flatness_m: float, most_parts: int) -> tuple[Mesh, list
 
 
 def _welded_apart(given: Mesh, most: int) -> Mesh | None:
-    """Weld each part of a file by itself, since parts that touch are no longer apart once welded.
-
-    Parts share no vertex in the file. None if there is one part, more than `most`, or if a part
-    does not bound a solid.
-    """
+    """Weld parts without common vertices one by one; None unless all of several bound solids."""
     vertices, triangles = given.vertices, given.triangles
     sides = np.column_stack([triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()])
     _, label = np.unique(components(len(vertices), sides)[triangles[:, 0]], return_inverse=True)

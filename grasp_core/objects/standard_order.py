@@ -262,10 +262,7 @@ class Copies:
 
 
 def symmetries(body: Polyhedron) -> Symmetries:
-    """Find the rotations and reflections that map an object to itself.
-
-    A curved object, or one with more than `MOST_FACES` faces, gets the identity alone.
-    """
+    """Find rotations and reflections of an object; of a curved or finely cut one, the identity."""
     alone = Symmetries(np.eye(3)[None], np.empty((0, 3, 3)))
     if body.patches is not None or len(body.faces) > MOST_FACES:
         return alone
@@ -291,11 +288,7 @@ def symmetries(body: Polyhedron) -> Symmetries:
 
 
 def copies_of(body: Polyhedron, grasps: Sequence[Grasp]) -> tuple[Copies, ...]:
-    """Sort grasps of an object into classes of copies, in the order of each class's first grasp.
-
-    Every grasp is compared with the first grasps of the classes before it, so that each is within
-    the tolerance of the grasp that stands for it.
-    """
+    """Sort grasps into classes of copies of the first grasp of each class, in their order."""
     found = symmetries(body)
     classes: list[Copies] = []
     traits = [_Traits.of(body, grasp) for grasp in grasps]

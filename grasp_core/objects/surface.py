@@ -34,10 +34,7 @@ def crosses_of(corners: Array) -> Array:
 
 
 def areas_and_normals(corners: Array) -> tuple[Array, Array]:
-    """Compute the areas, (t,), and unit normals, (t, 3), of triangles (t, 3, 3).
-
-    Normals point to where the triangles are counter-clockwise; they are zero without an area.
-    """
+    """Compute areas (t,) and unit normals (t, 3) of triangles (t, 3, 3); zero without an area."""
     crosses = crosses_of(corners)
     lengths = np.linalg.norm(crosses, axis=1)
     return 0.5 * lengths, crosses / np.where(lengths > 0.0, lengths, 1.0)[:, None]

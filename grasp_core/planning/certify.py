@@ -210,10 +210,7 @@ the face, `a` or `b`; empty for a whole face."""
 def to_grasp(
     body: Polyhedron, friction: float, found: Certified, on: Standard | None = None
 ) -> Grasp:
-    """Convert a certified placement to a grasp in the object's frame, which has late figures.
-
-    Takes `on`, the reordered copy of the object that it was found on, if it is not the object.
-    """
+    """Convert a certified placement, found on a reordered copy if given, to one of the object."""
     name, faces, order = (found.id, found.faces, ORDER) if on is None else _named(found, on)
     flip = FLIP if on is not None and on.mirrored else UNMIRRORED
     center, radius, placement = body.center_of_mass, body.radius, found.placement

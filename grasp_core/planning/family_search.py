@@ -183,10 +183,7 @@ class FamilySearch:
         return max(worst * (1.0 + SAME_MERIT), self.construction.least)
 
     def found_in(self, blocks: Blocks, places: range) -> Iterator[list[Certified]]:
-        """Try the construction on some of the blocks; yield the grasps found on each quadruple.
-
-        Whoever keeps them does so before asking for the next: that raises the threshold.
-        """
+        """Yield the grasps on each quadruple of some blocks, to be kept before the next ones."""
         tally, quadruples = self.kept.gathered.tally, self._in_order(blocks, places)
         while group := self._next_few(quadruples):
             least = self.least
@@ -331,10 +328,7 @@ def _rows(
     start: int,
     least: int,
 ) -> Expanded:
-    """Yield one item for a table's rows from `start` on; expanding it refines some of them.
-
-    These are the rows with bounds above that of the next item, within a chunk's size.
-    """
+    """Yield one item for a table's rows from `start` on; expanding it refines the next chunk."""
 
     def expand(worth: float, beyond: float) -> Expanded:
         larger = int(np.searchsorted(-best[start:], -beyond))

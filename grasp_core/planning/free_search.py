@@ -100,10 +100,7 @@ class _FreeSearch:
         return found
 
     def placed_on(self, faces: FaceQuadruple, known: ClosureCertificate | None) -> Placed | None:
-        """Find contacts on four faces; if there are none, record the proof or that it is open.
-
-        `known` is the certificate of contacts at all corners of the faces' hulls, if there is one.
-        """
+        """Find contacts on four faces, or record why there are none; `known` is of their hulls."""
         on, gathered = self.on, self.gathered
         chosen = chosen_shapes(on.shapes, faces)
         answers = self._answers(faces, chosen, known)

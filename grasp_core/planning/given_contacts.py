@@ -84,10 +84,7 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
-    """Make a grasp of four contacts, or return the proof that they are not in force closure.
-
-    The grasp has no contact regions, and its family is `regulus`, the most general one.
-    """
+    """Make a grasp without regions of four contacts, or return the proof that there is none."""
     body = seated.body
     positions = np.array([contact.position for contact in seated.contacts])
     normals = np.array([contact.normal for contact in seated.contacts])

@@ -122,10 +122,7 @@ class PlanSearch:
             progress(total, total, found)
 
     def _steps(self) -> Iterator[tuple[int, list[Certified]]]:
-        """Yield, for each quadruple tried, how many are finished at least, and its grasps.
-
-        With a limit, only grasps that are among the best when they are found.
-        """
+        """Yield, for each quadruple tried, how many are finished at least, and its grasps."""
         limit, dealt_with, kept_so_far = self.request.searched, 0, list[int]()
         families: list[Family] = [method for method in self.methods if method != "free"]
         places = {family: range(len(self.blocks(family)[0])) for family in families}
@@ -204,10 +201,7 @@ class PlanSearch:
         return around_normals, kept(all_blocks(cones, whole, on.shared), KEPT_BLOCKS)
 
     def _batches(self, size: int, held: AbstractSet[FaceQuadruple]) -> Iterator[Batch]:
-        """Yield the quadruples that hold no grasp yet and have room for contacts, in batches.
-
-        Those with two halves of a face come last.
-        """
+        """Yield quadruples with room that hold no grasp yet, in batches; halves come last."""
         shapes = self.on.shapes
         whole = combinations(range(len(self.on.faces)), FINGERS)
         quadruples = chain(whole, map(four, self.on.shared.tolist()))
@@ -270,10 +264,7 @@ def _reached(body: Polyhedron, finger: Finger | None, found: Certified) -> Certi
 
 
 def found_elsewhere(given: bytes, part: Part) -> Found:
-    """Search one part to its end in another process, which tells its time.
-
-    Takes `given`, the pickled object and request, which are the same for all parts.
-    """
+    """Search one part of the pickled search to its end in another process, which tells its time."""
     begun, found = time.process_time(), _search_of(given).found_at_once(part)
     return replace(found, seconds=time.process_time() - begun)
 
@@ -285,10 +276,7 @@ def _search_of(given: bytes) -> PlanSearch:
 
 
 def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
-    """Return how many processes are worth starting beside this one.
-
-    A search with a limit needs the grasps of each block before the next, so it has one process.
-    """
+    """Return how many more processes are worth starting; none with a limit, which needs order."""
     if jobs < 2 or request.searched is not None:  # noqa: PLR2004 - nobody beside this one
         return 0
     worth = math.comb(len(body.faces), FINGERS) // QUADRUPLES_PER_PROCESS
@@ -351,12 +339,7 @@ TIP_RADIUS = 0.1
 def chosen(
     body: Polyhedron, lists: Sequence[Sequence[Certified]], request: PlanRequest
 ) -> list[Certified]:
-    """Select the grasps to return, the best first.
-
-    By radius, families take turns: the best of each, then the second of each, and so on. By another
-    measure all grasps compete. `diverse` begins with the largest discs and goes on with the grasp
-    that is farthest from all before it.
-    """
+    """Select the grasps to return, the best first; by radius, families take turns."""
     every = _largest_first(chain.from_iterable(lists))
     if request.rank_by == "radius":
         families = [[one for one in every if one.family == family] for family in FAMILIES]
@@ -391,11 +374,7 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
 def _carried(
     body: Polyhedron, points: Array, normals: Array, friction: float, finger: Finger | None
 ) -> float:
-    """Return the mass that the best squeeze of contacts survives in any orientation [kg].
-
-    It is certified, in the linear model; zero where no squeeze holds. Takes contact points about
-    the centre of mass.
-    """
+    """Return the mass that the best squeeze proves to survive in any orientation, or 0 [kg]."""
     count, tip = len(points), TIP_RADIUS * body.radius if finger is None else finger.radius_m
     start = Grip(
         points, normals, np.full(count, friction), np.zeros((count, 3)),

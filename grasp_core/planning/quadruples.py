@@ -99,10 +99,7 @@ class PlannedCones:
         return angle_limits(extent, widths, widest)
 
     def chosen(self, quads: Indices) -> tuple[Array, Array, Array]:
-        """Choose cones around normals and tilted: axes (q, 2, 4, 3), half-angles or 0 (q, 2).
-
-        Also gives upper bounds on the discs of both, (q, 2, 4), see `disc_limits`.
-        """
+        """Choose both kinds of cones: axes (q, 2, 4, 3), half-angles (q, 2), limits (q, 2, 4)."""
         normals, thetas = self.normals[quads], self._thetas[quads]
         axes = [normals, normals]
         half_angles = [_around(span_sines(normals), thetas), np.zeros(len(quads))]
@@ -212,11 +209,7 @@ class ConedQuadruples:
         return ConedQuadruples(*(getattr(self, each.name)[rows] for each in fields(self)))
 
     def ranked(self, construction: Construction) -> tuple["ConedQuadruples", Array]:
-        """Order the rows by their upper bounds on discs; for reguli, by the width of the cones.
-
-        Gives the quadruples worth a program, and a bound for each choice of cones and finger order,
-        (q, 2, orders) [object radii]: minus infinity where an attempt is not worth a program.
-        """
+        """Order what is worth a program; also bound each choice and order, (q, 2, orders), or -inf."""
         bounds = self._bounds(construction)
         best = bounds.max(axis=(1, 2), initial=-np.inf)
         promise = self.half_angles[:, NORMAL] if construction.limits is None else best
@@ -292,11 +285,7 @@ class WideQuadruples:
         return ConedQuadruples(faces, normals, *self.cones.chosen(faces), rooms)
 
     def ranked(self, construction: Construction, worth: float) -> tuple["WideQuadruples", Array]:
-        """Order the rows by the discs that their widest cones allow; drop those below `worth`.
-
-        Gives the quadruples, and upper bounds on their discs, (q,) [object radii]; infinite for
-        reguli, which have none.
-        """
+        """Order the rows by upper bounds on their discs, (q,); drop those below `worth`."""
         rooms, bounds = self.rooms, np.full(len(self), np.inf)
         promise = self.widest
         if construction.limits is not None:

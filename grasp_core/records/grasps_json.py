@@ -109,11 +109,7 @@ def plan_to_json(body: Polyhedron, plan: Plan) -> str:
 
 
 def grasps_from_json(text: str) -> Plan:
-    """Read the text of a `grasps.json` as the plan that was written.
-
-    A file keeps neither times nor what is known of face quadruples without grasps: `absences`,
-    `undecided` and `unreached` are empty. Written again, the plan gives the same text.
-    """
+    """Read a `grasps.json` as the plan that was written, without what files do not keep."""
     found = object_of(text, "grasps.json", schema=SCHEMA)
     del found["schema"]
     body = from_record(RecordedObject, found.pop("object", None), "object").body()

@@ -209,11 +209,7 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
 
 
 def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
-    """Close fingers on the contacts, and plan the loads that can be applied to them.
-
-    Gives also where the fingertips stand; none for contacts without force closure, whose fingertips
-    may overlap.
-    """
+    """Close fingers on contacts and plan their loads; also give contacts whose tips have room."""
     body, contacts, friction = recorded.body, recorded.contacts, recorded.friction
     setup = recorded.setup
     if recorded.control is not None:

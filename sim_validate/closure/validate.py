@@ -142,10 +142,7 @@ def tested(
 def held_wrenches(
     rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda, overlap: Sequence[str] = ()
 ) -> tuple[WrenchVerdict, ...]:
-    """Judge the hold of every load and, if asked for, find its limit.
-
-    What fingertips overlap at the start, if anything, is given in words.
-    """
+    """Judge the hold of every load, from overlaps in words, and find its limit if asked for."""
     limits = [planned.limit for planned in loads]
     traces = rig.hold([planned.load for planned in loads])
     found: Sequence[SimulatedLimit | None] = [None] * len(limits)

@@ -175,11 +175,7 @@ def say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
 
 
 def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
-    """Find the largest mass in any orientation.
-
-    There is none for a hand whose motors or links are not known well enough, and for a grasp in
-    which motors cannot carry their links.
-    """
+    """Find the mass held in any orientation; None if the hand is not known well enough or weak."""
     unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
     if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
         return None

@@ -71,10 +71,7 @@ def plan_object(
 def improved(
     body: Polyhedron, found: Plan, planning: command_flags.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
-    """Move the contacts of each grasp to raise its quality; return the new plan, best first.
-
-    The plan keeps only one of several grasps that end at the same contacts.
-    """
+    """Move contacts to raise the quality; keep one of grasps that end alike, the best first."""
     results = each(partial(_improve, body, planning), found.grasps, jobs=jobs)
     done = list(
         reporter.counted(

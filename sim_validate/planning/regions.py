@@ -303,10 +303,7 @@ def certified(
     body: Polyhedron, grasps: Sequence[Grasp], friction: float, asked: Certifying, *,
     folder: Path | None, jobs: int, reporter: Reporter,
 ) -> Regions:  # fmt: skip
-    """Certify regions of grasps, in order; write each proof when it is ready, then regions.json.
-
-    Nothing is written if `folder` is None.
-    """
+    """Certify regions in order, and write each proof when it is ready, if there is a folder."""
     proofs = each(partial(_certify, body, friction, asked), grasps, jobs=jobs)
 
     def recorded() -> Iterator[GraspRegions]:
