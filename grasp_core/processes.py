@@ -78,7 +78,7 @@ class Processes:
         self, function: Callable[[Task], Result], tasks: Iterable[Task], *,
         here: Callable[[Task], Result] | None = None, ahead: int = AHEAD,
     ) -> Generator[Result]:  # fmt: skip
-        """Yield the result of each task, in order; this process helps, by `here` if that is given."""
+        """Yield the result of each task, in order; this process helps, by `here` if given."""
         coming, line, mine = iter(tasks), deque[_Asked](), here or function
         try:
             while True:

@@ -209,7 +209,7 @@ class ConedQuadruples:
         return ConedQuadruples(*(getattr(self, each.name)[rows] for each in fields(self)))
 
     def ranked(self, construction: Construction) -> tuple["ConedQuadruples", Array]:
-        """Order what is worth a program; also bound each choice and order, (q, 2, orders), or -inf."""
+        """Order what is worth a program; bound each choice and order, (q, 2, orders), or -inf."""
         bounds = self._bounds(construction)
         best = bounds.max(axis=(1, 2), initial=-np.inf)
         promise = self.half_angles[:, NORMAL] if construction.limits is None else best
