@@ -71,12 +71,10 @@ class Shape:
     """
 
     shape: tuple[int | str | None, ...]
-    units: bool = False
-    """Whether vectors along the last axis have length one."""
+    units: bool = False  # whether vectors along the last axis have length one
     slack: float = UNIT_SLACK
     """How far a length may be from one in an array that is not taken but looked at."""
-    whole: bool = False
-    """Whether entries are whole numbers from 0 up."""
+    whole: bool = False  # whether entries are whole numbers from 0 up
     least: float = -LARGEST_ENTRY
     most: float = LARGEST_ENTRY
     nan: bool = False

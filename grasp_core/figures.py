@@ -45,8 +45,7 @@ class Compared:
 
     worse: Worse | None = changed
     """Whether a change is for the worse; None for a figure that is kept without being compared."""
-    words: str = ""
-    """What messages call it, if not by its name."""
+    words: str = ""  # what messages call it, if not by its name
     items: tuple[str, str] | None = None
     """What messages say of items that came into a list of faults, and of those that left it; None
     for a list of which only the number of items is kept."""
@@ -54,10 +53,8 @@ class Compared:
     """Whether the number comes from the analysis, which depends less on rounding."""
     friction: bool = False
     """Whether it is a friction, which other shapes of a part change by a share of the friction."""
-    follows: bool = False
-    """Whether it also changes where a wrench is now held, or no longer."""
-    of_part: bool = False
-    """Whether another shape of the part may change it."""
+    follows: bool = False  # whether it also changes where a wrench is now held, or no longer
+    of_part: bool = False  # whether another shape of the part may change it
     close: str = ""
     """Name of the figure that says where rounding may decide: whether it does, or for which items
     of a list."""
@@ -70,12 +67,9 @@ BY_DEFAULT = Compared()
 class Shown:
     """How tables and pages show a figure."""
 
-    heading: str
-    """A few words above the column."""
-    form: str = ".4g"
-    """Format of a number."""
-    times: float = 1.0
-    """Factor on a number, such as 1e6 for micrometres."""
+    heading: str  # a few words above the column
+    form: str = ".4g"  # format of a number
+    times: float = 1.0  # factor on a number, such as 1e6 for micrometres
     infinite: str = "never"
     """What stands for an infinite number: most figures are multiples at which something happens."""
     compared: Compared | None = BY_DEFAULT

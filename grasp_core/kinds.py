@@ -70,8 +70,7 @@ class Range:
     least: float | None = None
     below: float | None = None
     most: float | None = None
-    where: str = ""
-    """What the ends are, for messages that name them."""
+    where: str = ""  # what the ends are, for messages that name them
 
     def holds(self, value: float) -> bool:
         """Return whether a number is in the range."""

@@ -68,8 +68,7 @@ class Entry(NamedTuple):
     kind: Any
     default: Any
     write: Convert
-    read: Read | None
-    """Makes values of JSON for the constructor; None if it takes them as they are."""
+    read: Read | None  # makes values of JSON for the constructor; None if it takes them as they are
     flat: type | None
     """The class whose keys stand among those of the outer record; None for other fields."""
 

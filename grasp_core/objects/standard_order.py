@@ -248,8 +248,7 @@ class Symmetries(Declared):
 class Copies:
     """Places, in a list, of grasps that symmetries of the object map to one another."""
 
-    first: int
-    """Place of the grasp that stands for all of them, the first in the list."""
+    first: int  # place of the grasp that stands for all of them, the first in the list
     rotated: tuple[int, ...] = ()
     """Places of the grasps that a rotation of the object maps the first to."""
     mirrored: tuple[int, ...] = ()

@@ -76,8 +76,7 @@ class Found:
     """What a part of a search holds."""
 
     gathered: Gathered  # proofs and counts, complete once all grasps were taken
-    grasps: Iterable[list[Certified]]
-    """Grasps on each quadruple that was tried."""
+    grasps: Iterable[list[Certified]]  # grasps on each quadruple that was tried
     seconds: float = 0.0
     """Processor time of another process [s]; zero for parts found in this process."""
 
@@ -86,10 +85,8 @@ class Found:
 class PlanSearch:
     """The search for grasps of one object: what is asked for, and what each method has found."""
 
-    body: Polyhedron
-    """The object as it was given."""
-    on: Standard
-    """The object as the planner works on it."""
+    body: Polyhedron  # the object as it was given
+    on: Standard  # the object as the planner works on it
     request: PlanRequest
     methods: dict[Method, MethodSearch]
     """The search of each method that is asked for; the free method comes last."""

@@ -265,8 +265,7 @@ class Overrides:
     """Friction of contacts that have no friction of their own, in place of the file's."""
     torque_scale: float | None = None
     """Torque scale [m], in place of the file's or of the object's radius."""
-    outward: bool = False
-    """Whether the file's normals point out of the object."""
+    outward: bool = False  # whether the file's normals point out of the object
 
 
 def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tuple[ContactSet, ...]:

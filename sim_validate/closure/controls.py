@@ -146,8 +146,7 @@ class ControlLoad:
 
     name: str
     load: Load
-    settling: float
-    """Friction coefficient while the object settles, before the load is applied."""
+    settling: float  # friction coefficient while the object settles, before the load is applied
     required_friction: float | None
 
 

@@ -47,8 +47,7 @@ class Wanted:
     grasp: str | None = None
     control: str | None = None
     """Name of a negative control (contacts that must fail) made from the grasp."""
-    trial: int | None = None
-    """Number of a repeat with noise; None for the trials without noise."""
+    trial: int | None = None  # number of a repeat with noise; None for the trials without noise
     grasps: Path | None = None
     """The `grasps.json` that verdicts are about, if it is not beside them."""
 
@@ -64,8 +63,7 @@ class Recorded:
     setup: Setup
     agenda: Agenda
     control: str | None = None
-    grasp: Grasp | None = None
-    """The planned grasp that has these contacts; None if it is not known."""
+    grasp: Grasp | None = None  # the planned grasp that has these contacts; None if it is not known
     trial: int | None = None
     outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
     others: str | None = None

@@ -326,8 +326,7 @@ class Disturbed:
     contacts: tuple[Contact, ...]
     missed: tuple[int, ...]
     friction: float
-    mass: float
-    """Mass of the trial, relative to the planned mass."""
+    mass: float  # mass of the trial, relative to the planned mass
 
 
 def disturbed(

@@ -61,8 +61,7 @@ class ReachJob:
     body: Polyhedron
     friction: float
     asked: ReachSettings
-    simulated: bool = False
-    """Whether the hand is also to hold test wrenches with its motors."""
+    simulated: bool = False  # whether the hand is also to hold test wrenches with its motors
     execution: ExecutionSettings | None = None
     """Settings with which it is also to execute the grasp."""
 
