@@ -50,29 +50,19 @@ may be off by the root of three, and a plane through three of them as far from a
 COARSEST = 1e-3
 """Largest distance from a plane, relative to the extent, that is explained by rounding: in a file
 that is coarser than this, shapes and rounding cannot be told apart."""
-DEFAULT_LIMITS = MeshLimits()
-
-
-DEFAULT_CHOICES = MeshChoices()
+DEFAULT_LIMITS, DEFAULT_CHOICES = MeshLimits(), MeshChoices()
 
 
 def build(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    choices: MeshChoices,
-    *,
-    rounding: float | None = None,
-    center_of_mass: ArrayLike | None = None,
-    known: Surface | None = None,
-) -> dict[str, Any]:
+    vertices: ArrayLike, triangles: ArrayLike, choices: MeshChoices, rounding: float | None,
+    center_of_mass: ArrayLike | None, known: Surface | None,
+) -> dict[str, Any]:  # fmt: skip
     """Check a triangle mesh and find its faces; return the fields of a `Polyhedron`."""
     points, corners = _checked_arrays(vertices, triangles, choices.max_triangles)
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     off = single_rounding(points) if rounding is None else rounding
     blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
-    most, largest = choices.max_parts, choices.largest_part
-    mesh = Mesh(points, corners)
-    found = sound_surface(mesh, blur, most_parts=most, largest_part=largest, known=known)
+    found = sound_surface(Mesh(points, corners), blur, choices, known)
     slack = planar_slack(extent, blur)
     groups = _planar_groups(found, slack, blur, choices)
     fault = found.edges.fault()
@@ -81,7 +71,7 @@ def build(
     if found.surface.closed:
         check_bounds(found)
     else:
-        found = outward_sheets(found, largest_part=largest)
+        found = outward_sheets(found, largest_part=choices.largest_part)
     patches = None
     if groups is None:
         patches = choices.patches

@@ -72,14 +72,9 @@ def planar_slack(extent: float, flatness_m: float) -> float:
 
 
 def coplanar_groups(
-    mesh: Mesh,
-    distance: float,
-    *,
-    angle: float = ANGLE,
-    blur: float = 0.0,
-    caps: Indices = NO_CAPS,
-    most: int | None = None,
-) -> list[Indices]:
+    mesh: Mesh, distance: float, *, angle: float = ANGLE, blur: float = 0.0,
+    caps: Indices = NO_CAPS, most: int | None = None,
+) -> list[Indices]:  # fmt: skip
     """Group triangles that lie in one plane within the limits and connect across edges, (g,) each.
 
     Groups are in the order of their first triangle, and do not depend on the winding. Not all of

@@ -220,9 +220,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
 ) -> AnyPolyhedron:
     """Check a triangle mesh and build the polyhedron of its faces."""
     value_of(str, name, "name")
-    made = build(
-        vertices, triangles, choices, rounding=rounding, center_of_mass=center_of_mass, known=known
-    )
+    made = build(vertices, triangles, choices, rounding, center_of_mass, known)
     return kind(name=name, source_sha256=source_sha256 or made["content_sha256"], **made)
 
 

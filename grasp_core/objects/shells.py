@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
+from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.booleans import Solid, intersection_volume, union
 from grasp_core.objects.surface import (
     NO_CAPS,
@@ -89,7 +90,7 @@ class _Body(Solid):
         return parts
 
 
-def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSurface:
+def one_solid(found: SoundSurface, choices: MeshChoices) -> SoundSurface:
     """Orient the shells of a closed surface outwards, and make one solid of them."""
     triangles, said = found.triangles, list[str]()
     check_volume(found)
@@ -98,7 +99,7 @@ def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSur
         said.append("the mesh was inside out; its triangles were turned")
     whole = _Body(found.vertices, triangles, np.arange(len(triangles)))
     shells = whole.parts()
-    if (count := len(shells)) > most:
+    if (count := len(shells)) > (most := choices.max_parts):
         raise MeshError(
             MeshRefusal.SEPARATE,
             f"the mesh has {count} parts, more than the limit of {most}; give one solid",
@@ -107,7 +108,7 @@ def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSur
     if count == 1:
         return as_it_is
     try:
-        kept, dropped, changed = _of_many(shells, abs(found.volume), largest_part=largest_part)
+        kept, dropped, changed = _of_many(shells, abs(found.volume), choices.largest_part)
     except InputError as error:
         if isinstance(error, MeshError):
             raise
@@ -120,7 +121,7 @@ def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSur
 
 
 def _of_many(
-    shells: list[_Body], volume: float, *, largest_part: bool
+    shells: list[_Body], volume: float, largest_part: bool
 ) -> tuple[_Body, float, list[str]]:
     """Return the one body to use, the share of the area left out, and what else was changed."""
     said = list[str]()

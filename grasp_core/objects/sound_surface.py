@@ -20,6 +20,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.geometry.polygons import plane_frame
+from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.booleans import triangulate
 from grasp_core.objects.shells import one_solid, wound_alike
 from grasp_core.objects.surface import Mesh, SoundSurface, Surface, components
@@ -35,16 +36,11 @@ keeps 6e-8, and vertices that were equal before are equal to the last bit."""
 
 
 def sound_surface(
-    given: Mesh,
-    flatness_m: float,
-    *,
-    most_parts: int,
-    largest_part: bool,
-    known: Surface | None = None,
+    given: Mesh, flatness_m: float, choices: MeshChoices, known: Surface | None
 ) -> SoundSurface:
     """Make one surface of triangles."""
     if known is None:
-        mesh, said = _joined(given, flatness_m, most_parts)
+        mesh, said = _joined(given, flatness_m, choices.max_parts)
         surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
         if mesh.edges.fault():
             mesh, surface = _capped(mesh, surface)
@@ -58,7 +54,7 @@ def sound_surface(
     # a volume is enclosed where edges are run along as often in both directions
     closed = not mesh.edges.balance.any()
     found = SoundSurface(mesh.vertices, mesh.triangles, replace(surface, closed=closed))
-    return one_solid(found, most=most_parts, largest_part=largest_part) if closed else found
+    return one_solid(found, choices) if closed else found
 
 
 def _joined(given: Mesh, flatness_m: float, most_parts: int) -> tuple[Mesh, list[str]]:

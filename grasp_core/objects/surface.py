@@ -26,6 +26,8 @@ NO_CAPS = np.empty(0, dtype=np.int64)
 
 Plane: TypeAlias = tuple[Array, Array]
 """A plane by its unit normal and a point on it, (3,) each."""
+Fit: TypeAlias = Callable[[Indices, Plane], NDArray[np.bool_]]
+"""A function that tells which of some triangles fit a plane, (t,)."""
 
 
 def crosses_of(corners: Array) -> Array:
@@ -103,13 +105,9 @@ class Mesh:
         return mean / length, middle
 
     def groups(
-        self,
-        seeds: Iterable[int],
-        first_plane: Callable[[int], Plane],
-        fit: Callable[[Indices, Plane], NDArray[np.bool_]],
-        fits: int,
+        self, seeds: Iterable[int], first_plane: Callable[[int], Plane], fit: Fit, fits: int,
         caps: Indices,
-    ) -> Iterator[tuple[Indices, Plane]]:
+    ) -> Iterator[tuple[Indices, Plane]]:  # fmt: skip
         """Yield the triangles of each group, and its plane; no triangle is in two groups.
 
         A group grows over the triangles that `fit` its plane, `fits` times, each time with a plane
@@ -132,13 +130,7 @@ class Mesh:
                 free[group[0]] = False
                 yield group
 
-    def _grown(
-        self,
-        seed: int,
-        plane: Plane,
-        fit: Callable[[Indices, Plane], NDArray[np.bool_]],
-        free: NDArray[np.bool_],
-    ) -> Indices:
+    def _grown(self, seed: int, plane: Plane, fit: Fit, free: NDArray[np.bool_]) -> Indices:
         """Collect the free triangles near a plane that connect with a seed; leaves `free` as is."""
         near, members = np.array([seed]), list[Indices]()
         while len(near := near[fit(near, plane)]):

@@ -322,12 +322,9 @@ class FamilySearch:
 
 
 def _rows(
-    refined: Callable[[slice, float], Expanded],
-    best: Array,
-    place: tuple[int, ...],
-    start: int,
+    refined: Callable[[slice, float], Expanded], best: Array, place: tuple[int, ...], start: int,
     least: int,
-) -> Expanded:
+) -> Expanded:  # fmt: skip
     """Yield one item for a table's rows from `start` on; expanding it refines the next chunk."""
 
     def expand(worth: float, beyond: float) -> Expanded:

@@ -45,13 +45,9 @@ Placed: TypeAlias = tuple[Pieces, Placement]
 
 
 def found_on(
-    on: Standard,
-    to_try: Sequence[FaceQuadruple],
-    request: PlanRequest,
-    gathered: Gathered,
-    *,
-    again: bool = False,
-) -> Iterator[Certified | None]:
+    on: Standard, to_try: Sequence[FaceQuadruple], request: PlanRequest, gathered: Gathered,
+    again: bool,
+) -> Iterator[Certified | None]:  # fmt: skip
     """Decide quadruples together, or `again` with more parts; yield the grasp on each, or None."""
     if again:
         request = replace(request, max_face_parts=COMPLETE_PARTS)
@@ -161,12 +157,9 @@ class _FreeSearch:
         return answers
 
     def _on_triangles(
-        self,
-        faces: FaceQuadruple,
-        shapes: Sequence[FaceShape],
-        pieces: Pieces,
+        self, faces: FaceQuadruple, shapes: Sequence[FaceShape], pieces: Pieces,
         answer: Placement | Absence | Undecided,
-    ) -> Placed | None:
+    ) -> Placed | None:  # fmt: skip
         """Contacts on the triangles of curved patches; planes without a grasp prove nothing."""
         if isinstance(answer, Placement):
             cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
@@ -190,12 +183,9 @@ class _FreeSearch:
         return math.tan(theta - spread if spread < theta else LEAST_SPAN_ANGLE)
 
     def _place(
-        self,
-        pieces: Pieces,
-        rng: np.random.Generator,
-        restarts: int = RESTARTS,
+        self, pieces: Pieces, rng: np.random.Generator, restarts: int = RESTARTS,
         known: ClosureCertificate | None = None,
-    ) -> Placement | Absence | Undecided:
+    ) -> Placement | Absence | Undecided:  # fmt: skip
         try:
             return place_free(
                 pieces, self._friction(pieces), rng=rng, cells=self.request.max_face_parts,

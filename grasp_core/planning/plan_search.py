@@ -39,7 +39,7 @@ from grasp_core.planning.request import FAMILIES, PlanRequest
 from grasp_core.planning.result import Outcomes
 from grasp_core.processes import Processes
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
-from grasp_core.values import FINGERS, FaceQuadruple, Grasp, four
+from grasp_core.values import FINGERS, FaceQuadruple, four
 
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
@@ -137,8 +137,11 @@ class PlanSearch:
             else:
                 steps = self._constructed(method, places[method], search)
                 found = iter([Found(Gathered(), steps)])
-            yield from enumerate(_timed(_taken(found, search), search), start=dealt_with + 1)
-            _prune(method, search, self.on.quadruples)
+            yield from enumerate(_taken(found, search), start=dealt_with + 1)
+            # each quadruple counts once per order of the fingers
+            orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
+            tally = search.gathered.tally
+            tally["pruned"] = self.on.quadruples * orders - tally["tried"]
             kept_so_far.append(len(search.best))
             dealt_with += self.on.quadruples
         if self.request.complete:
@@ -146,7 +149,7 @@ class PlanSearch:
             open_yet = tuple(search.gathered.undecided)
             search.gathered.undecided.clear()
             found = self.each_found(Batch((faces,), again=True) for faces in open_yet)
-            for grasps in _timed(_taken(found, search), search):
+            for grasps in _taken(found, search):
                 yield dealt_with, grasps
 
     def each_found(self, parts: Iterable[Part]) -> Iterator[Found]:
@@ -164,7 +167,7 @@ class PlanSearch:
             search = MethodSearch(part.family, gathered=gathered)
             places = range(part.place, part.place + 1)
             return Found(gathered, self._constructed(part.family, places, search))
-        tried = found_on(self.on, part.quadruples, self.request, gathered, again=part.again)
+        tried = found_on(self.on, part.quadruples, self.request, gathered, part.again)
         return Found(gathered, ([one] if one else [] for one in tried))
 
     def found_at_once(self, part: Part) -> Found:
@@ -281,20 +284,18 @@ def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
 
 
 def _taken(found: Iterable[Found], search: MethodSearch) -> Iterator[list[Certified]]:
-    """Keep the grasps that parts hold, until the limit; yield those kept of each quadruple."""
+    """Keep the grasps that parts hold, until the limit; yield those kept, and add up the time."""
+    start = time.process_time()
     for each in found:
         if search.full:
-            return
+            break
         for grasps in each.grasps:
-            yield search.keep_each(grasps)
+            kept = search.keep_each(grasps)
+            search.seconds += time.process_time() - start
+            yield kept
+            start = time.process_time()
         search.take(each.gathered, each.seconds)
-
-
-def _prune(method: Method, search: MethodSearch, quadruples: int) -> None:
-    """Count what was not tried; each quadruple counts once per order of the fingers."""
-    orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
-    tally = search.gathered.tally
-    tally["pruned"] = quadruples * orders - tally["tried"]
+    search.seconds += time.process_time() - start
 
 
 def _share(limit: int, before: Sequence[int]) -> int:
@@ -314,17 +315,6 @@ def _without_room(on: Standard) -> int:
     roomy = sum(shape is not None for shape in on.shapes[:whole])
     shared = sum(any(on.shapes[face] is None for face in faces) for faces in on.shared.tolist())
     return math.comb(whole, FINGERS) - math.comb(roomy, FINGERS) + shared
-
-
-def _timed(steps: Iterator[list[Certified]], search: MethodSearch) -> Iterator[list[Certified]]:
-    """Yield each of `steps`, adding the processor time it took to `search.seconds`."""
-    while True:
-        start = time.process_time()
-        step = next(steps, None)
-        search.seconds += time.process_time() - start
-        if step is None:
-            return
-        yield step
 
 
 PUSH_N = 10.0
@@ -362,16 +352,16 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
 
     def lightness(found: Certified) -> float:
         points = body.radius * found.placement.positions
-        return -_carried(body, points, found.normals, request.friction, request.finger)
+        return -carried(body, points, found.normals, request.friction, request.finger)
 
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
     return lightness, 2.0 * GAP
 
 
-def _carried(
+def carried(
     body: Polyhedron, points: Array, normals: Array, friction: float, finger: Finger | None
 ) -> float:
-    """Return the mass that the best squeeze proves to survive in any orientation, or 0 [kg]."""
+    """Return the mass that the best squeeze of points proves to hold, or 0 [kg]."""
     count, tip = len(points), TIP_RADIUS * body.radius if finger is None else finger.radius_m
     start = Grip(
         points, normals, np.full(count, friction), np.zeros((count, 3)),
@@ -381,12 +371,6 @@ def _carried(
         return searched(start, any_direction(1.0), PUSH_N).scale
     except NoForcesError:
         return 0.0
-
-
-def carried(body: Polyhedron, grasp: Grasp, friction: float, finger: Finger | None) -> float:
-    """Return the mass in any orientation that ranks a grasp [kg]; 0 if none is held."""
-    points = grasp.positions - body.center_of_mass
-    return _carried(body, points, grasp.normals, friction, finger)
 
 
 def _largest_first(found: Iterable[Certified]) -> list[Certified]:

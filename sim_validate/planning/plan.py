@@ -167,10 +167,11 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         return Exit.NONE
     reporter.records(f"{len(found.grasps)} grasps of {body.name}", found.grasps)
     if command.planning.rank_by == "payload":  # which is not kept with grasps
-        payloads = [
-            (grasp.id, f"{carried(body, grasp, found.friction, found.finger):.4g}")
-            for grasp in found.grasps[:TABLE_ROWS]
-        ]
+        masses = (
+            carried(body, each.positions - body.center_of_mass, each.normals, found.friction,
+                    found.finger) for each in found.grasps[:TABLE_ROWS]
+        )  # fmt: skip
+        payloads = [(each.id, f"{kg:.4g}") for each, kg in zip(found.grasps, masses, strict=False)]
         reporter.table("what one squeeze carries", ("grasp", "payload kg"), payloads)
     if found.moves:
         show_gains(found.moves, reporter)
