@@ -34,7 +34,7 @@ from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named
 from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSearch, best_first
 from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE, cones_around
-from grasp_core.planning.request import COMPLETE_PARTS, FAMILIES, PlanRequest
+from grasp_core.planning.result import COMPLETE_PARTS, FAMILIES, PlanRequest
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
 Pieces: TypeAlias = tuple[FacePiece, ...]

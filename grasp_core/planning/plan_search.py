@@ -35,8 +35,7 @@ from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSear
 from grasp_core.planning.free_search import found_on
 from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Finger, reach
-from grasp_core.planning.request import FAMILIES, PlanRequest
-from grasp_core.planning.result import Outcomes
+from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
 from grasp_core.processes import Processes
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.values import FINGERS, FaceQuadruple, four

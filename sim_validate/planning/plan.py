@@ -20,8 +20,7 @@ from grasp_core.kinds import METHODS
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.plan_search import carried
 from grasp_core.planning.planner import plan
-from grasp_core.planning.request import methods_for
-from grasp_core.planning.result import Moved, Plan
+from grasp_core.planning.result import Moved, Plan, methods_for
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types

@@ -12,7 +12,7 @@ from grasp_core.planning import family_search as promising_module
 from grasp_core.planning.family_search import SAME_MERIT, FamilySearch, MethodSearch
 from grasp_core.planning.plan_search import in_standard_order
 from grasp_core.planning.quadruples import PlannedCones, all_blocks
-from grasp_core.planning.request import PlanRequest
+from grasp_core.planning.result import PlanRequest
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
 from tests.grasp_core.quadruples import leave_all
