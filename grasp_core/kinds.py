@@ -226,12 +226,8 @@ def _if(allowed: Callable[[Any], bool]) -> Take:
 
 
 def _literal(parts: tuple[Any, ...], _exact: bool) -> Take:
-    def take(value: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, str | int) or value not in parts:
-            raise UnfitError
-        return value
-
-    return take
+    return _if(lambda value: type(value) is not bool and isinstance(value, str | int)
+               and value in parts)  # fmt: skip
 
 
 def _narrowed(parts: tuple[Any, ...], exact: bool) -> Take:
@@ -304,14 +300,9 @@ def _path(value: Any) -> Path:
     return Path(value)
 
 
-def _none(value: Any) -> None:
-    if value is not None:
-        raise UnfitError
-
-
 PLAIN: Mapping[Any, Take] = {
     Any: lambda value: value, float: _numbers(endless=False), int: _whole, Path: _path,
-    type(None): _none, bool: _if(lambda value: isinstance(value, bool)),
+    type(None): _if(lambda value: value is None), bool: _if(lambda value: isinstance(value, bool)),
     str: _if(lambda value: isinstance(value, str)),
 }  # fmt: skip
 EXACT: Mapping[Any, Take] = {
@@ -404,12 +395,8 @@ def _words_of_items(origin: type, parts: tuple[Any, ...]) -> str:
     if any(part != parts[0] for part in parts):
         return f"{len(parts)} items: {', '.join(map(words, parts))}"
     each = "" if parts[0] is float else f", each {words(parts[0])}"
-    return f"{len(parts)} {'numbers' if _is_number(parts[0]) else 'items'}{each}"
-
-
-def _is_number(kind: Any) -> bool:
-    inner = get_args(kind)[0] if get_origin(kind) is Annotated else kind
-    return inner in (float, int)
+    inner = get_args(parts[0])[0] if get_origin(parts[0]) is Annotated else parts[0]
+    return f"{len(parts)} {'numbers' if inner in (float, int) else 'items'}{each}"
 
 
 def inside(kind: Any, wanted: type) -> Any:

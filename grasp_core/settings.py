@@ -38,8 +38,10 @@ class Settings(Declared):
         that the class refuses are errors that name the setting. What the program chooses may stand
         in a table with its usual value, as records have it.
         """
-        given = named(table, for_users(cls), where, usual=_chosen(cls))
-        for each in fields(cast("Any", cls)):
+        users, every = for_users(cls), fields(cast("Any", cls))
+        chosen = {each.name: default_of(each) for each in every if each.name not in users}
+        given = named(table, users, where, usual=chosen)
+        for each in every:
             inner = inside(types(cls)[each.name], Settings)
             if each.name in given and inner is not None:
                 own = default_of(each) if usual is None else getattr(usual, each.name)
@@ -73,13 +75,6 @@ def placed(error: InputError, where: str) -> InputError:
 def for_users(kind: type) -> tuple[str, ...]:
     """Return the names of the settings that users choose, in a file or by flags."""
     return tuple(name for name, each in types(kind).items() if CHOSEN not in get_args(each))
-
-
-def _chosen(kind: type) -> dict[str, Any]:
-    """Return the usual values of the settings that the program chooses."""
-    users = for_users(kind)
-    every = fields(cast("Any", kind))
-    return {each.name: default_of(each) for each in every if each.name not in users}
 
 
 NONE_USUAL: Mapping[str, Any] = {}

@@ -89,13 +89,13 @@ def standard(body: Polyhedron) -> Standard:
     """Put an object into standard order and handedness, which depend on its shape alone."""
     images = (body, mirror_image(body))
     views = ((image, flag_frame(image, *flag)) for image in images for flag in _rarest_flags(image))
-    first = min(((_looks(image, frame), image, frame) for image, frame in views), default=None,
-                key=lambda view: view[0])  # fmt: skip
+    seen = ((_cells(image, frame), image, frame) for image, frame in views)
+    first = min(seen, default=None, key=lambda view: sorted(view[0].tolist()))
     if first is None:
         faces = tuple(range(len(body.faces)))
         return Standard(body, faces, mirrored=False, owners=faces)
-    _, image, frame = first
-    order: list[int] = np.lexsort(_cells(image, frame).T[::-1]).tolist()
+    cells, image, frame = first
+    order: list[int] = np.lexsort(cells.T[::-1]).tolist()
     extent = float(np.ptp(body.vertices, axis=0).max())
     slack = planar_slack(extent, body.surface.flatness_m)
     faces = tuple(_relisted(image.faces[face], image, frame, slack) for face in order)
@@ -177,11 +177,6 @@ def flag_frame(body: Polyhedron, face: int, corner: int) -> Array:
     toward = toward / np.linalg.norm(toward)
     across = np.cross(normal, toward)
     return np.asarray(np.column_stack([toward, across, normal]), dtype=np.float64)
-
-
-def _looks(body: Polyhedron, frame: Array) -> tuple[Cells, ...]:
-    """Sort the rows of `_cells` for all faces in a frame in lexicographic order."""
-    return tuple(sorted(map(tuple, _cells(body, frame).tolist())))
 
 
 def _cells(body: Polyhedron, frame: Array) -> Array:

@@ -26,7 +26,6 @@ from sim_validate.closure.controls import (
     Control,
     ControlLoad,
     ControlTrial,
-    ControlVerdict,
     control_case,
 )
 from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
@@ -137,24 +136,18 @@ def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Rec
         return _in_trial(path, found, verdict, wanted.trial)
     trials: Sequence[WrenchVerdict | ControlTrial] = verdict.wrenches
     if wanted.control is not None:
-        control = _control(path, verdict, wanted.control)
+        control = next((c for c in verdict.controls if c.control.name == wanted.control), None)
+        if control is None:
+            raise InputError(
+                f"{path}: grasp {verdict.id} has no negative control {wanted.control!r}; choose "
+                f"from {some(each.control.name for each in verdict.controls)}"
+            )
         trials = control.tried
         found = replace(
             found, name=f"{grasp.id}:{wanted.control}", contacts=control.control.contacts,
             friction=control.control.friction, control=wanted.control, grasp=None,
         )  # fmt: skip
     return replace(found, outcomes={each.name: each.hold.outcome.value for each in trials})
-
-
-def _control(path: Path, verdict: Verdict, name: str) -> ControlVerdict:
-    """Find the verdict on a negative control of a grasp."""
-    found = next((each for each in verdict.controls if each.control.name == name), None)
-    if found is None:
-        raise InputError(
-            f"{path}: grasp {verdict.id} has no negative control {name!r}; choose from "
-            f"{some(each.control.name for each in verdict.controls)}"
-        )
-    return found
 
 
 def _in_trial(path: Path, found: Recorded, verdict: Verdict, trial: int) -> Recorded:

@@ -37,6 +37,7 @@ from grasp_core.errors import InputError, UndecidedError
 from grasp_core.kinds import Count, Friction, function, instance, several, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces, within
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import facets_of
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene, to_text
 from scenes.mujoco.fingertips import clashes
@@ -380,10 +381,8 @@ def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact |
             within(at, piece, plane.normal, 0.0) for piece in plane.pieces
         )
         return Contact(at, plane.normal) if inside else None
-    corners = body.vertices[body.triangles[:, ::-1]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sizes = np.linalg.norm(normals, axis=1)
-    corners, normals = corners[sizes > 0.0], (normals[sizes > 0.0].T / sizes[sizes > 0.0]).T
+    facets = facets_of(body)
+    corners, normals = facets.corners, facets.normals
     at = _crossing(corners[:, 0], normals, point, way)
     edges = np.roll(corners, -1, axis=1) - corners
     beside = np.einsum("tei,tei->te", np.cross(normals[:, None], edges), at[:, None] - corners)

@@ -5,7 +5,7 @@ A question that cannot be decided leaves a reason; all other questions are still
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
@@ -150,17 +150,6 @@ class Analyses(RecordFile):
         return {"grasps": len(self.grasps)} | {each.value: counts[each] for each in Outcome}
 
 
-def check_edges(sets: Iterable[ContactSet], edges: int) -> None:
-    """Refuse pyramids with so many edges that their hull would take minutes."""
-    for contacts in sets:
-        count = len(contacts.positions)
-        if count * edges > MOST_EDGES:
-            raise InputError(
-                f"grasp {contacts.id}: {count} contacts with {edges} edges each exceed "
-                f"{MOST_EDGES} edges; use --edges {MOST_EDGES // count} or less"
-            )
-
-
 def analyze(contacts: ContactSet, question: Question) -> Analysis:
     """Answer every question about one grasp that can be decided."""
     given = contacts.positions, contacts.normals, contacts.friction
@@ -282,7 +271,13 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
     text = read_text(command.contacts)
     with about(command.contacts):
         sets = contact_sets_from_json(text, overrides)
-    check_edges(sets, command.edges)
+    for contacts in sets:
+        count = len(contacts.positions)
+        if count * command.edges > MOST_EDGES:
+            raise InputError(
+                f"grasp {contacts.id}: {count} contacts with {command.edges} edges each exceed "
+                f"{MOST_EDGES} edges; use --edges {MOST_EDGES // count} or less"
+            )
     question = Question(command.max_normal_force_n, command.wrench, command.edges)
     found = each(partial(analyze, question=question), sets, jobs=command.jobs)
 
