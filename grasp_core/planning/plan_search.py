@@ -31,8 +31,7 @@ from grasp_core.objects.face_pieces import clear_of_edges, with_halves
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, standard
 from grasp_core.planning.certify import Certified, LateFigures
-from grasp_core.planning.family_search import FamilySearch, Gathered, MethodSearch
-from grasp_core.planning.free_search import found_on
+from grasp_core.planning.method_search import FamilySearch, Gathered, MethodSearch, found_on
 from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest

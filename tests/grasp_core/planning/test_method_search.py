@@ -8,8 +8,8 @@ from grasp_core.errors import SolverError
 from grasp_core.families import placing
 from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.placing import CONSTRUCTIONS
-from grasp_core.planning import family_search as promising_module
-from grasp_core.planning.family_search import SAME_MERIT, FamilySearch, MethodSearch
+from grasp_core.planning import method_search as promising_module
+from grasp_core.planning.method_search import SAME_MERIT, FamilySearch, MethodSearch
 from grasp_core.planning.plan_search import in_standard_order
 from grasp_core.planning.quadruples import PlannedCones, all_blocks
 from grasp_core.planning.result import PlanRequest
