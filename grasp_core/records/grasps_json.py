@@ -334,9 +334,7 @@ def _contact_set(
         )
     farthest = float(np.linalg.norm(positions - center, axis=1).max())
     scale, source = _first(
-        (flags.torque_scale, "flag"),
-        (file.torque_scale_m, "file"),
-        (farthest, "farthest contact"),
+        (flags.torque_scale, "flag"), (file.torque_scale_m, "file"), (farthest, "farthest contact")
     )
     if not SMALLEST <= scale <= LARGEST:
         raise InputError(

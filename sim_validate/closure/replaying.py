@@ -22,12 +22,7 @@ from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
-from sim_validate.closure.controls import (
-    Control,
-    ControlLoad,
-    ControlTrial,
-    control_case,
-)
+from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
 from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
 from sim_validate.engine.bench import Load

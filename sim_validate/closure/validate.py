@@ -51,12 +51,7 @@ from sim_validate.closure.verdict import (
     WrenchVerdict,
 )
 from sim_validate.engine.bench import Bench
-from sim_validate.engine.gate import (
-    Gate,
-    measured_gate,
-    require_faithful,
-    require_touch,
-)
+from sim_validate.engine.gate import Gate, measured_gate, require_faithful, require_touch
 from sim_validate.engine.rig import (
     Analysis,
     CriticalFriction,
