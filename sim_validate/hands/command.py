@@ -104,9 +104,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
     return judged if all(each.good for each in found) else Exit.NEGATIVE
 
 
-def _reach(
-    command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter
-) -> Reaches:  # fmt: skip
+def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter) -> Reaches:
     if command.out is not None:
         remove_results(command.out, "reaches")
     job = ReachJob(
