@@ -188,23 +188,16 @@ def scalars(record: object) -> Mapping[str, Any]:
 def meanings(kind: type) -> Mapping[str, str]:
     """Return what the fields and recorded properties of a class mean: their docstrings."""
     found: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        if base.__module__ != "builtins":
-            found |= _meanings_in(base)
-    return found
-
-
-def _meanings_in(kind: type) -> dict[str, str]:
-    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    found: dict[str, str] = {}
-    statements = body.body if isinstance(body, ast.ClassDef) else []
-    for one, two in zip(statements, [*statements[1:], None], strict=True):
-        if isinstance(one, ast.FunctionDef):
-            found[one.name] = " ".join((ast.get_docstring(one) or "").split())
-        elif isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name):
-            text = two.value if isinstance(two, ast.Expr) else None
-            said = text.value if isinstance(text, ast.Constant) else ""
-            found[one.target.id] = " ".join(str(said).split())
+    for base in (base for base in reversed(kind.__mro__) if base.__module__ != "builtins"):
+        (body,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+        statements = body.body if isinstance(body, ast.ClassDef) else []
+        for one, two in zip(statements, [*statements[1:], None], strict=True):
+            if isinstance(one, ast.FunctionDef):
+                found[one.name] = " ".join((ast.get_docstring(one) or "").split())
+            elif isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name):
+                text = two.value if isinstance(two, ast.Expr) else None
+                said = text.value if isinstance(text, ast.Constant) else ""
+                found[one.target.id] = " ".join(str(said).split())
     return found
 
 

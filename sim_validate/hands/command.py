@@ -99,8 +99,14 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
     reporter.document(told.document())
     show_simulated([each.simulated for each in found if each.simulated is not None], reporter)
     show_executed([each.executed for each in found if each.executed is not None], reporter)
-    if poses:
-        say_where_to_look(command, reporter)
+    beside = None if command.out is None else command.out / GRASPS
+    if poses and beside is not None and beside.is_file() and command.grasps.samefile(beside):
+        folder = shlex.quote(str(command.out))
+        reporter.say(f"see the hand in the grasps: graspproof report {folder}")
+    elif poses:
+        reporter.say(
+            f"give the folder of {GRASPS} as --out to have the hand drawn by `graspproof report`"
+        )
     return judged if all(each.good for each in found) else Exit.NEGATIVE
 
 
@@ -158,17 +164,6 @@ def _show(found: Reaches, reporter: Reporter) -> None:
         )
     for each in (one.reach for one in shown if not one.reach.reached):
         reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
-
-
-def say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
-    """Say which command draws the hand in the grasps, where their file is beside the poses."""
-    out = command.out
-    if out is None or not (out / GRASPS).is_file() or not command.grasps.samefile(out / GRASPS):
-        reporter.say(
-            f"give the folder of {GRASPS} as --out to have the hand drawn by `graspproof report`"
-        )
-        return
-    reporter.say(f"see the hand in the grasps: graspproof report {shlex.quote(str(out))}")
 
 
 def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
