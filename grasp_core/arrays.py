@@ -23,8 +23,7 @@ Indices: TypeAlias = NDArray[np.int64]
 """Integer array of indices, of any shape."""
 
 DIGITS = 9
-"""Digits kept by `to_digits`: a thousand times finer than any result needs, a million times coarser
-than solvers' noise."""
+"""Digits kept by `to_digits`: a thousand times finer than results need, far above noise."""
 SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
 """Offset, in cells, of the grids on which numbers are rounded or compared: the golden section is
 the number that fractions approximate worst, so the numbers of regular objects are far from the

@@ -30,8 +30,7 @@ UNITS = {
 Worse = Callable[[Any, Any], bool]
 """A function that tells whether a change is for the worse, of the figure before and after."""
 more, less, changed = operator.lt, operator.gt, operator.ne
-"""Functions of the figure before and after, which tell whether it has grown, become smaller, or is
-another one."""
+"""Tell from a figure before and after whether it has grown, become smaller, or is another one."""
 
 
 @dataclass(frozen=True, slots=True)

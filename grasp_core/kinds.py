@@ -31,8 +31,7 @@ MOST_COUNT = 10**9
 """Largest count accepted: anything larger would take longer than anybody waits."""
 MOST_SEED = 2**64 - 1
 MOST_EDGES = 10_000
-"""Largest number of edges of a pyramid that replaces a friction cone: it equals the cone to seven
-digits."""
+"""Most edges of a pyramid for a friction cone: it equals the cone to seven digits."""
 HUGE = 10**100
 """Whole numbers above this are shown by their size: Python does not write the largest ones."""
 SHOWN = 60
@@ -174,8 +173,7 @@ Reserve = Annotated[float, Range(least=0.0, below=1.0)]
 MaxCones = Annotated[int, Range(least=64, most=1_000_000)]
 """Number of cones of a proof of regions, which begins with the 64 orthants."""
 FaceTurn = Annotated[float, Range(least=0.0, most=45.0)]
-"""An angle between normals of like faces [deg]: beyond it, a face of a box and its chamfer would be
-like each other."""
+"""Angle between normals of like faces [deg]: beyond it, a chamfer would be like its box's face."""
 TorqueLimit = Annotated[float, Range(above=0.0, most=1e6)]
 HandClearance = Annotated[float, Range(least=0.0, most=0.02)]
 Starts = Annotated[int, Range(least=1, most=10_000)]
@@ -189,8 +187,7 @@ Seed = Annotated[int, Range(least=0, most=MOST_SEED)]
 Vector = tuple[float, float, float]
 Direction = Annotated[Vector, Size()]
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
-"""The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
-others."""
+"""The family of a grasp, by how its four lines of force meet."""
 Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
 """How grasps are searched for: by one of the paper's three constructions, or free of any family."""
 METHODS: tuple[Method, ...] = get_args(Method)

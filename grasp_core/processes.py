@@ -34,8 +34,7 @@ LENGTH = struct.Struct("<Q")
 AHEAD = 8
 """Number of tasks per process that are handed out before the first of them is done."""
 COLLECTED_AFTER = 50_000
-"""Number of new objects after which a process looks for unused circles of objects: nearly all
-results are freed as soon as they are sent."""
+"""New objects after which unused circles are looked for: nearly all results are freed when sent."""
 
 
 class ProcessEndedError(Exception):

@@ -16,8 +16,7 @@ from grasp_core.solvers.ties import graded, largest_first
 GRID_DIGITS = 9
 """Digits to which corners are rounded before triangulation, for figures of size one."""
 GRID = 4e-8
-"""Extra distance by which figures of size one are shrunk, because manifold3d rounds coordinates to
-1e-8."""
+"""Extra inset of figures of size one, because manifold3d rounds coordinates to 1e-8."""
 
 
 class Solid(Mesh):

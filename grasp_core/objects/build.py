@@ -54,17 +54,14 @@ from grasp_core.objects.surface import Face, Mesh, SoundSurface, Surface, compon
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
-"""Smallest and largest extent of an object [m]: beyond them, the unit of the file is almost surely
-wrong."""
+"""Ends of an object's extent [m]: beyond them, the unit of the file is almost surely wrong."""
 SURROUNDINGS = 1e-6
-"""Largest distance of a given centre of mass from the object's bounding box, relative to the
-extent."""
+"""Largest distance of a given centre of mass from the bounding box, relative to the extent."""
 MARGIN = 8.0
 """Number of rounding errors of a coordinate that a corner of a face may be off its plane: a corner
 may be off by the root of three, and a plane through three of them as far from a fourth by more."""
 COARSEST = 1e-3
-"""Largest distance from a plane, relative to the extent, that is explained by rounding: in a file
-that is coarser than this, shapes and rounding cannot be told apart."""
+"""Largest distance from a plane, over the extent, that rounding explains and shapes do not."""
 DEFAULT_LIMITS, DEFAULT_CHOICES = MeshLimits(), MeshChoices()
 
 
@@ -259,8 +256,7 @@ def mass_properties(solid: Mesh, center: Array | None = None) -> tuple[float, Ar
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""
 FLAT = 1e-9
-"""Area of a loop in the plane that fits it, relative to its width squared, below which it is a
-crack between triangles that meet."""
+"""Area of a loop, over its width squared, below which it is a crack between triangles."""
 WELD = 1e-8
 """Distance below which vertices are joined, relative to the extent: single precision in a file
 keeps 6e-8, and vertices that were equal before are equal to the last bit."""

@@ -38,8 +38,7 @@ from grasp_core.values import FINGERS
 THINNEST = 1e-6
 """Least radius of the largest disc in a piece that can hold a contact (object size one)."""
 SOUND = 1e-9
-"""Largest disagreement between fields of one piece that counts as rounding (object size one), and
-relative to a piece that is smaller."""
+"""Largest disagreement of a piece's fields that counts as rounding, relative to a small piece."""
 
 SAME_PLACE = 6
 """Digits to which distances are compared (object size one); the order of the pieces breaks ties."""
@@ -205,8 +204,7 @@ def inscribed_radius(E: Array, b: Array) -> float:
 
 
 SAME_LENGTH = 1.0 - 1e-6
-"""Share of the largest length from which two lengths count as equal. The first of equal ones is
-taken, so that rounding decides nothing."""
+"""Share of the largest length from which two count as equal; the first of equal ones is taken."""
 
 
 def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:

@@ -31,8 +31,7 @@ from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6
-"""Largest distance of a contact from its face, in object radii: files that keep six digits stay
-within it."""
+"""Largest distance of a contact from its face [object radii]: six digits of a file keep it."""
 
 
 def check_body(body: Polyhedron) -> None:

@@ -55,8 +55,7 @@ MAX_FACES = 200
 quadruples, some 6 million of which positively span."""
 
 PLANAR = 1e-6
-"""Largest distance from a plane, relative to the extent, that always counts as in it: some ten
-times the rounding of single precision."""
+"""Largest distance from a plane, over the extent, that is in it: ten single roundings."""
 ANGLE = 1e-3
 """Largest angle between normals in one face [rad]: about a thousand times the error of the normal
 of a triangle one millimetre high in single precision, and far below any friction angle of interest.
@@ -145,14 +144,11 @@ def convex_pieces(loops: list[Array], slack: float) -> list[Array]:
 
 
 SMOOTHING = 10
-"""Number of times that normals are averaged with those of neighbours, to find where a surface is
-flat."""
+"""Number of times that normals are averaged with neighbours, to find where a surface is flat."""
 FLATNESS_DIGITS = 9
-"""Digits to which the cosines between normals and their averages are compared; equal ones are ties.
-"""
+"""Digits to which cosines of normals and their averages are compared; equal ones are ties."""
 BORDER_GAP = 1e-9
-"""Distance that patches keep from the borders of their groups of triangles, relative to the
-object's extent."""
+"""Distance that patches keep from borders of their triangles, relative to the object's extent."""
 
 
 def flat_patches(surface: Mesh, limits: PatchLimits, caps: Indices = NO_CAPS) -> tuple[Face, ...]:
@@ -277,8 +273,7 @@ SLENDEREST = 1e-5
 """Least width of a polygon that grows further, relative to its length: places that are stretched to
 a disc are rounded by some 1e-16 of the length divided by this, which must be well below the gap."""
 SAME_HEIGHT = 1.0 - 1e-12
-"""Share of a half-plane's distance from the middle at which an end of a segment counts as beyond.
-"""
+"""Share of a half-plane's distance at which an end of a segment counts as beyond."""
 CANDIDATES = 400
 """Largest number of points that are tried as the middle of a polygon."""
 

@@ -47,13 +47,11 @@ from grasp_core.objects.surface import (
 )
 
 OVERLAP = 1e-6
-"""Volume shared by two parts, relative to the whole, above which they overlap; parts that only
-touch share what rounding leaves."""
+"""Volume shared by two parts, over the whole, above which they overlap and not only touch."""
 SMALL = 0.01
 """Largest share of the surface that is left out without being asked for."""
 CLEAN = 1e-4
-"""Largest share of the surface of a union that may be beside slits as thin as rounding; edges of
-sound unions show some 1e-6."""
+"""Largest share of a union's surface beside slits as thin as rounding; sound ones show 1e-6."""
 THINNEST = 1e-9
 """Least volume of a solid, relative to the cube of the extent."""
 THIN = 4e-6

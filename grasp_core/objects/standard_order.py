@@ -52,8 +52,7 @@ FLIP = np.array([1.0, 1.0, -1.0])
 CELL_DIGITS = 6
 """Digits to which lengths (object size one) and cosines are compared."""
 SHORTEST = 1e-3
-"""Least distance of a corner from its face's centre at which their connecting line gives a
-direction, in object radii."""
+"""Least distance of a corner from its face's centre that gives a direction [object radii]."""
 
 Cells: TypeAlias = tuple[float, ...]
 
@@ -218,8 +217,7 @@ SAME_GRASP = 1e-3
 """Largest distance between contacts or foci of two copies, in object radii, and between directions
 of their normals and force cones: a picture of this object shows no smaller one."""
 FAR = 4.0
-"""Distance in object radii from which foci are compared by their direction, with the same share of
-their distance."""
+"""Distance from which foci are compared by direction, to the same share of it [object radii]."""
 MOST_FACES = 200
 """Largest number of faces of objects whose symmetries are looked for, as for exact planning."""
 CROWDED = 300

@@ -198,8 +198,7 @@ def find_critical_frictions(grasps: Iterable[Grasp]) -> None:
 
 
 PAIRED = ("p", "r")
-"""Letters with which the ids of pencil and regulus grasps begin: their fingers (0, 1) and (2, 3)
-form pairs."""
+"""Letters of the ids of pencils and reguli, whose fingers (0, 1) and (2, 3) form pairs."""
 ORDER, UNMIRRORED = list(range(FINGERS)), np.ones(3)
 """The order of the fingers, and the signs of the coordinates, where nothing is translated."""
 Place: TypeAlias = tuple[int, str]

@@ -71,8 +71,7 @@ TOGETHER = 32
 MOST_ATTEMPTS = 512
 """Number of attempts that are made together at most."""
 SAME_MERIT = 1e-5
-"""Share by which a new grasp must beat the worst one kept: symmetric objects hold thousands of
-equal grasps."""
+"""Share by which a grasp must beat the worst one kept: symmetric objects hold many equal ones."""
 SAME_CONTACTS = 1e-6
 """Distance between contacts below which two grasps count as one, in object radii."""
 

@@ -44,8 +44,7 @@ Progress: TypeAlias = Callable[[int, int, int], None]
 BATCH, LIMITED_BATCH = 1024, 64
 """Number of face quadruples that are decided together, and with a limit on the grasps."""
 QUADRUPLES_PER_PROCESS = 5_000
-"""Number of face quadruples for which one more process is worth starting: the start takes a second,
-and so do a thousand to two thousand quadruples."""
+"""Number of face quadruples that take a few times as long as the start of a process, a second."""
 KEPT_BLOCKS = 8
 """Number of blocks of face quadruples kept for all families: some hundred megabytes."""
 

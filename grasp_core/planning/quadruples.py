@@ -48,8 +48,7 @@ from grasp_core.solvers.ties import coarse, graded
 from grasp_core.values import FINGERS, ForceCone, four
 
 LEAST_SPAN_ANGLE = math.atan(LEAST_RADIUS)
-"""Least half-angle to plan with [rad]: narrower cones hold no disc that counts at a depth of one
-object radius."""
+"""Least half-angle to plan with [rad]: narrower cones hold no disc that counts one radius deep."""
 BELOW_SPAN_ANGLE = 0.999
 """Share of the span angle theta* to plan with: P3 is a strict inequality."""
 INSIDE_FRICTION = 1.0 - 1e-6
@@ -298,8 +297,7 @@ class WideQuadruples:
 
 
 Blocks: TypeAlias = tuple[Array, Callable[[int], WideQuadruples]]
-"""Upper bound on the discs of each block, (blocks,) [object radii], and the function that makes the
-block at a place."""
+"""Upper bound on the discs of each block, (blocks,) [object radii], and what makes the block."""
 
 
 def kept(blocks: Blocks, count: int) -> Blocks:

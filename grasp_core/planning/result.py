@@ -40,8 +40,7 @@ FARTHEST_APPROACH = 1e3
 COMPLETE_PARTS = 20_000
 """Parts into which `complete` may cut the faces of one quadruple."""
 MOST_FACES = 1000
-"""Most faces to plan with: tables of all pairs of faces and of all triples whose normals span then
-take some hundred megabytes."""
+"""Most faces to plan with: tables of pairs and of spanning triples take some hundred megabytes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -178,8 +178,7 @@ def load_grasps(path: str | Path) -> Plan:
 
 FEWEST_CONTACTS = 2
 MOST_CONTACTS = 100
-"""Largest number of contacts of one grasp: analysing a hundred takes some seconds, most of them for
-the volume of the wrench hull."""
+"""Most contacts of one grasp: a hundred take seconds, most of them for the hull's volume."""
 MOST_GRASPS = 100_000
 """Largest number of grasps in one file: two hours of work for one processor."""
 LARGEST_LENGTH_M = 1e6
@@ -191,8 +190,7 @@ NEARLY_UNIT = 1e-3
 UNIT_ROUNDING = 1e-15
 """How far rounding takes the length of a unit vector from 1."""
 SAME_POINT = 1e-9
-"""Distance below which contacts are at one point, relative to the numbers in the file: rounding
-leaves nothing of smaller differences."""
+"""Distance below which contacts are at one point, over the numbers in the file: rounding."""
 
 CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
 ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]

@@ -308,8 +308,7 @@ def validate_all(
 
 
 STREAM = 1
-"""Number of the random stream that noise is drawn from, apart from other draws with the same
-seed."""
+"""Number of the random stream of noise, apart from other draws with the same seed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,8 +33,7 @@ from sim_validate.kit.files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 
 AGREEMENT = 0.02
-"""Largest relative error of simulated limits and critical frictions: five times the worst that was
-measured."""
+"""Largest relative error of simulated limits and frictions: five times the worst measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -74,8 +74,7 @@ from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.settings import ExecutionSettings
 
 MOST_PUSH_N = 100.0
-"""Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors
-give, so that they are what limits."""
+"""Largest normal force of a fingertip unless stated [N]: more than hands' motors give."""
 
 EXCESS = 0.05
 """Share of the applied load, at least, that no forces of a control can balance."""

@@ -38,8 +38,7 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.processes import each
 
 MOST_EDGES = 10_000
-"""Largest number of edges of all pyramids of a grasp together; their hull in six dimensions then
-takes ten seconds."""
+"""Most edges of all pyramids of a grasp, whose hull in six dimensions then takes ten seconds."""
 
 Answer = TypeVar("Answer")
 Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
@@ -261,8 +260,7 @@ def _resisted(contacts: ContactSet, wrench: ArrayLike, question: Question) -> Re
 
 DIGITS = 7
 STEP = 10.0**-DIGITS
-"""Step to which both ends of a printed interval are rounded; results are reproducible to this step.
-"""
+"""Step to which ends of a printed interval are rounded, and to which they are reproducible."""
 
 
 def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
