@@ -64,10 +64,7 @@ def frozen(
 
 @dataclass(frozen=True)
 class Shape:
-    """The rule of a kind that a value is an array of a shape, copied and read-only.
-
-    Lengths that are None are free; those with the same letter in a class are the same.
-    """
+    """The rule that a value is an array of a shape: None is free, equal letters are equal."""
 
     shape: tuple[int | str | None, ...]
     units: bool = False  # whether vectors along the last axis have length one

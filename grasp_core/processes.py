@@ -110,11 +110,7 @@ class Processes:
             return None
 
     def _serve(self, number: int) -> None:
-        """Hand tasks to a process, one after the other; a new one takes the place of one that ends.
-
-        With patience, start none unless each process has as many tasks left as this one has done in
-        the time of a start.
-        """
+        """Hand tasks to a process, or a new one if it ends; with patience, only if many wait."""
         if self._patience_s > 0.0:
             self._closed.wait(self._patience_s)
             if self._waiting.qsize() < (number + 1) * max(1, self._done_here):
@@ -242,10 +238,7 @@ def _exactly(pipe: IO[bytes], length: int) -> bytes:
 
 
 def unpacked(message: bytes) -> Any:
-    """Return the value of a message, which came from a process of our own.
-
-    Nearly all objects made here live on: looking for unused ones would take longer than the rest.
-    """
+    """Return the value of a message of our own process, whose objects nearly all live on."""
     collects = gc.isenabled()
     gc.disable()
     try:

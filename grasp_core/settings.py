@@ -32,12 +32,7 @@ class Settings(Declared):
 
     @classmethod
     def of_table(cls, table: object, where: str = "", usual: Any = None) -> Self:
-        """Make settings from a table of a file, with those of `usual` where it says nothing.
-
-        `where` leads to the table, such as 'execution'. An unknown name, a missing one and a value
-        that the class refuses are errors that name the setting. What the program chooses may stand
-        in a table with its usual value, as records have it.
-        """
+        """Make settings from a table of a file; those of `usual` stand where it says nothing."""
         users, every = for_users(cls), fields(cast("Any", cls))
         chosen = {each.name: default_of(each) for each in every if each.name not in users}
         given = named(table, users, where, usual=chosen)

@@ -367,11 +367,7 @@ def whole(word: bytes) -> int:
 
 
 def read_obj(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
-    """Read the vertices and polygons of an OBJ file.
-
-    The format does not say whether a backslash joins lines also at the end of a comment. Such a
-    comment right before a vertex or a face is therefore refused.
-    """
+    """Read an OBJ file; a comment whose backslash might hide a vertex or a face is refused."""
     text = plain_text(data)
     if SWALLOWED.search(text):
         raise ValueError("a comment ends in a backslash before a `v` or `f` line")

@@ -183,12 +183,7 @@ class Edges(NamedTuple):
         return numbered(len(self.corners), np.column_stack([here, first[self.place]]))
 
     def fault(self) -> MeshError | None:
-        """Return the fault by which triangles do not bound a solid, or None if they do.
-
-        They bound a solid if each edge belongs to two triangles that run along it in opposite
-        directions. Inconsistent orientation is reported first, since a surface with any other fault
-        may have usable parts.
-        """
+        """Return the fault by which triangles bound no solid, or None if they do."""
         if same_side := int(self.against.sum()):
             message = (
                 f"{same_side} edges have triangles of opposite orientation; wind all "
@@ -213,11 +208,7 @@ class Edges(NamedTuple):
         return None
 
     def open_loops(self) -> list[list[int]] | None:
-        """Walk along the open edges against their triangles, so that caps are wound like these.
-
-        None if an edge that belongs to three or more triangles has more of them on one side.
-        Otherwise as many open edges end in each vertex as begin there, so that every walk returns.
-        """
+        """Walk along open edges against their triangles; None where walks may not return."""
         if ((self.uses > 1) & (self.balance != 0)).any():
             return None
         tails, heads = self.corners.ravel(), np.roll(self.corners, -1, axis=1).ravel()
@@ -235,11 +226,7 @@ class Edges(NamedTuple):
 
 
 def border_loops(triangles: Indices) -> list[list[int]]:
-    """Walk along the borders of a group of triangles; return loops of vertices wound like them.
-
-    Where the border touches itself in one vertex, the walk turns through the group's own
-    triangles, and is then cut there, so that each loop passes a vertex once.
-    """
+    """Walk along the borders of triangles, wound like them; loops pass each vertex once."""
     inside = {
         (int(t[k]), int(t[(k + 1) % 3])): int(t[(k + 2) % 3]) for t in triangles for k in range(3)
     }

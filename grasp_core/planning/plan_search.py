@@ -387,11 +387,7 @@ def _in_order(
 
 
 def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]:
-    """Order grasps so that each next one is as far as possible from the nearest before it.
-
-    The distance of two grasps is the largest distance of a contact of one from the nearest contact
-    of the other, relative to the object's radius.
-    """
+    """Order grasps by the distance from the nearest before, that of their farthest contacts."""
     if not every:
         return []
     places = np.array([found.placement.positions for found in every])
