@@ -61,8 +61,7 @@ class Polyhedron(Declared, InNotebooks):
 
     def __post_init__(self) -> None:
         Declared.__post_init__(self)
-        away = self.vertices - self.center_of_mass
-        reach = np.linalg.norm(away, axis=1).max(initial=0.0)
+        reach = np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max(initial=0.0)
         object.__setattr__(self, "radius", float(reach))
 
     def _check_together(self) -> None:

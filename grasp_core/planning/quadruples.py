@@ -133,8 +133,7 @@ class PlannedCones:
 
     @cached_property
     def _thetas(self) -> Array:
-        spreads = np.array([face.spread for face in self.body.faces])
-        return usable_half_angles(self.theta, spreads)
+        return usable_half_angles(self.theta, np.array([face.spread for face in self.body.faces]))
 
     @cached_property
     def _corners(self) -> Corners:

@@ -43,7 +43,6 @@ from grasp_core.planning.certify import check_witness, find_critical_frictions
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
 from grasp_core.settings import extended
-from grasp_core.values import Grasp
 
 SCHEMA = 2
 ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
@@ -118,21 +117,16 @@ def grasps_from_json(text: str) -> Plan:
         raise InputError("versions: missing; add those of the packages that made the grasps")
     for place, grasp in enumerate(plan.grasps):
         with about(f"grasps[{place}]"):
-            _check_grasp(body, grasp, plan.friction)
+            if not ID.fullmatch(grasp.id):
+                raise InputError(
+                    "id: expected up to 100 letters, digits, '_' and '-', as it names files as "
+                    f"well, got {shown(grasp.id)}"
+                )
+            check_on_faces(body, grasp)
+            check_witness(body, grasp, plan.friction)
     if len({grasp.id for grasp in plan.grasps}) < len(plan.grasps):
         raise InputError("grasps: two grasps have the same id; ids must differ")
     return plan
-
-
-def _check_grasp(body: Polyhedron, grasp: Grasp, friction: float) -> None:
-    """Refuse a grasp of a file that cannot be one of the object, or whose id is no file name."""
-    if not ID.fullmatch(grasp.id):
-        raise InputError(
-            "id: expected up to 100 letters, digits, '_' and '-', as it names files as well, got "
-            f"{shown(grasp.id)}"
-        )
-    check_on_faces(body, grasp)
-    check_witness(body, grasp, friction)
 
 
 def save_grasps(path: str | Path, plan: Plan) -> Path:

@@ -223,8 +223,7 @@ def _arrived(body: Shared[Polyhedron], *rest: Any) -> Job:
 
 def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
     """Yield one verdict per job, in order; the number of processors does not change the results."""
-    count = processes(len(jobs), processors)
-    return each(verdict_of, prepared(jobs, processors), jobs=count)
+    return each(verdict_of, prepared(jobs, processors), jobs=processes(len(jobs), processors))
 
 
 def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
@@ -470,8 +469,7 @@ def noisy_case(
         object_kg=case.mass * planned.layout.object_kg,
         inertia_kg_m2=case.mass * planned.layout.inertia_kg_m2,
     )
-    text = to_text(layout, planned.physics)
-    scene = replace(planned, xml=text, layout=layout)
+    scene = replace(planned, xml=to_text(layout, planned.physics), layout=layout)
     rig = closed_on(scene, setup, case.friction)
     heavy = [(name, case.mass * wrench) for name, wrench in loads]
     analysis = Analysis(body, case.contacts, case.friction, setup, None)

@@ -499,5 +499,5 @@ def executed_by_hand(
 ) -> ExecutedGrasp:
     """Execute one grasp with a hand; a grasp that cannot be executed is a result with a reason."""
     execution = partial(execute_hand, hand, body, reach, friction, settings)
-    refused = (InputError, NoForcesError)
-    return result_of(reach.grasp, "", reach.contacts or (), execution, refused)
+    contacts = reach.contacts or ()
+    return result_of(reach.grasp, "", contacts, execution, (InputError, NoForcesError))

@@ -152,8 +152,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
             found = replace(found, grasps=(best.grasp, *planned), absence=None)
         text = plan_to_json(body, found)
         if command.out:
-            path = write_text(command.out / "grasps.json", text)
-            reporter.say(f"wrote {path}")
+            reporter.say(f"wrote {write_text(command.out / 'grasps.json', text)}")
         if best is not None:
             from sim_validate.planning.best import write_best
 
