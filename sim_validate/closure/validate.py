@@ -469,7 +469,8 @@ def noisy_case(
         object_kg=case.mass * planned.layout.object_kg,
         inertia_kg_m2=case.mass * planned.layout.inertia_kg_m2,
     )
-    scene = replace(planned, xml=to_text(layout, planned.physics), layout=layout)
+    text = to_text(layout, planned.physics)
+    scene = replace(planned, xml=text, layout=layout)
     rig = closed_on(scene, setup, case.friction)
     heavy = [(name, case.mass * wrench) for name, wrench in loads]
     analysis = Analysis(body, case.contacts, case.friction, setup, None)
