@@ -352,12 +352,12 @@ def plain_text(data: bytes) -> bytes:
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
-def worded_lines(text: bytes, *, comments: bool = True) -> Iterator[list[bytes]]:
+def worded_lines(text: bytes) -> Iterator[list[bytes]]:
     """Yield the words of each line that is not blank, one line at a time to save memory."""
     for line in io.BytesIO(text):
         if len(line) > LONGEST_LINE:
             raise ValueError(f"a line is longer than {LONGEST_LINE} bytes")
-        if words := (line.partition(b"#")[0] if comments else line).split():
+        if words := line.partition(b"#")[0].split():
             yield words
 
 
