@@ -23,8 +23,7 @@ Indices: TypeAlias = NDArray[np.int64]
 """Integer array of indices, of any shape."""
 
 DIGITS = 9
-"""Digits kept by `to_digits`: a thousand times finer than any result needs, a million times coarser
-than solvers' noise."""
+"""Digits kept by `to_digits`: a thousand times finer than results need, far above noise."""
 SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
 """Offset, in cells, of the grids on which numbers are rounded or compared: the golden section is
 the number that fractions approximate worst, so the numbers of regular objects are far from the
@@ -65,18 +64,13 @@ def frozen(
 
 @dataclass(frozen=True)
 class Shape:
-    """The rule of a kind that a value is an array of a shape, copied and read-only.
-
-    Lengths that are None are free; those with the same letter in a class are the same.
-    """
+    """The rule that a value is an array of a shape: None is free, equal letters are equal."""
 
     shape: tuple[int | str | None, ...]
-    units: bool = False
-    """Whether vectors along the last axis have length one."""
+    units: bool = False  # whether vectors along the last axis have length one
     slack: float = UNIT_SLACK
     """How far a length may be from one in an array that is not taken but looked at."""
-    whole: bool = False
-    """Whether entries are whole numbers from 0 up."""
+    whole: bool = False  # whether entries are whole numbers from 0 up
     least: float = -LARGEST_ENTRY
     most: float = LARGEST_ENTRY
     nan: bool = False
@@ -91,10 +85,7 @@ class Shape:
             object.__setattr__(self, name, value)
 
     def take(self, value: Any) -> NDArray[Any]:
-        """Return a read-only copy of a value as an array of this shape.
-
-        An array that is read-only and owns its entries is kept as it is.
-        """
+        """Return a read-only copy of a value, or itself if it is read-only and owns its entries."""
         if self._fits(value):
             array = value if value.base is None and not value.flags.writeable else np.array(value)
             array.setflags(write=False)
@@ -129,10 +120,7 @@ class Shape:
         return value
 
     def _fits(self, value: Any) -> bool:
-        """Return whether a value is an array of this shape and type, with entries as they must be.
-
-        Ends are not looked at.
-        """
+        """Return whether a value is an array of this shape and type, with entries as must be."""
         if type(value) is not np.ndarray or value.dtype != (np.int64 if self.whole else np.float64):
             return False
         array: NDArray[Any] = value

@@ -52,11 +52,7 @@ KERNEL = "_kernel"
 def loop(
     division: Literal["python", "numpy"] = "python", *, beside: bool = False
 ) -> Callable[[Loop], Loop]:
-    """Declare a function that numba compiles on first use and keeps for later processes.
-
-    Where no folder can be written, neither a cache folder of the user nor `__pycache__` beside the
-    module, every process compiles the function again.
-    """
+    """Declare a function that numba compiles on first use and keeps for later processes."""
     numba: Any = importlib.import_module("numba")
     # what Python runs stays where debuggers look for it, and numba keeps no unoptimized code
     keeps = not numba.config.DISABLE_JIT and int(numba.config.OPT) > 0
@@ -86,11 +82,7 @@ def compiled(name: str) -> Any:
 
 
 def state_of(function: Any) -> Literal["kept", "not kept", "interpreted"]:
-    """Return whether a function runs compiled by numba, kept on disk or not, or interpreted.
-
-    Gives whether later processes find it compiled, or no folder keeps it, or Python runs it because
-    the environment variable NUMBA_DISABLE_JIT says so.
-    """
+    """Return whether later processes find a function compiled, too, or Python runs it as it is."""
     if not hasattr(function, "stats"):
         return "interpreted"
     return "kept" if function.stats.cache_path else "not kept"
@@ -136,11 +128,7 @@ def copy_of(module: str, path: str) -> Path | None:
 
 
 def folders(path: Path) -> Iterator[Path]:
-    """Yield folders that may keep compiled loops, best first.
-
-    They are in the one that `NUMBA_CACHE_DIR` names, in the user's cache folder, and `__pycache__`
-    beside the module.
-    """
+    """Yield folders that may keep compiled loops: a chosen one, the user's, or the module's."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         yield Path(chosen).absolute() / OWN
     users = Path(os.environ.get("XDG_CACHE_HOME", ""))

@@ -189,8 +189,12 @@ def kept(value: object, name: str) -> Any:
 def _same(one: Any, other: Any) -> bool:
     if one is other:
         return True
+    if _is_array(one) and _is_array(other):
+        import numpy as np
+
+        return np.array_equal(one, other, equal_nan="f" in one.dtype.kind + other.dtype.kind)
     if _is_array(one) or _is_array(other):
-        return _is_array(one) and _is_array(other) and _same_entries(one, other)
+        return False
     if isinstance(one, tuple | list) and isinstance(other, tuple | list):
         ours, theirs = cast("tuple[Any, ...]", one), cast("tuple[Any, ...]", other)
         return len(ours) == len(theirs) and all(map(_same, ours, theirs))
@@ -202,12 +206,6 @@ def _same(one: Any, other: Any) -> bool:
 
 def _is_array(value: Any) -> bool:
     return hasattr(value, "dtype") and hasattr(value, "flat")
-
-
-def _same_entries(one: Any, other: Any) -> bool:
-    import numpy as np
-
-    return np.array_equal(one, other, equal_nan="f" in one.dtype.kind + other.dtype.kind)
 
 
 def _is_nan(value: Any) -> bool:
@@ -260,11 +258,7 @@ def vector(value: Any) -> str:
 
 
 class InNotebooks:
-    """Base of values that show a picture at the end of a notebook's cell.
-
-    A package that stands on this one draws it: `scenes` hands over a function when it is imported,
-    and values ask for it. Without `scenes` notebooks show `repr`.
-    """
+    """Base of values that show a picture at the end of a notebook's cell, if `scenes` draws one."""
 
     __slots__ = ()
 

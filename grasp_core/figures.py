@@ -30,8 +30,7 @@ UNITS = {
 Worse = Callable[[Any, Any], bool]
 """A function that tells whether a change is for the worse, of the figure before and after."""
 more, less, changed = operator.lt, operator.gt, operator.ne
-"""Functions of the figure before and after, which tell whether it has grown, become smaller, or is
-another one."""
+"""Tell from a figure before and after whether it has grown, become smaller, or is another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +44,7 @@ class Compared:
 
     worse: Worse | None = changed
     """Whether a change is for the worse; None for a figure that is kept without being compared."""
-    words: str = ""
-    """What messages call it, if not by its name."""
+    words: str = ""  # what messages call it, if not by its name
     items: tuple[str, str] | None = None
     """What messages say of items that came into a list of faults, and of those that left it; None
     for a list of which only the number of items is kept."""
@@ -54,10 +52,8 @@ class Compared:
     """Whether the number comes from the analysis, which depends less on rounding."""
     friction: bool = False
     """Whether it is a friction, which other shapes of a part change by a share of the friction."""
-    follows: bool = False
-    """Whether it also changes where a wrench is now held, or no longer."""
-    of_part: bool = False
-    """Whether another shape of the part may change it."""
+    follows: bool = False  # whether it also changes where a wrench is now held, or no longer
+    of_part: bool = False  # whether another shape of the part may change it
     close: str = ""
     """Name of the figure that says where rounding may decide: whether it does, or for which items
     of a list."""
@@ -70,12 +66,9 @@ BY_DEFAULT = Compared()
 class Shown:
     """How tables and pages show a figure."""
 
-    heading: str
-    """A few words above the column."""
-    form: str = ".4g"
-    """Format of a number."""
-    times: float = 1.0
-    """Factor on a number, such as 1e6 for micrometres."""
+    heading: str  # a few words above the column
+    form: str = ".4g"  # format of a number
+    times: float = 1.0  # factor on a number, such as 1e6 for micrometres
     infinite: str = "never"
     """What stands for an infinite number: most figures are multiples at which something happens."""
     compared: Compared | None = BY_DEFAULT
@@ -172,10 +165,7 @@ def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tu
 
 
 def scalars(record: object) -> Mapping[str, Any]:
-    """Return the plain entries of a record by name: numbers, words, and numbers of items.
-
-    Those of a flat part are among them, if the record has it.
-    """
+    """Return the plain entries of a record and its flat parts: numbers, words, numbers of items."""
     own, properties = entries(type(record))
     found: dict[str, Any] = {}
     for each in (*own, *properties):
@@ -197,23 +187,16 @@ def scalars(record: object) -> Mapping[str, Any]:
 def meanings(kind: type) -> Mapping[str, str]:
     """Return what the fields and recorded properties of a class mean: their docstrings."""
     found: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        if base.__module__ != "builtins":
-            found |= _meanings_in(base)
-    return found
-
-
-def _meanings_in(kind: type) -> dict[str, str]:
-    (body,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    found: dict[str, str] = {}
-    statements = body.body if isinstance(body, ast.ClassDef) else []
-    for one, two in zip(statements, [*statements[1:], None], strict=True):
-        if isinstance(one, ast.FunctionDef):
-            found[one.name] = " ".join((ast.get_docstring(one) or "").split())
-        elif isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name):
-            text = two.value if isinstance(two, ast.Expr) else None
-            said = text.value if isinstance(text, ast.Constant) else ""
-            found[one.target.id] = " ".join(str(said).split())
+    for base in (base for base in reversed(kind.__mro__) if base.__module__ != "builtins"):
+        (body,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+        statements = body.body if isinstance(body, ast.ClassDef) else []
+        for one, two in zip(statements, [*statements[1:], None], strict=True):
+            if isinstance(one, ast.FunctionDef):
+                found[one.name] = " ".join((ast.get_docstring(one) or "").split())
+            elif isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name):
+                text = two.value if isinstance(two, ast.Expr) else None
+                said = text.value if isinstance(text, ast.Constant) else ""
+                found[one.target.id] = " ".join(str(said).split())
     return found
 
 

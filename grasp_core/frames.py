@@ -15,8 +15,7 @@ Row: TypeAlias = tuple[float, float, float]
 POSE = 4
 """Rows and columns of a homogeneous transform."""
 SAME_SIZE = 1e-7
-"""Difference between components that does not count: those of a regular object's normals are equal
-but for rounding, in computing or in a file."""
+"""Difference between components that does not count: rounding, in computing or in a file."""
 
 
 def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:

@@ -25,11 +25,7 @@ Item = TypeVar("Item", bound=Named)
 
 
 class ById(Generic[Item]):
-    """Base of frozen dataclasses that are sequences of grasps, or of results about them.
-
-    They have a length and an order, and give an item by its place or its id, and a value of their
-    own class for a slice. They are true even if empty: that there is no grasp is a result, too.
-    """
+    """Base of frozen dataclasses that are sequences of grasps or of results; true even if empty."""
 
     __slots__ = ()
     ITEMS: ClassVar[str] = "grasps"

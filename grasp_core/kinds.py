@@ -31,8 +31,7 @@ MOST_COUNT = 10**9
 """Largest count accepted: anything larger would take longer than anybody waits."""
 MOST_SEED = 2**64 - 1
 MOST_EDGES = 10_000
-"""Largest number of edges of a pyramid that replaces a friction cone: it equals the cone to seven
-digits."""
+"""Most edges of a pyramid for a friction cone: it equals the cone to seven digits."""
 HUGE = 10**100
 """Whole numbers above this are shown by their size: Python does not write the largest ones."""
 SHOWN = 60
@@ -70,8 +69,7 @@ class Range:
     least: float | None = None
     below: float | None = None
     most: float | None = None
-    where: str = ""
-    """What the ends are, for messages that name them."""
+    where: str = ""  # what the ends are, for messages that name them
 
     def holds(self, value: float) -> bool:
         """Return whether a number is in the range."""
@@ -175,8 +173,7 @@ Reserve = Annotated[float, Range(least=0.0, below=1.0)]
 MaxCones = Annotated[int, Range(least=64, most=1_000_000)]
 """Number of cones of a proof of regions, which begins with the 64 orthants."""
 FaceTurn = Annotated[float, Range(least=0.0, most=45.0)]
-"""An angle between normals of like faces [deg]: beyond it, a face of a box and its chamfer would be
-like each other."""
+"""Angle between normals of like faces [deg]: beyond it, a chamfer would be like its box's face."""
 TorqueLimit = Annotated[float, Range(above=0.0, most=1e6)]
 HandClearance = Annotated[float, Range(least=0.0, most=0.02)]
 Starts = Annotated[int, Range(least=1, most=10_000)]
@@ -190,8 +187,7 @@ Seed = Annotated[int, Range(least=0, most=MOST_SEED)]
 Vector = tuple[float, float, float]
 Direction = Annotated[Vector, Size()]
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
-"""The family of a grasp, by how its four lines of force meet: concurrent, pencil or regulus among
-others."""
+"""The family of a grasp, by how its four lines of force meet."""
 Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
 """How grasps are searched for: by one of the paper's three constructions, or free of any family."""
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -206,10 +202,7 @@ Measured = Annotated[float, Null(math.nan)]
 
 @lru_cache(maxsize=1024)
 def takes(kind: Any, *, exact: bool = False) -> Take:
-    """Return the function that takes values of a kind: lists as tuples, numbers as Python's.
-
-    If `exact`, nothing is converted: a list is no tuple, and an array has the type that it must.
-    """
+    """Return the function that takes values of a kind in plain form; if `exact`, as they are."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin in COMPOUND:
         return COMPOUND[origin](parts, exact)
@@ -230,12 +223,8 @@ def _if(allowed: Callable[[Any], bool]) -> Take:
 
 
 def _literal(parts: tuple[Any, ...], _exact: bool) -> Take:
-    def take(value: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, str | int) or value not in parts:
-            raise UnfitError
-        return value
-
-    return take
+    return _if(lambda value: type(value) is not bool and isinstance(value, str | int)
+               and value in parts)  # fmt: skip
 
 
 def _narrowed(parts: tuple[Any, ...], exact: bool) -> Take:
@@ -308,14 +297,9 @@ def _path(value: Any) -> Path:
     return Path(value)
 
 
-def _none(value: Any) -> None:
-    if value is not None:
-        raise UnfitError
-
-
 PLAIN: Mapping[Any, Take] = {
     Any: lambda value: value, float: _numbers(endless=False), int: _whole, Path: _path,
-    type(None): _none, bool: _if(lambda value: isinstance(value, bool)),
+    type(None): _if(lambda value: value is None), bool: _if(lambda value: isinstance(value, bool)),
     str: _if(lambda value: isinstance(value, str)),
 }  # fmt: skip
 EXACT: Mapping[Any, Take] = {
@@ -408,12 +392,8 @@ def _words_of_items(origin: type, parts: tuple[Any, ...]) -> str:
     if any(part != parts[0] for part in parts):
         return f"{len(parts)} items: {', '.join(map(words, parts))}"
     each = "" if parts[0] is float else f", each {words(parts[0])}"
-    return f"{len(parts)} {'numbers' if _is_number(parts[0]) else 'items'}{each}"
-
-
-def _is_number(kind: Any) -> bool:
-    inner = get_args(kind)[0] if get_origin(kind) is Annotated else kind
-    return inner in (float, int)
+    inner = get_args(parts[0])[0] if get_origin(parts[0]) is Annotated else parts[0]
+    return f"{len(parts)} {'numbers' if inner in (float, int) else 'items'}{each}"
 
 
 def inside(kind: Any, wanted: type) -> Any:

@@ -34,8 +34,7 @@ LENGTH = struct.Struct("<Q")
 AHEAD = 8
 """Number of tasks per process that are handed out before the first of them is done."""
 COLLECTED_AFTER = 50_000
-"""Number of new objects after which a process looks for unused circles of objects: nearly all
-results are freed as soon as they are sent."""
+"""New objects after which unused circles are looked for: nearly all results are freed when sent."""
 
 
 class ProcessEndedError(Exception):
@@ -78,11 +77,7 @@ class Processes:
         self, function: Callable[[Task], Result], tasks: Iterable[Task], *,
         here: Callable[[Task], Result] | None = None, ahead: int = AHEAD,
     ) -> Generator[Result]:  # fmt: skip
-        """Yield the result of each task, in their order; this process works with the others.
-
-        It does the tasks of processes that end, too. Takes `here`, a function with the same results
-        for tasks that this process does.
-        """
+        """Yield the result of each task, in order; this process helps, by `here` if given."""
         coming, line, mine = iter(tasks), deque[_Asked](), here or function
         try:
             while True:
@@ -115,11 +110,7 @@ class Processes:
             return None
 
     def _serve(self, number: int) -> None:
-        """Hand tasks to a process, one after the other; a new one takes the place of one that ends.
-
-        With patience, start none unless each process has as many tasks left as this one has done in
-        the time of a start.
-        """
+        """Hand tasks to a process, or a new one if it ends; with patience, only if many wait."""
         if self._patience_s > 0.0:
             self._closed.wait(self._patience_s)
             if self._waiting.qsize() < (number + 1) * max(1, self._done_here):
@@ -168,10 +159,7 @@ class Processes:
 
 @contextmanager
 def local_processes(workers: int, patience_s: float = 0.0) -> Generator[Processes]:
-    """Have processes do tasks during a `with` block, and end them after it, whatever they do.
-
-    Takes `patience_s`, the time [s] after which the first process starts, if work is left for it.
-    """
+    """Have processes do tasks during a `with` block; the first starts after `patience_s` [s]."""
     started = Processes(workers, patience_s)
     try:
         yield started
@@ -229,10 +217,7 @@ def _working_folder() -> str:
 
 
 def send(pipe: IO[bytes], value: Any) -> None:
-    """Send one value, after its length in bytes; the other process gets a copy.
-
-    Contiguous arrays keep their bits and stay read-only: protocol 5 writes their memory as it is.
-    """
+    """Send one value, after its length in bytes; protocol 5 keeps the bits of contiguous arrays."""
     message = pickle.dumps(value, protocol=5)
     pipe.write(LENGTH.pack(len(message)))
     pipe.write(message)
@@ -253,10 +238,7 @@ def _exactly(pipe: IO[bytes], length: int) -> bytes:
 
 
 def unpacked(message: bytes) -> Any:
-    """Return the value of a message, which came from a process of our own.
-
-    Nearly all objects made here live on: looking for unused ones would take longer than the rest.
-    """
+    """Return the value of a message of our own process, whose objects nearly all live on."""
     collects = gc.isenabled()
     gc.disable()
     try:
@@ -275,10 +257,7 @@ def _result_of(answer: bytes) -> Any:
 
 
 def main() -> None:
-    """Do the tasks that come through standard input, one after the other, until it ends.
-
-    Errors of a task are answers, too.
-    """
+    """Do the tasks that come through standard input until it ends; errors are answers, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
     gc.set_threshold(COLLECTED_AFTER)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")

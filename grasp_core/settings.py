@@ -32,14 +32,11 @@ class Settings(Declared):
 
     @classmethod
     def of_table(cls, table: object, where: str = "", usual: Any = None) -> Self:
-        """Make settings from a table of a file, with those of `usual` where it says nothing.
-
-        `where` leads to the table, such as 'execution'. An unknown name, a missing one and a value
-        that the class refuses are errors that name the setting. What the program chooses may stand
-        in a table with its usual value, as records have it.
-        """
-        given = named(table, for_users(cls), where, usual=_chosen(cls))
-        for each in fields(cast("Any", cls)):
+        """Make settings from a table of a file; those of `usual` stand where it says nothing."""
+        users, every = for_users(cls), fields(cast("Any", cls))
+        chosen = {each.name: default_of(each) for each in every if each.name not in users}
+        given = named(table, users, where, usual=chosen)
+        for each in every:
             inner = inside(types(cls)[each.name], Settings)
             if each.name in given and inner is not None:
                 own = default_of(each) if usual is None else getattr(usual, each.name)
@@ -75,13 +72,6 @@ def for_users(kind: type) -> tuple[str, ...]:
     return tuple(name for name, each in types(kind).items() if CHOSEN not in get_args(each))
 
 
-def _chosen(kind: type) -> dict[str, Any]:
-    """Return the usual values of the settings that the program chooses."""
-    users = for_users(kind)
-    every = fields(cast("Any", kind))
-    return {each.name: default_of(each) for each in every if each.name not in users}
-
-
 NONE_USUAL: Mapping[str, Any] = {}
 
 
@@ -89,10 +79,7 @@ def named(
     table: object, known: Collection[str], where: str, what: str = "setting",
     usual: Mapping[str, Any] = NONE_USUAL,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return a table of a file by name, if it is one and nothing in it is unknown.
-
-    Names with their `usual` value are left out.
-    """
+    """Return a table of a file by name, without names of `usual` values; refuse unknown names."""
     start = f"{where}: " if where else ""
     if not isinstance(table, Mapping):
         raise InputError(f"{start}expected a table of {what}s, got {shown(table)}")
@@ -116,10 +103,7 @@ def at(where: str, name: str) -> str:
 
 
 def extended(kind: type[Given], part: Settings, **more: Any) -> Given:
-    """Make settings of a class from those of a class that it extends, and from `more`.
-
-    Settings inside them are extended in the same way.
-    """
+    """Make settings of a class, and those inside, from those of a class that it extends."""
     given: dict[str, Any] = {name: getattr(part, name) for name in types(type(part))} | more
     for name, value in given.items():
         own = inside(types(kind)[name], Settings)
@@ -129,10 +113,7 @@ def extended(kind: type[Given], part: Settings, **more: Any) -> Given:
 
 
 def as_table(settings: Settings) -> dict[str, Any]:
-    """Return the settings of users as the table of a file that gives them when it is read.
-
-    What is None is left out, as TOML has no word for it.
-    """
+    """Return the settings of users as a table of a file, which has no word for None."""
     given = {name: getattr(settings, name) for name in for_users(type(settings))}
     return {
         name: as_table(value) if isinstance(value, Settings) else value

@@ -17,8 +17,7 @@ DEEPEST = 64
 """Largest number of objects and lists inside each other; files of graspproof have less than ten."""
 TOO_DEEP = f"objects and lists are nested more than {DEEPEST} deep; flatten the file"
 LARGEST_WHOLE = 2**64 - 1
-"""Largest whole number: larger ones are no seeds, counts or indices, and arrays cannot hold them.
-"""
+"""Largest whole number: larger ones are no seeds, counts or indices, nor fit into arrays."""
 LONGEST_ECHO = 40
 """Largest number of characters of a key that a message repeats."""
 KINDS: Mapping[str, Collection[str]] = {
@@ -33,8 +32,7 @@ KINDS: Mapping[str, Collection[str]] = {
     "wrench file": {"wrenches"},
     "contacts file": {"contacts"},
 }
-"""The JSON files of graspproof, and for each the keys that tell it from the files listed after it.
-"""
+"""The JSON files of graspproof, with the keys that tell each from those listed after it."""
 BESIDE = ("verdicts.json", "regions.json", "executions.json", "best.json")
 """Files that are kept in the same folder as the grasps.json that they belong to."""
 

@@ -60,6 +60,15 @@ class recorded(property):  # noqa: N801 - it is used as a decorator, as `propert
     """A property that files hold as well, for those who read them without this package."""
 
 
+@dataclass(frozen=True, slots=True)
+class Form:
+    """How values of a kind are written and read."""
+
+    write: Convert
+    read: Read | None
+    """Makes values of JSON for the constructor; None if it takes them as they are."""
+
+
 class Entry(NamedTuple):
     """How a field or a recorded property is written and read."""
 
@@ -67,9 +76,7 @@ class Entry(NamedTuple):
     key: str
     kind: Any
     default: Any
-    write: Convert
-    read: Read | None
-    """Makes values of JSON for the constructor; None if it takes them as they are."""
+    form: Form
     flat: type | None
     """The class whose keys stand among those of the outer record; None for other fields."""
 
@@ -97,9 +104,9 @@ def entries(kind: type) -> Entries:
         if UNRECORDED not in marks:
             key = next((rule.name for rule in marks if isinstance(rule, Key)), name)
             flat = inside_record(each) if FLAT in marks else None
-            own.append(Entry(name, key, each, defaults[name], writes(each), reads(each), flat))
+            own.append(Entry(name, key, each, defaults[name], form_of(each), flat))
     properties = [
-        Entry(name, name, said, MISSING, writes(said), None, None)
+        Entry(name, name, said, MISSING, form_of(said), None)
         for name, said in property_kinds(kind, recorded).items()
     ]
     return Entries(tuple(own), tuple(properties))
@@ -129,7 +136,7 @@ def record_of(value: object) -> dict[str, Any]:
     own, properties = entries(type(value))
     found: dict[str, Any] = {}
     for each in (*own, *properties):
-        plain = each.write(getattr(value, each.name))
+        plain = each.form.write(getattr(value, each.name))
         if each.flat is None:
             found[each.key] = plain
         else:
@@ -137,38 +144,30 @@ def record_of(value: object) -> dict[str, Any]:
     return found
 
 
-def writes(kind: Any) -> Convert:
-    """Return the function that makes plain JSON of values of a kind."""
+def form_of(kind: Any) -> Form:
+    """Return how values of a kind are written as plain JSON and read."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        if any(getattr(rule, "nan", False) for rule in parts[1:]):
-            return _array
-        return _finite if any(isinstance(rule, Null) for rule in parts[1:]) else writes(parts[0])
+        return _narrowed(*parts)
     if origin in (Union, UnionType):
-        inner = writes(next(part for part in parts if part is not type(None)))
-        return lambda value: None if value is None else inner(value)
+        inner = form_of(next(part for part in parts if part is not type(None)))
+        read = inner.read
+        return Form(
+            lambda value: None if value is None else inner.write(value),
+            read and (lambda value, where: None if value is None else read(value, where)),
+        )
     if origin is tuple:
-        return _items_written(parts)
+        return _items(parts)
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        one = writes(parts[1])
-        return lambda value: {name: one(each) for name, each in value.items()}
-    return _plain if inside_record(kind) is None else record_of
+        return _values(parts[1])
+    own = inside_record(kind)
+    return Form(_plain, None) if own is None else Form(record_of, partial(from_record, own))
 
 
 def inside_record(kind: Any) -> type | None:
     """Return the class of records of a kind, alone or beside None; None if there is none."""
     found: type | None = inside(kind, object)
     return found if is_dataclass(cast("Any", found)) else None
-
-
-def _items_written(parts: tuple[Any, ...]) -> Convert:
-    each, endless = [writes(part) for part in parts if part is not Ellipsis], parts[-1] is Ellipsis
-    if all(write is _plain for write in each):
-        return lambda value: [_plain(item) for item in value]
-    return lambda value: [
-        write(item)
-        for write, item in zip(each * len(value) if endless else each, value, strict=True)
-    ]
 
 
 def _finite(value: Any) -> Any:
@@ -194,13 +193,7 @@ def _plain(value: Any) -> Any:
 
 
 def from_record(kind: type[Record], found: object, where: str = "", **beside: Any) -> Record:
-    """Make a value of an object of JSON; `where` leads to it, such as 'verdicts[0]'.
-
-    `beside` holds fields that are in no file.
-
-    A key that is unknown or missing, a value that the class refuses, and a recorded property that
-    the other fields contradict are errors that name the field.
-    """
+    """Make a value of an object of JSON at a place such as 'verdicts[0]'; faults name the field."""
     own, properties = entries(kind)
     given = named(found, keys(kind), where, "field")
     taken: dict[str, Any] = {}
@@ -213,7 +206,7 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
             if each.default is MISSING:
                 raise InputError(f"{at(where, each.key)}: missing; add it")
         else:
-            value, read = given[each.key], each.read
+            value, read = given[each.key], each.form.read
             taken[each.name] = value if read is None else read(value, at(where, each.key))
     said = {each.name: taken.pop(each.name) for each in properties}
     try:
@@ -226,7 +219,7 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
     except InputError as error:
         raise placed(error, where) from None
     for each in properties:
-        ours = each.write(getattr(made, each.name))
+        ours = each.form.write(getattr(made, each.name))
         for place, given_there, ours_there in _differences(said[each.name], ours):
             raise InputError(
                 f"{at(where, each.key)}{place}: {_told(given_there)} contradicts the other fields, "
@@ -235,39 +228,24 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
     return made
 
 
-def reads(kind: Any) -> Read | None:
-    """Return the function that makes values of a kind of JSON; None if nothing is to be made."""
-    origin, parts = get_origin(kind), get_args(kind)
-    if origin is Annotated:
-        return _narrowed_read(*parts)
-    if origin in (Union, UnionType):
-        inner = reads(next(part for part in parts if part is not type(None)))
-        return inner and (lambda value, where: None if value is None else inner(value, where))
-    if origin is tuple:
-        return _items_read(parts)
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        return _values_read(parts[1])
-    own = inside_record(kind)
-    return None if own is None else partial(from_record, own)
-
-
-def _narrowed_read(kind: Any, *given: Any) -> Read | None:
+def _narrowed(kind: Any, *given: Any) -> Form:
     null = next((rule for rule in given if isinstance(rule, Null)), None)
     if null is not None:
-        return lambda value, _where: null.value if value is None else value
+        return Form(_finite, lambda value, _where: null.value if value is None else value)
     array = next((rule for rule in given if hasattr(rule, "take")), None)
     if array is not None:
-        return partial(_array_read, array.shape)
-    inner, many = reads(kind), next((rule for rule in given if isinstance(rule, Many)), None)
-    if inner is None or many is None:
+        return Form(_array if array.nan else _plain, partial(_array_read, array.shape))
+    inner, many = form_of(kind), next((rule for rule in given if isinstance(rule, Many)), None)
+    own = inner.read
+    if own is None or many is None:
         return inner
 
     def read(value: Any, where: str) -> Any:
         if isinstance(value, list) and not many.holds(cast("list[Any]", value)):
             raise InputError(f"{where} {many.fault(cast('list[Any]', value))}")
-        return inner(value, where)
+        return own(value, where)
 
-    return read
+    return Form(inner.write, read)
 
 
 def _array_read(shape: tuple[int | str | None, ...], value: Any, where: str) -> Any:
@@ -284,37 +262,40 @@ def _array_read(shape: tuple[int | str | None, ...], value: Any, where: str) -> 
     return cast("Any", value)
 
 
-def _items_read(parts: tuple[Any, ...]) -> Read | None:
-    """Read the items of a list; what is no list is left to the constructor to refuse."""
-    each, endless = [reads(part) for part in parts if part is not Ellipsis], parts[-1] is Ellipsis
-    if not any(each):
-        return None
+def _items(parts: tuple[Any, ...]) -> Form:
+    """Write and read the items of a list; what is no list is left to the constructor to refuse."""
+    each, endless = [form_of(part) for part in parts if part is not Ellipsis], parts[-1] is Ellipsis
+
+    def write(value: Any) -> list[Any]:
+        forms = each * len(value) if endless else each
+        return [form.write(item) for form, item in zip(forms, value, strict=True)]
 
     def read(value: Any, where: str) -> Any:
         if not isinstance(value, list):
             return value
         items = cast("list[Any]", value)
-        readers = each * len(items) if endless else each
+        forms = each * len(items) if endless else each
         return [
-            item if one is None else one(item, f"{where}[{place}]")
-            for place, (one, item) in enumerate(zip(readers, items, strict=False))
-        ] + items[len(readers) :]
+            item if form.read is None else form.read(item, f"{where}[{place}]")
+            for place, (form, item) in enumerate(zip(forms, items, strict=False))
+        ] + items[len(forms) :]
 
-    return read
+    return Form(write, read if any(form.read for form in each) else None)
 
 
-def _values_read(kind: Any) -> Read | None:
-    one = reads(kind)
-    if one is None:
-        return None
+def _values(kind: Any) -> Form:
+    one = form_of(kind)
+
+    def write(value: Any) -> dict[str, Any]:
+        return {name: one.write(each) for name, each in value.items()}
 
     def read(value: Any, where: str) -> Any:
-        if not isinstance(value, dict):
+        if one.read is None or not isinstance(value, dict):
             return value
         table = cast("dict[str, Any]", value)
-        return {name: one(item, at(where, name)) for name, item in table.items()}
+        return {name: one.read(item, at(where, name)) for name, item in table.items()}
 
-    return read
+    return Form(write, one.read and read)
 
 
 ABSENT = object()
@@ -329,10 +310,7 @@ def _told(value: Any) -> str:
 
 
 def _differences(said: Any, ours: Any, place: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield where a file and its other fields say different things: numbers up to rounding.
-
-    Of sentences only the number counts, which another version may word otherwise.
-    """
+    """Yield where a file contradicts itself: numbers beyond rounding, and numbers of sentences."""
     if isinstance(said, list) and isinstance(ours, list):
         theirs, own = cast("list[Any]", said), cast("list[Any]", ours)
         texts = all(isinstance(each, str) for each in (*theirs, *own))

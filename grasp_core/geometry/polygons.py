@@ -218,8 +218,7 @@ def _edges(loop: list[int]) -> list[tuple[int, int]]:
 
 FEWEST_CORNERS, MOST_CORNERS = 3, 5000
 WIDTH, FINE = 1e-6, 1e-9
-"""Largest error of a claimed radius of the largest disc: relative to it, and to the extent of
-the polygon."""
+"""Largest error of a claimed radius of the largest disc, over it and over the polygon's extent."""
 LEFT_OUT = 2e-3
 """Share of a polygon's area by which it may fail to cover its disc: half of it is given up to have
 fewer corners, the rest is for `SIDES`."""

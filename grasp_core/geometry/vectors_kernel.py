@@ -36,11 +36,7 @@ def crossed(u: Array, v: Array) -> tuple[float, float, float]:
 
 @loop()
 def vanishing_weights(vectors: Array) -> tuple[float, float, float, float]:
-    """Return weights of sum w_i v_i = 0 for four vectors, by Cramer's rule.
-
-    They are determinants of the other three vectors, all of one sign where the four positively
-    span.
-    """
+    """Return w_i of sum w_i v_i = 0 by Cramer's rule: of one sign where vectors positively span."""
     one, two, three, four = vectors[0], vectors[1], vectors[2], vectors[3]
     (x, y, z), (u, v, w) = crossed(one, two), crossed(three, four)
     return (

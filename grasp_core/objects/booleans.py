@@ -2,7 +2,6 @@
 
 import importlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,21 +10,17 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import signed_area
+from grasp_core.objects.surface import Mesh
 from grasp_core.solvers.ties import graded, largest_first
 
 GRID_DIGITS = 9
 """Digits to which corners are rounded before triangulation, for figures of size one."""
 GRID = 4e-8
-"""Extra distance by which figures of size one are shrunk, because manifold3d rounds coordinates to
-1e-8."""
+"""Extra inset of figures of size one, because manifold3d rounds coordinates to 1e-8."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Solid:
+class Solid(Mesh):
     """A closed triangle mesh, wound counter-clockwise seen from outside."""
-
-    vertices: Array  # (n, 3) [m]
-    triangles: Indices  # vertex indices, (t, 3)
 
     def __add__(self, other: "Solid") -> "Solid":
         return _solid(_manifold(self) + _manifold(other))
@@ -33,12 +28,6 @@ class Solid:
     def __sub__(self, other: "Solid") -> "Solid":
         """Return the part of this solid that is outside of the other."""
         return _solid(_manifold(self) - _manifold(other))
-
-    @property
-    def volume(self) -> float:
-        """Return the enclosed volume [m^3]; it is negative when the mesh is inside out."""
-        corners = self.vertices[self.triangles] - self.vertices.mean(axis=0)
-        return float(np.linalg.det(corners).sum()) / 6.0
 
     def moved(self, offset: ArrayLike) -> "Solid":
         """Return this solid moved by an offset, (3,) [m]."""
@@ -87,12 +76,12 @@ def inset_figure(loops: Sequence[Array], margin: float) -> list[list[Array]]:
     ]
 
 
-def intersection_volume(one: Solid, two: Solid) -> float:
+def intersection_volume(one: Mesh, two: Mesh) -> float:
     """Compute the volume that two solids share [m^3]."""
     return float((_manifold(one) ^ _manifold(two)).volume())
 
 
-def union(solids: Sequence[Solid], numbers: Sequence[Indices]) -> tuple[Solid, Indices]:
+def union(solids: Sequence[Mesh], numbers: Sequence[Indices]) -> tuple[Solid, Indices]:
     """Unite solids whose triangles are numbered; parts of triangles keep their numbers, (t,)."""
     kernel = _kernel()
     parts = list(map(_manifold, solids, numbers))
@@ -104,7 +93,7 @@ def _kernel() -> Any:
     return importlib.import_module("manifold3d")
 
 
-def _manifold(solid: Solid, numbers: Indices | None = None) -> Any:
+def _manifold(solid: Mesh, numbers: Indices | None = None) -> Any:
     kernel = _kernel()
     mesh = kernel.Mesh64(
         np.array(solid.vertices, order="C"),

@@ -1,16 +1,21 @@
 """Splits an object's faces into convex pieces, moved and scaled so that the object has size one.
 
 All linear programs work on these pieces, so their tolerances mean the same for every object.
+
+Faces are also shrunk before planning: by a margin along edges, or into two halves for two fingers.
+Then the face counts twice, as two halves with a gap between them. It is cut once, across its
+longest direction and in its middle. Grasps found on the halves hold for the face. If none are
+found, nothing is proved, as other cuts were not tried.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, product
+from itertools import chain, combinations, product
 from typing import Annotated, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Amount, Array, Point, Shape, UnitVector
+from grasp_core.arrays import Amount, Array, Indices, Point, Shape, UnitVector
 from grasp_core.declared import Declared
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
@@ -20,16 +25,20 @@ from grasp_core.geometry.polygons import (
     convex_polygon,
     edge_rows,
     has_inscribed_radius,
+    merge_into_convex_pieces,
+    plane_frame,
 )
+from grasp_core.objects.booleans import inset_figure, triangulate
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import Face
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import graded
+from grasp_core.values import FINGERS
 
 THINNEST = 1e-6
 """Least radius of the largest disc in a piece that can hold a contact (object size one)."""
 SOUND = 1e-9
-"""Largest disagreement between fields of one piece that counts as rounding (object size one), and
-relative to a piece that is smaller."""
+"""Largest disagreement of a piece's fields that counts as rounding, relative to a small piece."""
 
 SAME_PLACE = 6
 """Digits to which distances are compared (object size one); the order of the pieces breaks ties."""
@@ -192,3 +201,71 @@ def inscribed_radius(E: Array, b: Array) -> float:
     rows = np.column_stack([E, np.ones(len(E))])
     best = maximize(LinearProgram(np.array([0.0, 0.0, 1.0]), rows, b))
     return best.value if isinstance(best, Optimum) else 0.0
+
+
+SAME_LENGTH = 1.0 - 1e-6
+"""Share of the largest length from which two count as equal; the first of equal ones is taken."""
+
+
+def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
+    """Add halves of faces that are long enough for two contacts; also list each face's owner."""
+    faces, owners = list(body.faces), list(range(len(body.faces)))
+    for index, face in enumerate(body.faces):
+        halves = _halves(face, apart)
+        faces += halves
+        owners += [index] * len(halves)
+    return replace(body, faces=tuple(faces)), tuple(owners)
+
+
+def shared_quadruples(owners: Sequence[int]) -> Indices:
+    """List face quadruples with both halves of one face, or of two faces, (q, 4)."""
+    whole = [index for index, owner in enumerate(owners) if index == owner]
+    halves: dict[int, list[int]] = {}
+    for index, owner in enumerate(owners):
+        if index != owner:
+            halves.setdefault(owner, []).append(index)
+    found = [
+        (*others, *pair)
+        for owner, pair in halves.items()
+        for others in combinations([index for index in whole if index != owner], 2)
+    ]
+    found += [(*one, *two) for one, two in combinations(halves.values(), 2)]
+    return np.array(found, dtype=np.int64).reshape(-1, FINGERS)
+
+
+def _halves(face: Face, apart: float) -> list[Face]:
+    frame = plane_frame(face.normal)
+    pieces = [(piece - face.centroid) @ frame for piece in face.pieces]
+    if not pieces:
+        return []
+    # along the line between the two corners that are farthest apart
+    border = (face.polygon - face.centroid) @ frame
+    gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
+    i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
+    along = (border[j] - border[i]) / gaps[i, j]
+    heights = np.concatenate(pieces) @ along
+    middle = 0.5 * float(heights.min() + heights.max())
+    halves: list[Face] = []
+    for side in (-1.0, 1.0):
+        limit = np.array([side * middle - 0.5 * apart])
+        parts = [clip(piece, side * along[None], limit) for piece in pieces]
+        parts = [part for part in parts if len(part) > 2]  # noqa: PLR2004 - else not a polygon
+        if parts:
+            polygon, *pieces_here = (
+                face.centroid + part @ frame.T for part in (convex_hull(np.vstack(parts)), *parts)
+            )
+            halves.append(replace(face, polygon=polygon, holes=(), pieces=tuple(pieces_here)))
+    return halves if len(halves) == 2 else []  # noqa: PLR2004 - both or none
+
+
+def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
+    """Shrink an object's faces so that contacts keep a distance from all edges and holes."""
+    faces: list[Face] = []
+    for face in body.faces:
+        frame, pieces = plane_frame(face.normal), list[Array]()
+        loops = [(loop - face.centroid) @ frame for loop in (face.polygon, *face.holes)]
+        for figure in inset_figure(loops, margin):
+            convex = merge_into_convex_pieces(np.vstack(figure), triangulate(figure))
+            pieces += [face.centroid + piece @ frame.T for piece in convex]
+        faces.append(replace(face, pieces=tuple(pieces)))
+    return replace(body, faces=tuple(faces))

@@ -26,14 +26,12 @@ from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import nearest_on_segments
 from grasp_core.kinds import instance
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.surface import Face
-from grasp_core.objects.triangles import areas_and_normals
+from grasp_core.objects.surface import Face, areas_and_normals
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6
-"""Largest distance of a contact from its face, in object radii: files that keep six digits stay
-within it."""
+"""Largest distance of a contact from its face [object radii]: six digits of a file keep it."""
 
 
 def check_body(body: Polyhedron) -> None:

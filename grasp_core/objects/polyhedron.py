@@ -61,8 +61,7 @@ class Polyhedron(Declared, InNotebooks):
 
     def __post_init__(self) -> None:
         Declared.__post_init__(self)
-        away = self.vertices - self.center_of_mass
-        reach = np.linalg.norm(away, axis=1).max(initial=0.0)
+        reach = np.linalg.norm(self.vertices - self.center_of_mass, axis=1).max(initial=0.0)
         object.__setattr__(self, "radius", float(reach))
 
     def _check_together(self) -> None:
@@ -220,9 +219,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
 ) -> AnyPolyhedron:
     """Check a triangle mesh and build the polyhedron of its faces."""
     value_of(str, name, "name")
-    made = build(
-        vertices, triangles, choices, rounding=rounding, center_of_mass=center_of_mass, known=known
-    )
+    made = build(vertices, triangles, choices, rounding, center_of_mass, known)
     return kind(name=name, source_sha256=source_sha256 or made["content_sha256"], **made)
 
 

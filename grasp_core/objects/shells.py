@@ -1,4 +1,4 @@
-"""Makes one solid of the closed shells of a mesh: turns, unites, leaves out, or refuses them.
+"""Decides which side of a surface is inside, and makes one solid of the closed shells of a mesh.
 
 A shell is a part of the mesh that connects across edges. A shell that encloses a positive volume is
 a body; one of negative volume is a cavity if a body encloses it, and a body that is inside out if
@@ -6,33 +6,59 @@ it is beside all others. Bodies that overlap or touch are united. A body inside 
 another cannot be told from a cavity that is wound like the outside, so it is refused, as are bodies
 apart from each other. Parts that would be refused are left out if all of them together have next to
 no area, or if the user asks for the largest part alone.
+
+Of open surfaces, winding numbers decide it. The winding number of a point is the sum of the solid
+angles of all triangles as seen from it, divided by that of the whole sphere. It is one inside a
+closed surface that is wound counter-clockwise seen from outside, and zero outside. It jumps by one
+across each triangle, so on a triangle the mean of both sides, in which the triangle itself does not
+count, is
+
+    1/2   where the triangle bounds the solid,
+    -1/2  where it does so inside out,
+    3/2   where it is inside another part of the solid.
+
+Holes change these values by the share of the sphere that they fill, seen from the triangle. A
+triangle of an open surface is certain to be outward if it bounds the solid by this rule, as far as
+holes allow. Where so much of the surface is missing that the sign of the mean winding number could
+come from the shape of the hole, as with one half of a ball, nothing is certain.
+
+Sources: Van Oosterom and Strackee, "The solid angle of a plane triangle", 1983; Jacobson, Kavan and
+Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers", 2013.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_core.arrays import Indices
+from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
+from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.booleans import Solid, intersection_volume, union
-from grasp_core.objects.surface import SoundSurface
-from grasp_core.objects.triangles import Edges, crosses_of, triangle_areas
+from grasp_core.objects.surface import (
+    NO_CAPS,
+    Edges,
+    Mesh,
+    SoundSurface,
+    components,
+    crosses_of,
+    numbered,
+)
 
 OVERLAP = 1e-6
-"""Volume shared by two parts, relative to the whole, above which they overlap; parts that only
-touch share what rounding leaves."""
+"""Volume shared by two parts, over the whole, above which they overlap and not only touch."""
 SMALL = 0.01
 """Largest share of the surface that is left out without being asked for."""
 CLEAN = 1e-4
-"""Largest share of the surface of a union that may be beside slits as thin as rounding; edges of
-sound unions show some 1e-6."""
+"""Largest share of a union's surface beside slits as thin as rounding; sound ones show 1e-6."""
 THINNEST = 1e-9
 """Least volume of a solid, relative to the cube of the extent."""
 THIN = 4e-6
 """Width of a slit, relative to the extent, which rounding in single precision may leave."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Body(Solid):
     """A body with its cavities."""
 
@@ -40,7 +66,7 @@ class _Body(Solid):
 
     @property
     def area(self) -> float:
-        return float(triangle_areas(self.vertices, self.triangles).sum())
+        return float(self.areas.sum())
 
     def joined(self, other: "_Body") -> "_Body":
         return _Body(
@@ -52,50 +78,48 @@ class _Body(Solid):
     def turned(self) -> "_Body":
         return _Body(self.vertices, self.triangles[:, ::-1], self.marks)
 
-    def parts(self, label: Indices) -> "list[_Body]":
-        """Split the body into the parts that triangles belong to, numbered (t,)."""
-        parts = list[_Body]()
+    def parts(self) -> "list[_Body]":
+        """Split the body into parts that share no edge."""
+        label, parts = self.edges.parts(), list[_Body]()
         for part in range(int(label.max()) + 1):
             mine = label == part
-            used, local = np.unique(self.triangles[mine], return_inverse=True)
-            parts.append(_Body(self.vertices[used], local.reshape(-1, 3), self.marks[mine]))
+            used = self.with_triangles(self.triangles[mine])
+            parts.append(_Body(used.vertices, used.triangles, self.marks[mine]))
         return parts
 
 
-def one_solid(found: SoundSurface, *, most: int, largest_part: bool) -> SoundSurface:
+def one_solid(found: SoundSurface, choices: MeshChoices) -> SoundSurface:
     """Orient the shells of a closed surface outwards, and make one solid of them."""
-    corners, said = found.corners, list[str]()
-    whole = Solid(found.points, corners)
-    check_volume(whole)
-    if whole.volume < 0.0:
-        corners = corners[:, ::-1]
+    triangles, said = found.triangles, list[str]()
+    check_volume(found)
+    if found.volume < 0.0:
+        triangles = triangles[:, ::-1]
         said.append("the mesh was inside out; its triangles were turned")
-    label = Edges.of(corners).parts()
-    if (count := int(label.max()) + 1) > most:
+    whole = _Body(found.vertices, triangles, np.arange(len(triangles)))
+    shells = whole.parts()
+    if (count := len(shells)) > (most := choices.max_parts):
         raise MeshError(
             MeshRefusal.SEPARATE,
             f"the mesh has {count} parts, more than the limit of {most}; give one solid",
         )
-    as_it_is = found.mended(found.points, corners, found.surface.caps, 0.0, said)
+    as_it_is = found.mended(whole, found.surface.caps, 0.0, said)
     if count == 1:
         return as_it_is
-    shells = _Body(found.points, corners, np.arange(len(corners))).parts(label)
     try:
-        kept, dropped, changed = _of_many(shells, abs(whole.volume), largest_part=largest_part)
+        kept, dropped, changed = _of_many(shells, abs(found.volume), choices.largest_part)
     except InputError as error:
         if isinstance(error, MeshError):
             raise
         raise MeshError(MeshRefusal.NON_MANIFOLD, f"parts cannot be compared: {error}") from error
     if not changed:
         return as_it_is
-    used, local = np.unique(kept.triangles, return_inverse=True)
     is_cap = np.flatnonzero(np.isin(kept.marks, found.surface.caps))
-    points, corners = kept.vertices[used], local.reshape(-1, 3)
-    return found.mended(points, corners, is_cap, dropped, [*said, *changed])
+    used = kept.with_triangles(kept.triangles)
+    return found.mended(used, is_cap, dropped, [*said, *changed])
 
 
 def _of_many(
-    shells: list[_Body], volume: float, *, largest_part: bool
+    shells: list[_Body], volume: float, largest_part: bool
 ) -> tuple[_Body, float, list[str]]:
     """Return the one body to use, the share of the area left out, and what else was changed."""
     said = list[str]()
@@ -130,8 +154,7 @@ def _sorted_out(
     shells: list[_Body], slack: float, said: list[str]
 ) -> tuple[list[_Body], list[_Body], MeshError | None]:
     """Give each cavity to its body; return bodies, parts that cannot be used, and the reason."""
-    thinnest = [THINNEST * float(np.ptp(s.vertices, axis=0).max()) ** 3 for s in shells]
-    flat = [s for s, least in zip(shells, thinnest, strict=True) if abs(s.volume) <= least]
+    flat = [s for s in shells if abs(s.volume) <= THINNEST * s.extent**3]
     bodies = [s for s in shells if s not in flat and s.volume > 0.0]
     bad: list[_Body] = flat
     why: MeshError | None = None
@@ -190,9 +213,7 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
     if len(bodies) == 1:
         return bodies
     solid, marks = union(bodies, [body.marks for body in bodies])
-    label = Edges.of(solid.triangles).parts()
-    shells = _Body(solid.vertices, solid.triangles, marks).parts(label)
-    found = _with_cavities(shells, slack)
+    found = _with_cavities(_Body(solid.vertices, solid.triangles, marks).parts(), slack)
     if len(found) == len(bodies):
         return bodies
     if max(map(thin_share, found)) > CLEAN:
@@ -217,10 +238,9 @@ def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
     return bodies
 
 
-def check_volume(solid: Solid) -> None:
+def check_volume(solid: Mesh) -> None:
     """Refuse a solid that encloses almost no volume."""
-    extent = float(np.ptp(solid.vertices, axis=0).max())
-    if abs(solid.volume) < THINNEST * extent**3:
+    if abs(solid.volume) < THINNEST * solid.extent**3:
         message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
@@ -232,10 +252,152 @@ def thin_share(solid: Solid) -> float:
     that it shows along the axis, each wall counted, less what slits and walls thinner than the step
     hide. The largest share of the three axes is returned.
     """
-    step = THIN * float(np.ptp(solid.vertices, axis=0).max())
-    corners = solid.vertices[solid.triangles]
-    seen = 0.25 * np.abs(crosses_of(corners)).sum(axis=0)
+    step = THIN * solid.extent
+    seen = 0.25 * np.abs(crosses_of(solid.corners)).sum(axis=0)
     left = [
         solid.volume - intersection_volume(solid, solid.moved(step * axis)) for axis in np.eye(3)
     ]
     return float(np.abs(seen - np.array(left) / step).max() / seen.max())
+
+
+CERTAIN = 0.4
+"""Least mean winding number on an open surface that is taken for outward: half a ball has 0.3."""
+NEAR = 0.25
+"""Largest distance from 1/2 of the winding number on a part that bounds the solid."""
+
+
+def check_bounds(surface: Mesh) -> None:
+    """Refuse a closed surface if more than next to nothing of it does not bound the solid."""
+    winding = winding_on(surface.corners, sampled(surface.areas))
+    off = float((np.abs(winding - 0.5) > NEAR).mean())
+    if off > SMALL:
+        raise _crossing(off)
+
+
+def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
+    """Orient the parts of an open surface outwards."""
+    # parts connect across edges of two triangles
+    here, side = np.nonzero(found.across >= 0)
+    links = np.column_stack([here, found.across[here, side]])
+    label, said = numbered(len(found.triangles), links), list[str]()
+    mesh, whole, count = Mesh(found.vertices, found.triangles), found.areas.sum(), label.max() + 1
+    if largest_part:
+        kept = label == np.bincount(label, weights=mesh.areas).argmax()
+        mesh = Mesh(mesh.vertices, mesh.triangles[kept])
+        label = np.zeros(len(mesh.triangles), np.int64)
+    sizes = np.bincount(label, weights=mesh.areas)
+    winding = _winding_of_parts(mesh, label)
+    turn = winding * (1.0 if sizes @ winding > 0.0 else -1.0) < -NEAR
+    turn ^= bool(sizes @ winding < 0.0)
+    if turn.any():
+        turned = np.where(turn[label][:, None], mesh.triangles[:, ::-1], mesh.triangles)
+        mesh = Mesh(mesh.vertices, turned)
+        winding = _winding_of_parts(mesh, label)
+        said.append(f"{int(turn.sum())} of {len(sizes)} parts of the open surface were inside out; "
+                    "their triangles were turned")  # fmt: skip
+    sound = np.abs(winding - 0.5) <= NEAR
+    mean = float(sizes @ winding / sizes.sum())
+    unsound = float(sizes[~sound].sum()) / whole
+    if unsound > SMALL and mean > CERTAIN:
+        raise _crossing(unsound)
+    if unsound > SMALL or not mean >= CERTAIN:
+        raise MeshError(
+            MeshRefusal.OPEN,
+            "the surface is open, and it is not certain which side is inside: the mean winding "
+            f"number on it is {mean:.2f}, expected 0.5 but for what holes are missing, at least "
+            f"{CERTAIN}; close the surface, or leave out all but its largest part (--largest-part)",
+        )
+    dropped = unsound + 1.0 - float(sizes.sum()) / whole if largest_part else unsound
+    if (apart := int(count - sound.sum())) > 0:
+        said.append(left_out(apart, dropped))
+    used = mesh.with_triangles(mesh.triangles[sound[label]])
+    return found.mended(used, NO_CAPS, max(dropped, 0.0), said)
+
+
+def _winding_of_parts(mesh: Mesh, label: Indices) -> Array:
+    """Average the winding number over samples of each part, (parts,); 0 for parts not looked at."""
+    places = sampled(mesh.areas)
+    _, first = np.unique(label, return_index=True)
+    unseen = first[~np.isin(np.arange(len(first)), label[places])]
+    places = np.concatenate([places, unseen[: MOST_ANGLES // len(mesh.triangles)]])
+    found = winding_on(mesh.corners, places)
+    sums, counts = (
+        np.bincount(label[places], weights=weight, minlength=len(first))
+        for weight in (found, np.ones(len(places)))
+    )
+    return sums / np.maximum(counts, 1.0)
+
+
+def _crossing(share: float) -> MeshError:
+    return MeshError(
+        MeshRefusal.OVERLAP,
+        f"{100.0 * share:.2g} % of the surface is inside other parts of it, or bounds nothing; "
+        "unite the parts and repair the surface in a modelling program, or leave out all parts but "
+        "the largest (--largest-part)",
+    )
+
+
+MOST_ANGLES = 2_000_000
+"""Largest number of solid angles that are computed for one mesh."""
+FEWEST_SAMPLES, MOST_SAMPLES = 32, 256
+BLOCK = 20_000
+"""Number of solid angles computed at a time, which stays in the processor's cache."""
+
+
+def sampled(areas: Array) -> Indices:
+    """Choose triangles that stand for equal shares of a surface each, (s,)."""
+    count = min(max(MOST_ANGLES // len(areas), FEWEST_SAMPLES), MOST_SAMPLES, len(areas))
+    upto: Array = np.cumsum(areas)
+    middles = np.linspace(0.0, float(upto[-1]), 2 * count + 1)[1::2]
+    return np.minimum(np.searchsorted(upto, middles), len(areas) - 1)
+
+
+def winding_on(corners: Array, places: Indices) -> Array:
+    """Compute the mean winding number of both sides of triangles, at their middles, (s,)."""
+    found = np.zeros(len(places))
+    step = max(BLOCK // len(corners), 1)
+    axes = np.ascontiguousarray(corners.transpose(2, 1, 0))
+    for start in range(0, len(places), step):
+        asked = places[start : start + step]
+        angles = solid_angles(axes, corners[asked].mean(axis=1))
+        angles[np.arange(len(asked)), asked] = 0.0
+        found[start : start + step] = angles.sum(axis=1) / (4.0 * math.pi)
+    return found
+
+
+def solid_angles(axes: Array, points: Array) -> Array:
+    """Return signed solid angles of triangles (3, 3, t), coordinates first, (points, t)."""
+    x, y, z = (axes[k] - points[:, k, None, None] for k in range(3))
+    lengths = np.sqrt(x * x + y * y + z * z)
+    (ax, bx, cx), (ay, by, cy), (az, bz, cz), (a, b, c) = (
+        each.transpose(1, 0, 2) for each in (x, y, z, lengths)
+    )
+    volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    spread = (
+        a * b * c
+        + (ax * bx + ay * by + az * bz) * c
+        + (bx * cx + by * cy + bz * cz) * a
+        + (cx * ax + cy * ay + cz * az) * b
+    )
+    return 2.0 * np.arctan2(volume, spread)
+
+
+def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.bool_]] | None:
+    """Wind triangles as most of their part by area; also say which turned. None if one-sided."""
+    edges = Edges.of(corners)
+    across, against = edges.neighbours(), edges.against[edges.place].reshape(-1, 3)
+    # each triangle counts twice, as it is and turned; those that are wound alike are linked
+    inner, count = across >= 0, len(corners)
+    here, there, flip = np.nonzero(inner)[0], across[inner], count * against[inner]
+    links = np.column_stack([here, there + flip, here + count, there + count - flip])
+    one, other = components(2 * count, links.reshape(-1, 2)).reshape(2, count)
+    if (one == other).any():
+        return None
+    # the first triangle of each part stands as it is
+    turned, part = other < one, np.minimum(one, other)
+    size, swept = (
+        np.bincount(part, weights=weight, minlength=len(corners))
+        for weight in (areas, areas * turned)
+    )
+    turned ^= (swept > 0.5 * size)[part]
+    return np.where(turned[:, None], corners[:, ::-1], corners), turned

@@ -14,39 +14,45 @@ of them counts: the first in the order of the file does.
 
 Only flags on the rarest kind of face, at its rarest kind of corner, are compared.
 
-Faces are also shrunk here before planning: into two halves for two fingers, or by a margin along
-edges. For two fingers on one face, the face counts twice, as two halves with a gap between them. It
-is cut once, across its longest direction and in its middle. Grasps found on the halves hold for the
-face. If none are found, nothing is proved, as other cuts were not tried.
+Symmetries. Solved: all orthogonal matrices Q for which x -> c + Q (x - c), with the centre of mass
+c, maps the object's vertices and its faces to themselves, each to within a small share of the
+object's radius.
+
+A symmetry takes one chosen flag to a flag at the same distances, and the two frames say which
+rotation, and which reflection, does it. Every candidate is then tried on all vertices and faces.
+The chosen flag is on a face that few others resemble, so that candidates are few. Numbers are
+compared by their distance, never by their digits.
+
+Two grasps are copies of each other if a symmetry maps contacts, force cones, lines of force and
+foci of one to those of the other, whatever the order of their fingers.
 """
 
+import importlib
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
-from typing import TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
-from grasp_core.geometry.polygons import clip, convex_hull, merge_into_convex_pieces, plane_frame
-from grasp_core.objects.booleans import inset_figure, triangulate
-from grasp_core.objects.face_pieces import Shapes, face_shapes
+from grasp_core.arrays import Array, Indices, Shape
+from grasp_core.declared import Declared
+from grasp_core.objects.face_pieces import Shapes, face_shapes, shared_quadruples
 from grasp_core.objects.planar_faces import convex_pieces, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import graded
-from grasp_core.values import FINGERS
+from grasp_core.values import FINGERS, Grasp
 
 FLIP = np.array([1.0, 1.0, -1.0])
 """Signs of the coordinates in the mirror image: only z changes its sign, which is exact."""
 CELL_DIGITS = 6
 """Digits to which lengths (object size one) and cosines are compared."""
 SHORTEST = 1e-3
-"""Least distance of a corner from its face's centre at which their connecting line gives a
-direction, in object radii."""
+"""Least distance of a corner from its face's centre that gives a direction [object radii]."""
 
 Cells: TypeAlias = tuple[float, ...]
 
@@ -82,13 +88,13 @@ def standard(body: Polyhedron) -> Standard:
     """Put an object into standard order and handedness, which depend on its shape alone."""
     images = (body, mirror_image(body))
     views = ((image, flag_frame(image, *flag)) for image in images for flag in _rarest_flags(image))
-    first = min(((_looks(image, frame), image, frame) for image, frame in views), default=None,
-                key=lambda view: view[0])  # fmt: skip
+    seen = ((_cells(image, frame), image, frame) for image, frame in views)
+    first = min(seen, default=None, key=lambda view: sorted(view[0].tolist()))
     if first is None:
         faces = tuple(range(len(body.faces)))
         return Standard(body, faces, mirrored=False, owners=faces)
-    _, image, frame = first
-    order: list[int] = np.lexsort(_cells(image, frame).T[::-1]).tolist()
+    cells, image, frame = first
+    order: list[int] = np.lexsort(cells.T[::-1]).tolist()
     extent = float(np.ptp(body.vertices, axis=0).max())
     slack = planar_slack(extent, body.surface.flatness_m)
     faces = tuple(_relisted(image.faces[face], image, frame, slack) for face in order)
@@ -172,11 +178,6 @@ def flag_frame(body: Polyhedron, face: int, corner: int) -> Array:
     return np.asarray(np.column_stack([toward, across, normal]), dtype=np.float64)
 
 
-def _looks(body: Polyhedron, frame: Array) -> tuple[Cells, ...]:
-    """Sort the rows of `_cells` for all faces in a frame in lexicographic order."""
-    return tuple(sorted(map(tuple, _cells(body, frame).tolist())))
-
-
 def _cells(body: Polyhedron, frame: Array) -> Array:
     """Describe each face in a frame by its area, centre and normal, rounded to cells, (f, 7)."""
     areas = np.array([face.area for face in body.faces]) / body.radius**2
@@ -209,70 +210,169 @@ def _corner_cells(corners: Array, body: Polyhedron, frame: Array) -> Array:
     return graded((corners - body.center_of_mass) / body.radius @ frame, CELL_DIGITS)
 
 
-SAME_LENGTH = 1.0 - 1e-6
-"""Share of the largest length from which two lengths count as equal. The first of equal ones is
-taken, so that rounding decides nothing."""
+SAME_BODY = 1e-4
+"""Largest distance between a vertex or a face's centre, as a symmetry maps it, and the nearest one
+of the object, in object radii: files that keep five digits stay within it."""
+SAME_GRASP = 1e-3
+"""Largest distance between contacts or foci of two copies, in object radii, and between directions
+of their normals and force cones: a picture of this object shows no smaller one."""
+FAR = 4.0
+"""Distance from which foci are compared by direction, to the same share of it [object radii]."""
+MOST_FACES = 200
+"""Largest number of faces of objects whose symmetries are looked for, as for exact planning."""
+CROWDED = 300
+"""Number of vertices above which a search tree finds the nearest ones: comparing each with each
+takes a hundred megabytes at two thousand, for every candidate."""
+ORDERS = np.array(list(itertools.permutations(range(FINGERS))))
+"""Ways to match the fingers of two grasps, (24, 4)."""
 
 
-def with_halves(body: Polyhedron, apart: float) -> tuple[Polyhedron, tuple[int, ...]]:
-    """Add halves of faces that are long enough for two contacts; also list each face's owner."""
-    faces, owners = list(body.faces), list(range(len(body.faces)))
-    for index, face in enumerate(body.faces):
-        halves = _halves(face, apart)
-        faces += halves
-        owners += [index] * len(halves)
-    return replace(body, faces=tuple(faces)), tuple(owners)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Symmetries(Declared):
+    """The orthogonal matrices that map an object to itself about its centre of mass."""
+
+    rotations: Annotated[Array, Shape(None, 3, 3)]
+    """Rotations, the identity first, (r, 3, 3)."""
+    reflections: Annotated[Array, Shape(None, 3, 3)]
+    """Matrices with determinant -1: reflections, and reflections that also rotate, (m, 3, 3)."""
 
 
-def shared_quadruples(owners: Sequence[int]) -> Indices:
-    """List face quadruples with both halves of one face, or of two faces, (q, 4)."""
-    whole = [index for index, owner in enumerate(owners) if index == owner]
-    halves: dict[int, list[int]] = {}
-    for index, owner in enumerate(owners):
-        if index != owner:
-            halves.setdefault(owner, []).append(index)
-    found = [
-        (*others, *pair)
-        for owner, pair in halves.items()
-        for others in combinations([index for index in whole if index != owner], 2)
+@dataclass(frozen=True, slots=True)
+class Copies:
+    """Places, in a list, of grasps that symmetries of the object map to one another."""
+
+    first: int  # place of the grasp that stands for all of them, the first in the list
+    rotated: tuple[int, ...] = ()
+    """Places of the grasps that a rotation of the object maps the first to."""
+    mirrored: tuple[int, ...] = ()
+    """Places of the grasps that only a reflection of the object maps the first to."""
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Return the places of all these grasps in ascending order."""
+        return tuple(sorted((self.first, *self.rotated, *self.mirrored)))
+
+
+def symmetries(body: Polyhedron) -> Symmetries:
+    """Find rotations and reflections of an object; of a curved or finely cut one, the identity."""
+    alone = Symmetries(np.eye(3)[None], np.empty((0, 3, 3)))
+    if body.patches is not None or len(body.faces) > MOST_FACES:
+        return alone
+    flags = _flags(body)
+    if not flags:
+        return alone
+    turns = [each @ flags[0].T for each in flags]
+    mirrors = [each @ np.diag([1.0, -1.0, 1.0]) @ flags[0].T for each in flags]
+    # vertices (v, 3), and centres and normals of faces (f, 6), which symmetries keep
+    vertices = (body.vertices - body.center_of_mass) / body.radius
+    centres = np.array([face.centroid for face in body.faces]) - body.center_of_mass
+    faces = np.hstack([centres / body.radius, body.normals])
+
+    def is_kept(turn: Array) -> bool:
+        turned = np.hstack([faces[:, :3] @ turn.T, faces[:, 3:] @ turn.T])
+        return _is_matched(vertices @ turn.T, vertices) and _is_matched(turned, faces)
+
+    rotations, reflections = (
+        np.reshape([turn for turn in candidates if is_kept(turn)], (-1, 3, 3))
+        for candidates in (turns, mirrors)
+    )
+    return Symmetries(rotations, reflections)
+
+
+def copies_of(body: Polyhedron, grasps: Sequence[Grasp]) -> tuple[Copies, ...]:
+    """Sort grasps into classes of copies of the first grasp of each class, in their order."""
+    found = symmetries(body)
+    classes: list[Copies] = []
+    traits = [_Traits.of(body, grasp) for grasp in grasps]
+    for place, trait in enumerate(traits):
+        for number, known in enumerate(classes):
+            if not trait.resembles(traits[known.first]):
+                continue
+            if trait.is_image(traits[known.first], found.rotations):
+                classes[number] = Copies(known.first, (*known.rotated, place), known.mirrored)
+                break
+            if trait.is_image(traits[known.first], found.reflections):
+                classes[number] = Copies(known.first, known.rotated, (*known.mirrored, place))
+                break
+        else:
+            classes.append(Copies(place))
+    return tuple(classes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Traits:
+    """What must be the same in two copies, about the centre of mass and over the object's radius.
+
+    Rows of `vectors` are, for each finger, its contact, normal, cone's axis, witness force's
+    direction, direction of approach, and focus, which all turn with the object.
+    """
+
+    family: str
+    vectors: Array  # vectors of each finger, (4, v, 3)
+    lengths: Array
+    """Distances between contacts, and half-angles of cones, in ascending order, (10,)."""
+
+    @classmethod
+    def of(cls, body: Polyhedron, grasp: Grasp) -> "_Traits":
+        places = (grasp.positions - body.center_of_mass) / body.radius
+        ways = grasp.normals if grasp.approach_directions is None else grasp.approach_directions
+        axes = np.array([cone.axis for cone in grasp.force_cones])
+        foci = (grasp.focus_points - body.center_of_mass) / body.radius
+        each = [_near(np.repeat(foci, FINGERS // len(foci), axis=0)) if len(foci) else 0.0 * places]
+        apart = np.linalg.norm(places[:, None] - places[None], axis=2)[np.triu_indices(FINGERS, 1)]
+        halves = [cone.half_angle for cone in grasp.force_cones]
+        return cls(
+            grasp.family,
+            np.stack([places, grasp.normals, axes, grasp.witness.directions, ways, *each], axis=1),
+            np.concatenate([np.sort(apart), np.sort(halves)]),
+        )
+
+    def resembles(self, other: "_Traits") -> bool:
+        """Return whether the lengths, which no symmetry changes, leave it possible."""
+        return self.family == other.family and bool(
+            (np.abs(self.lengths - other.lengths) <= 2.0 * SAME_GRASP).all()
+        )
+
+    def is_image(self, other: "_Traits", maps: Array) -> bool:
+        """Return whether one of the matrices `maps`, (n, 3, 3), makes this from another grasp."""
+        images = np.einsum("nij,kvj->nkvi", maps, other.vectors)
+        off = np.linalg.norm(images[:, :, None] - self.vectors[None, None], axis=4).max(axis=3)
+        matched = off[:, np.arange(FINGERS), ORDERS].max(axis=2)
+        return bool((matched <= SAME_GRASP).any())
+
+
+def _near(points: Array) -> Array:
+    """Move points beyond `FAR` to that distance: farther ones count by their direction."""
+    lengths = np.linalg.norm(points, axis=1, keepdims=True)
+    return points * np.minimum(1.0, FAR / np.maximum(lengths, FAR))
+
+
+def _flags(body: Polyhedron) -> list[Array]:
+    """Return the frames of flags that may be images of the first one, which comes first."""
+    kinds, corners = flag_traits(body)
+    kinds[:, 0] = np.sqrt(kinds[:, 0])  # areas as lengths
+    alike = np.abs(kinds[:, None] - kinds[None]).max(axis=2) <= SAME_BODY
+    chosen = int(alike.sum(axis=1).argmin())
+    flags = [
+        (face, corner, lengths)
+        for face in (chosen, *(face for face in np.flatnonzero(alike[chosen]) if face != chosen))
+        for corner, lengths in enumerate(corners[face])
+        if lengths[0] > SHORTEST
     ]
-    found += [(*one, *two) for one, two in combinations(halves.values(), 2)]
-    return np.array(found, dtype=np.int64).reshape(-1, FINGERS)
+    return [
+        flag_frame(body, int(face), corner)
+        for face, corner, lengths in flags
+        if math.dist(lengths, flags[0][2]) <= 2.0 * SAME_BODY
+    ]
 
 
-def _halves(face: Face, apart: float) -> list[Face]:
-    frame = plane_frame(face.normal)
-    pieces = [(piece - face.centroid) @ frame for piece in face.pieces]
-    if not pieces:
-        return []
-    # along the line between the two corners that are farthest apart
-    border = (face.polygon - face.centroid) @ frame
-    gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
-    i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
-    along = (border[j] - border[i]) / gaps[i, j]
-    heights = np.concatenate(pieces) @ along
-    middle = 0.5 * float(heights.min() + heights.max())
-    halves: list[Face] = []
-    for side in (-1.0, 1.0):
-        limit = np.array([side * middle - 0.5 * apart])
-        parts = [clip(piece, side * along[None], limit) for piece in pieces]
-        parts = [part for part in parts if len(part) > 2]  # noqa: PLR2004 - else not a polygon
-        if parts:
-            polygon, *pieces_here = (
-                face.centroid + part @ frame.T for part in (convex_hull(np.vstack(parts)), *parts)
-            )
-            halves.append(replace(face, polygon=polygon, holes=(), pieces=tuple(pieces_here)))
-    return halves if len(halves) == 2 else []  # noqa: PLR2004 - both or none
-
-
-def clear_of_edges(body: Polyhedron, margin: float) -> Polyhedron:
-    """Shrink an object's faces so that contacts keep a distance from all edges and holes."""
-    faces: list[Face] = []
-    for face in body.faces:
-        frame, pieces = plane_frame(face.normal), list[Array]()
-        loops = [(loop - face.centroid) @ frame for loop in (face.polygon, *face.holes)]
-        for figure in inset_figure(loops, margin):
-            convex = merge_into_convex_pieces(np.vstack(figure), triangulate(figure))
-            pieces += [face.centroid + piece @ frame.T for piece in convex]
-        faces.append(replace(face, pieces=tuple(pieces)))
-    return replace(body, faces=tuple(faces))
+def _is_matched(images: Array, rows: Array) -> bool:
+    """Return whether images (n, d) are each near a row (n, d), no two of them near the same."""
+    if len(rows) > CROWDED:
+        spatial: Any = importlib.import_module("scipy.spatial")
+        apart, nearest = spatial.KDTree(rows).query(images, p=np.inf)
+    else:
+        gaps = np.abs(images[:, None] - rows[None]).max(axis=2)
+        nearest = gaps.argmin(axis=1)
+        apart = gaps[np.arange(len(rows)), nearest]
+    return bool((apart <= SAME_BODY).all()) and len(set(nearest.tolist())) == len(rows)

@@ -42,13 +42,13 @@ from grasp_core.geometry.polygons import convex_polygon
 from grasp_core.objects.face_pieces import (
     LARGEST_INSET,
     FacePiece,
+    clear_of_edges,
     inset_piece,
     pieces_by_face,
     unit_pieces,
 )
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import clear_of_edges
-from grasp_core.objects.symmetries import symmetries
+from grasp_core.objects.standard_order import symmetries
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 

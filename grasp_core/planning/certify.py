@@ -198,8 +198,7 @@ def find_critical_frictions(grasps: Iterable[Grasp]) -> None:
 
 
 PAIRED = ("p", "r")
-"""Letters with which the ids of pencil and regulus grasps begin: their fingers (0, 1) and (2, 3)
-form pairs."""
+"""Letters of the ids of pencils and reguli, whose fingers (0, 1) and (2, 3) form pairs."""
 ORDER, UNMIRRORED = list(range(FINGERS)), np.ones(3)
 """The order of the fingers, and the signs of the coordinates, where nothing is translated."""
 Place: TypeAlias = tuple[int, str]
@@ -210,10 +209,7 @@ the face, `a` or `b`; empty for a whole face."""
 def to_grasp(
     body: Polyhedron, friction: float, found: Certified, on: Standard | None = None
 ) -> Grasp:
-    """Convert a certified placement to a grasp in the object's frame, which has late figures.
-
-    Takes `on`, the reordered copy of the object that it was found on, if it is not the object.
-    """
+    """Convert a certified placement, found on a reordered copy if given, to one of the object."""
     name, faces, order = (found.id, found.faces, ORDER) if on is None else _named(found, on)
     flip = FLIP if on is not None and on.mirrored else UNMIRRORED
     center, radius, placement = body.center_of_mass, body.radius, found.placement
@@ -259,9 +255,13 @@ def _region(region: ContactRegion, body: Polyhedron, flip: Array) -> ContactRegi
 
 def _named(found: Certified, on: Standard) -> tuple[str, Sequence[int], list[int]]:
     """Return the id and the faces of a grasp on the object as given, and its fingers in order."""
-    places = [_place(on, face) for face in found.faces]
-    order = _finger_order(found.id[0], places)
-    name = "-".join([found.id[0], *("{}{}".format(*places[finger]) for finger in order)])
+    letter, places = found.id[0], [_place(on, face) for face in found.faces]
+    order = sorted(range(FINGERS), key=places.__getitem__)
+    if letter in PAIRED:  # within pairs, then the pairs
+        pairs = [sorted(pair, key=places.__getitem__) for pair in ((0, 1), (2, 3))]
+        first, second = sorted(pairs, key=lambda pair: places[pair[0]])
+        order = [*first, *second]
+    name = "-".join([letter, *("{}{}".format(*places[finger]) for finger in order)])
     return name, [places[finger][0] for finger in order], order
 
 
@@ -278,31 +278,20 @@ def faces_as_given(faces: FaceQuadruple, on: Standard) -> FaceQuadruple:
     return four(sorted(on.faces[on.owners[face]] for face in faces))
 
 
-def _finger_order(letter: str, places: Sequence[Place]) -> list[int]:
-    """Return the fingers sorted by face: within pairs, then the pairs; else all four at once."""
-    if letter not in PAIRED:
-        return sorted(range(len(places)), key=places.__getitem__)
-    pairs = [sorted(pair, key=places.__getitem__) for pair in ((0, 1), (2, 3))]
-    first, second = sorted(pairs, key=lambda pair: places[pair[0]])
-    return [*first, *second]
-
-
-def _mirrored_piece(piece: FacePiece) -> FacePiece:
-    """Mirror a convex piece of a face; its frame is mirrored too, so plane coordinates stay."""
-    return altered(
-        piece, normal=frozen_copy(piece.normal * FLIP), origin=frozen_copy(piece.origin * FLIP),
-        frame=frozen_copy(piece.frame * FLIP[:, None]),
-    )  # fmt: skip
-
-
 def absence_as_given(proof: Absence, on: Standard) -> Absence:
     """Translate a proof of absence to the faces of the object as it was given."""
     pieces = [altered(piece, face=on.faces[on.owners[piece.face]]) for piece in proof.pieces]
     if not on.mirrored:
         return altered(proof, pieces=tuple(pieces))
+    mirrored = (  # frames too, so that plane coordinates stay
+        altered(piece, normal=frozen_copy(piece.normal * FLIP),
+                origin=frozen_copy(piece.origin * FLIP),
+                frame=frozen_copy(piece.frame * FLIP[:, None]))
+        for piece in pieces
+    )  # fmt: skip
     return altered(
         proof,
-        pieces=tuple(map(_mirrored_piece, pieces)),
+        pieces=tuple(mirrored),
         leaves=tuple((path, _mirrored_certificate(leaf)) for path, leaf in proof.leaves),
     )
 

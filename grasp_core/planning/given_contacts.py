@@ -22,8 +22,7 @@ from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, plane_frame
 from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.surface import Face
-from grasp_core.objects.triangles import areas_and_normals
+from grasp_core.objects.surface import Face, areas_and_normals
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import (
@@ -85,10 +84,7 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
 
 
 def grasp_of(seated: Seated, friction: float, name: str) -> Grasp | ClosureCertificate:
-    """Make a grasp of four contacts, or return the proof that they are not in force closure.
-
-    The grasp has no contact regions, and its family is `regulus`, the most general one.
-    """
+    """Make a grasp without regions of four contacts, or return the proof that there is none."""
     body = seated.body
     positions = np.array([contact.position for contact in seated.contacts])
     normals = np.array([contact.normal for contact in seated.contacts])

@@ -27,27 +27,24 @@ from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
 from grasp_core.families.placing import CONSTRUCTIONS, chosen_shapes
 from grasp_core.kinds import METHODS, Family, Method
+from grasp_core.objects.face_pieces import clear_of_edges, with_halves
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.standard_order import Standard, clear_of_edges, standard, with_halves
+from grasp_core.objects.standard_order import Standard, standard
 from grasp_core.planning.certify import Certified, LateFigures
-from grasp_core.planning.family_search import Gathered, MethodSearch, found_in
-from grasp_core.planning.free_search import found_on
-from grasp_core.planning.planned_cones import PlannedCones
-from grasp_core.planning.quadruples import Blocks, all_blocks, kept, spanning_blocks
+from grasp_core.planning.method_search import FamilySearch, Gathered, MethodSearch, found_on
+from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Finger, reach
-from grasp_core.planning.request import FAMILIES, PlanRequest
-from grasp_core.planning.result import Outcomes
+from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
 from grasp_core.processes import Processes
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
-from grasp_core.values import FINGERS, FaceQuadruple, Grasp, four
+from grasp_core.values import FINGERS, FaceQuadruple, four
 
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
 BATCH, LIMITED_BATCH = 1024, 64
 """Number of face quadruples that are decided together, and with a limit on the grasps."""
 QUADRUPLES_PER_PROCESS = 5_000
-"""Number of face quadruples for which one more process is worth starting: the start takes a second,
-and so do a thousand to two thousand quadruples."""
+"""Number of face quadruples that take a few times as long as the start of a process, a second."""
 KEPT_BLOCKS = 8
 """Number of blocks of face quadruples kept for all families: some hundred megabytes."""
 
@@ -76,8 +73,7 @@ class Found:
     """What a part of a search holds."""
 
     gathered: Gathered  # proofs and counts, complete once all grasps were taken
-    grasps: Iterable[list[Certified]]
-    """Grasps on each quadruple that was tried."""
+    grasps: Iterable[list[Certified]]  # grasps on each quadruple that was tried
     seconds: float = 0.0
     """Processor time of another process [s]; zero for parts found in this process."""
 
@@ -86,10 +82,8 @@ class Found:
 class PlanSearch:
     """The search for grasps of one object: what is asked for, and what each method has found."""
 
-    body: Polyhedron
-    """The object as it was given."""
-    on: Standard
-    """The object as the planner works on it."""
+    body: Polyhedron  # the object as it was given
+    on: Standard  # the object as the planner works on it
     request: PlanRequest
     methods: dict[Method, MethodSearch]
     """The search of each method that is asked for; the free method comes last."""
@@ -122,10 +116,7 @@ class PlanSearch:
             progress(total, total, found)
 
     def _steps(self) -> Iterator[tuple[int, list[Certified]]]:
-        """Yield, for each quadruple tried, how many are finished at least, and its grasps.
-
-        With a limit, only grasps that are among the best when they are found.
-        """
+        """Yield, for each quadruple tried, how many are finished at least, and its grasps."""
         limit, dealt_with, kept_so_far = self.request.searched, 0, list[int]()
         families: list[Family] = [method for method in self.methods if method != "free"]
         places = {family: range(len(self.blocks(family)[0])) for family in families}
@@ -143,8 +134,11 @@ class PlanSearch:
             else:
                 steps = self._constructed(method, places[method], search)
                 found = iter([Found(Gathered(), steps)])
-            yield from enumerate(_timed(_taken(found, search), search), start=dealt_with + 1)
-            _prune(method, search, self.on.quadruples)
+            yield from enumerate(_taken(found, search), start=dealt_with + 1)
+            # each quadruple counts once per order of the fingers
+            orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
+            tally = search.gathered.tally
+            tally["pruned"] = self.on.quadruples * orders - tally["tried"]
             kept_so_far.append(len(search.best))
             dealt_with += self.on.quadruples
         if self.request.complete:
@@ -152,7 +146,7 @@ class PlanSearch:
             open_yet = tuple(search.gathered.undecided)
             search.gathered.undecided.clear()
             found = self.each_found(Batch((faces,), again=True) for faces in open_yet)
-            for grasps in _timed(_taken(found, search), search):
+            for grasps in _taken(found, search):
                 yield dealt_with, grasps
 
     def each_found(self, parts: Iterable[Part]) -> Iterator[Found]:
@@ -167,10 +161,10 @@ class PlanSearch:
         gathered = Gathered()
         if isinstance(part, Block):
             # with no limit, no grasp raises the threshold: nothing is kept here
-            search = MethodSearch(part.family, None, _unasked, gathered=gathered)
+            search = MethodSearch(part.family, gathered=gathered)
             places = range(part.place, part.place + 1)
             return Found(gathered, self._constructed(part.family, places, search))
-        tried = found_on(self.on, part.quadruples, self.request, gathered, again=part.again)
+        tried = found_on(self.on, part.quadruples, self.request, gathered, part.again)
         return Found(gathered, ([one] if one else [] for one in tried))
 
     def found_at_once(self, part: Part) -> Found:
@@ -182,9 +176,9 @@ class PlanSearch:
         self, family: Family, places: range, search: MethodSearch
     ) -> Iterator[list[Certified]]:
         """Yield the grasps of a construction on each quadruple of some blocks, worth keeping."""
-        construction, shapes = CONSTRUCTIONS[family], self.on.shapes
-        friction, blocks = self.request.friction, self.blocks(family)
-        return found_in(construction, shapes, friction, blocks, places, search)
+        shapes, friction = self.on.shapes, self.request.friction
+        over = FamilySearch(CONSTRUCTIONS[family], shapes, friction, search)
+        return over.found_in(self.blocks(family), places)
 
     def blocks(self, family: Family) -> Blocks:
         """Return the blocks for a construction; without bounds it uses cones around normals."""
@@ -204,10 +198,7 @@ class PlanSearch:
         return around_normals, kept(all_blocks(cones, whole, on.shared), KEPT_BLOCKS)
 
     def _batches(self, size: int, held: AbstractSet[FaceQuadruple]) -> Iterator[Batch]:
-        """Yield the quadruples that hold no grasp yet and have room for contacts, in batches.
-
-        Those with two halves of a face come last.
-        """
+        """Yield quadruples with room that hold no grasp yet, in batches; halves come last."""
         shapes = self.on.shapes
         whole = combinations(range(len(self.on.faces)), FINGERS)
         quadruples = chain(whole, map(four, self.on.shared.tolist()))
@@ -270,10 +261,7 @@ def _reached(body: Polyhedron, finger: Finger | None, found: Certified) -> Certi
 
 
 def found_elsewhere(given: bytes, part: Part) -> Found:
-    """Search one part to its end in another process, which tells its time.
-
-    Takes `given`, the pickled object and request, which are the same for all parts.
-    """
+    """Search one part of the pickled search to its end in another process, which tells its time."""
     begun, found = time.process_time(), _search_of(given).found_at_once(part)
     return replace(found, seconds=time.process_time() - begun)
 
@@ -284,15 +272,8 @@ def _search_of(given: bytes) -> PlanSearch:
     return PlanSearch.of(*pickle.loads(given))  # noqa: S301
 
 
-def _unasked(_: Certified) -> str:
-    raise AssertionError("parts of a search keep no grasps")
-
-
 def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
-    """Return how many processes are worth starting beside this one.
-
-    A search with a limit needs the grasps of each block before the next, so it has one process.
-    """
+    """Return how many more processes are worth starting; none with a limit, which needs order."""
     if jobs < 2 or request.searched is not None:  # noqa: PLR2004 - nobody beside this one
         return 0
     worth = math.comb(len(body.faces), FINGERS) // QUADRUPLES_PER_PROCESS
@@ -300,20 +281,18 @@ def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
 
 
 def _taken(found: Iterable[Found], search: MethodSearch) -> Iterator[list[Certified]]:
-    """Keep the grasps that parts hold, until the limit; yield those kept of each quadruple."""
+    """Keep the grasps that parts hold, until the limit; yield those kept, and add up the time."""
+    start = time.process_time()
     for each in found:
         if search.full:
-            return
+            break
         for grasps in each.grasps:
-            yield search.keep_each(grasps)
+            kept = search.keep_each(grasps)
+            search.seconds += time.process_time() - start
+            yield kept
+            start = time.process_time()
         search.take(each.gathered, each.seconds)
-
-
-def _prune(method: Method, search: MethodSearch, quadruples: int) -> None:
-    """Count what was not tried; each quadruple counts once per order of the fingers."""
-    orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
-    tally = search.gathered.tally
-    tally["pruned"] = quadruples * orders - tally["tried"]
+    search.seconds += time.process_time() - start
 
 
 def _share(limit: int, before: Sequence[int]) -> int:
@@ -335,17 +314,6 @@ def _without_room(on: Standard) -> int:
     return math.comb(whole, FINGERS) - math.comb(roomy, FINGERS) + shared
 
 
-def _timed(steps: Iterator[list[Certified]], search: MethodSearch) -> Iterator[list[Certified]]:
-    """Yield each of `steps`, adding the processor time it took to `search.seconds`."""
-    while True:
-        start = time.process_time()
-        step = next(steps, None)
-        search.seconds += time.process_time() - start
-        if step is None:
-            return
-        yield step
-
-
 PUSH_N = 10.0
 """Largest push of a finger under which payloads and first slips are compared [N]."""
 TIP_RADIUS = 0.1
@@ -355,12 +323,7 @@ TIP_RADIUS = 0.1
 def chosen(
     body: Polyhedron, lists: Sequence[Sequence[Certified]], request: PlanRequest
 ) -> list[Certified]:
-    """Select the grasps to return, the best first.
-
-    By radius, families take turns: the best of each, then the second of each, and so on. By another
-    measure all grasps compete. `diverse` begins with the largest discs and goes on with the grasp
-    that is farthest from all before it.
-    """
+    """Select the grasps to return, the best first; by radius, families take turns."""
     every = _largest_first(chain.from_iterable(lists))
     if request.rank_by == "radius":
         families = [[one for one in every if one.family == family] for family in FAMILIES]
@@ -386,20 +349,16 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
 
     def lightness(found: Certified) -> float:
         points = body.radius * found.placement.positions
-        return -_carried(body, points, found.normals, request.friction, request.finger)
+        return -carried(body, points, found.normals, request.friction, request.finger)
 
     # the best squeeze is searched to a gap, so equal grasps may come out as far apart
     return lightness, 2.0 * GAP
 
 
-def _carried(
+def carried(
     body: Polyhedron, points: Array, normals: Array, friction: float, finger: Finger | None
 ) -> float:
-    """Return the mass that the best squeeze of contacts survives in any orientation [kg].
-
-    It is certified, in the linear model; zero where no squeeze holds. Takes contact points about
-    the centre of mass.
-    """
+    """Return the mass that the best squeeze of points proves to hold, or 0 [kg]."""
     count, tip = len(points), TIP_RADIUS * body.radius if finger is None else finger.radius_m
     start = Grip(
         points, normals, np.full(count, friction), np.zeros((count, 3)),
@@ -409,12 +368,6 @@ def _carried(
         return searched(start, any_direction(1.0), PUSH_N).scale
     except NoForcesError:
         return 0.0
-
-
-def carried(body: Polyhedron, grasp: Grasp, friction: float, finger: Finger | None) -> float:
-    """Return the mass in any orientation that ranks a grasp [kg]; 0 if none is held."""
-    points = grasp.positions - body.center_of_mass
-    return _carried(body, points, grasp.normals, friction, finger)
 
 
 def _largest_first(found: Iterable[Certified]) -> list[Certified]:
@@ -434,11 +387,7 @@ def _in_order(
 
 
 def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]:
-    """Order grasps so that each next one is as far as possible from the nearest before it.
-
-    The distance of two grasps is the largest distance of a contact of one from the nearest contact
-    of the other, relative to the object's radius.
-    """
+    """Order grasps by the distance from the nearest before, that of their farthest contacts."""
     if not every:
         return []
     places = np.array([found.placement.positions for found in every])

@@ -23,10 +23,9 @@ from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import absence_as_given, faces_as_given, to_grasp
 from grasp_core.planning.plan_search import PlanSearch, Progress, chosen, worth_starting
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
+from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
-from grasp_core.planning.request import PlanRequest, check_request
-from grasp_core.planning.result import Outcomes, Plan, PlanCounts
+from grasp_core.planning.result import Outcomes, Plan, PlanCounts, PlanRequest, check_request
 from grasp_core.processes import local_processes
 from grasp_core.values import Grasp
 

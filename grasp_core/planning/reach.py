@@ -174,5 +174,4 @@ def _between(start: Array, end: Array, tails: Array, heads: Array) -> Array:
     share = np.where(skew, np.clip((b * f - c * e) / np.where(skew, det, 1.0), 0.0, 1.0), 0.0)
     other = np.clip(np.where(e > 0.0, (b * share + f) / safe_e, 0.0), 0.0, 1.0)
     share = np.clip((b * other - c) / safe_a, 0.0, 1.0) if a > 0.0 else np.zeros_like(other)
-    gaps = apart + share[:, None] * one - other[:, None] * others
-    return np.linalg.norm(gaps, axis=1)
+    return np.linalg.norm(apart + share[:, None] * one - other[:, None] * others, axis=1)

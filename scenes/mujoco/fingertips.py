@@ -21,7 +21,7 @@ from grasp_core.objects.on_faces import (
     nearest_on_triangles,
 )
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.triangles import areas_and_normals
+from grasp_core.objects.surface import areas_and_normals
 from grasp_core.values import Contact
 
 TIP_RADIUS = 0.1

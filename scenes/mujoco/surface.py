@@ -23,7 +23,7 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import nearest_on_segments
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
-from grasp_core.objects.triangles import areas_and_normals
+from grasp_core.objects.surface import areas_and_normals
 
 TOUCHING = 1e-9
 """How far the two may overlap along an axis and count as touching, in object radii."""

@@ -71,9 +71,8 @@ def validate_file(
 
 
 def simulate_grasps(
-    saved: Plan, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
-    reporter: Reporter,
-) -> tuple[Exit, Verdicts]:  # fmt: skip
+    saved: Plan, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None, reporter: Reporter
+) -> tuple[Exit, Verdicts]:
     """Simulate grasps; return the exit code and the verdicts."""
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:

@@ -71,12 +71,7 @@ class Control(Declared):
 def negative_controls(
     body: Polyhedron, grasp: Grasp, friction: float, seed: int, setup: Setup | None = None
 ) -> tuple[Control, ...]:
-    """Make the negative controls that exist for a grasp, at most one of each kind.
-
-    The kinds are friction below the critical one, fingers removed, and contacts moved on their
-    faces, out of the grasp's region, to where fingertips have room. All of them are proved open by
-    fingertips as soft as those of the setup.
-    """
+    """Make the controls that exist: low friction, fewer fingers, moved contacts; all proved."""
     setup = setup or Setup()
     lower = FRICTION_SHARE * grasp.critical_friction
     low_friction = _refuted("low_friction", grasp.contacts, lower, setup)
@@ -146,8 +141,7 @@ class ControlLoad:
 
     name: str
     load: Load
-    settling: float
-    """Friction coefficient while the object settles, before the load is applied."""
+    settling: float  # friction coefficient while the object settles, before the load is applied
     required_friction: float | None
 
 

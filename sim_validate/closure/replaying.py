@@ -22,13 +22,7 @@ from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
-from sim_validate.closure.controls import (
-    Control,
-    ControlLoad,
-    ControlTrial,
-    ControlVerdict,
-    control_case,
-)
+from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
 from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
 from sim_validate.engine.bench import Load
@@ -47,8 +41,7 @@ class Wanted:
     grasp: str | None = None
     control: str | None = None
     """Name of a negative control (contacts that must fail) made from the grasp."""
-    trial: int | None = None
-    """Number of a repeat with noise; None for the trials without noise."""
+    trial: int | None = None  # number of a repeat with noise; None for the trials without noise
     grasps: Path | None = None
     """The `grasps.json` that verdicts are about, if it is not beside them."""
 
@@ -64,8 +57,7 @@ class Recorded:
     setup: Setup
     agenda: Agenda
     control: str | None = None
-    grasp: Grasp | None = None
-    """The planned grasp that has these contacts; None if it is not known."""
+    grasp: Grasp | None = None  # the planned grasp that has these contacts; None if it is not known
     trial: int | None = None
     outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
     others: str | None = None
@@ -139,24 +131,18 @@ def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Rec
         return _in_trial(path, found, verdict, wanted.trial)
     trials: Sequence[WrenchVerdict | ControlTrial] = verdict.wrenches
     if wanted.control is not None:
-        control = _control(path, verdict, wanted.control)
+        control = next((c for c in verdict.controls if c.control.name == wanted.control), None)
+        if control is None:
+            raise InputError(
+                f"{path}: grasp {verdict.id} has no negative control {wanted.control!r}; choose "
+                f"from {some(each.control.name for each in verdict.controls)}"
+            )
         trials = control.tried
         found = replace(
             found, name=f"{grasp.id}:{wanted.control}", contacts=control.control.contacts,
             friction=control.control.friction, control=wanted.control, grasp=None,
         )  # fmt: skip
     return replace(found, outcomes={each.name: each.hold.outcome.value for each in trials})
-
-
-def _control(path: Path, verdict: Verdict, name: str) -> ControlVerdict:
-    """Find the verdict on a negative control of a grasp."""
-    found = next((each for each in verdict.controls if each.control.name == name), None)
-    if found is None:
-        raise InputError(
-            f"{path}: grasp {verdict.id} has no negative control {name!r}; choose from "
-            f"{some(each.control.name for each in verdict.controls)}"
-        )
-    return found
 
 
 def _in_trial(path: Path, found: Recorded, verdict: Verdict, trial: int) -> Recorded:
@@ -209,11 +195,7 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
 
 
 def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
-    """Close fingers on the contacts, and plan the loads that can be applied to them.
-
-    Gives also where the fingertips stand; none for contacts without force closure, whose fingertips
-    may overlap.
-    """
+    """Close fingers on contacts and plan their loads; also give contacts whose tips have room."""
     body, contacts, friction = recorded.body, recorded.contacts, recorded.friction
     setup = recorded.setup
     if recorded.control is not None:

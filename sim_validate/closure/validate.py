@@ -37,6 +37,7 @@ from grasp_core.errors import InputError, UndecidedError
 from grasp_core.kinds import Count, Friction, function, instance, several, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces, within
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import facets_of
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
@@ -50,12 +51,7 @@ from sim_validate.closure.verdict import (
     WrenchVerdict,
 )
 from sim_validate.engine.bench import Bench
-from sim_validate.engine.gate import (
-    Gate,
-    measured_gate,
-    require_faithful,
-    require_touch,
-)
+from sim_validate.engine.gate import Gate, measured_gate, require_faithful, require_touch
 from sim_validate.engine.rig import (
     Analysis,
     CriticalFriction,
@@ -142,10 +138,7 @@ def tested(
 def held_wrenches(
     rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda, overlap: Sequence[str] = ()
 ) -> tuple[WrenchVerdict, ...]:
-    """Judge the hold of every load and, if asked for, find its limit.
-
-    What fingertips overlap at the start, if anything, is given in words.
-    """
+    """Judge the hold of every load, from overlaps in words, and find its limit if asked for."""
     limits = [planned.limit for planned in loads]
     traces = rig.hold([planned.load for planned in loads])
     found: Sequence[SimulatedLimit | None] = [None] * len(limits)
@@ -230,8 +223,7 @@ def _arrived(body: Shared[Polyhedron], *rest: Any) -> Job:
 
 def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
     """Yield one verdict per job, in order; the number of processors does not change the results."""
-    count = processes(len(jobs), processors)
-    return each(verdict_of, prepared(jobs, processors), jobs=count)
+    return each(verdict_of, prepared(jobs, processors), jobs=processes(len(jobs), processors))
 
 
 def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
@@ -315,8 +307,7 @@ def validate_all(
 
 
 STREAM = 1
-"""Number of the random stream that noise is drawn from, apart from other draws with the same
-seed."""
+"""Number of the random stream of noise, apart from other draws with the same seed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -329,8 +320,7 @@ class Disturbed:
     contacts: tuple[Contact, ...]
     missed: tuple[int, ...]
     friction: float
-    mass: float
-    """Mass of the trial, relative to the planned mass."""
+    mass: float  # mass of the trial, relative to the planned mass
 
 
 def disturbed(
@@ -384,10 +374,8 @@ def _landing(body: Polyhedron, face: int, point: Array, way: Array) -> Contact |
             within(at, piece, plane.normal, 0.0) for piece in plane.pieces
         )
         return Contact(at, plane.normal) if inside else None
-    corners = body.vertices[body.triangles[:, ::-1]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sizes = np.linalg.norm(normals, axis=1)
-    corners, normals = corners[sizes > 0.0], (normals[sizes > 0.0].T / sizes[sizes > 0.0]).T
+    facets = facets_of(body)
+    corners, normals = facets.corners, facets.normals
     at = _crossing(corners[:, 0], normals, point, way)
     edges = np.roll(corners, -1, axis=1) - corners
     beside = np.einsum("tei,tei->te", np.cross(normals[:, None], edges), at[:, None] - corners)

@@ -32,8 +32,7 @@ from sim_validate.kit.files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 
 AGREEMENT = 0.02
-"""Largest relative error of simulated limits and critical frictions: five times the worst that was
-measured."""
+"""Largest relative error of simulated limits and frictions: five times the worst measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -236,16 +235,12 @@ class Verdict(HoldsWrenches, InNotebooks):
         return (min(found), max(found)) if found else None
 
     @recorded
-    def displacement_m(
-        self,
-    ) -> Annotated[Measured, MICRONS_MOVED]:
+    def displacement_m(self) -> Annotated[Measured, MICRONS_MOVED]:
         """Largest displacement of the object under any wrench, after friction was lowered [m]."""
         return _largest([trial.hold.displacement_m for trial in self.wrenches])
 
     @recorded
-    def start_displacement_m(
-        self,
-    ) -> Annotated[Measured, MICRONS_LOADED]:
+    def start_displacement_m(self) -> Annotated[Measured, MICRONS_LOADED]:
         """Largest one before that, at high friction: the fingers give way a little [m]."""
         return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
 

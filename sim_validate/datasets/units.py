@@ -33,7 +33,7 @@ from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
 from grasp_core.provenance import versions
-from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
+from grasp_core.records.grasps_json import Overrides, contact_sets_from_json
 from grasp_core.settings import as_table
 from grasp_core.values import FINGERS, Contact, Grasp
 from scenes.example_objects import example_object

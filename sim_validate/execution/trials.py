@@ -43,7 +43,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, Reactions
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.on_faces import nearest_on_surface
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.sheets import solid_angles
+from grasp_core.objects.shells import solid_angles
 from grasp_core.solvers.ties import first_best, largest_first
 from scenes.mujoco.held_scene import HeldLayout
 from scenes.mujoco.mjcf_text import quaternion, rotations

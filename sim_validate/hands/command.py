@@ -59,8 +59,7 @@ class ReachJob:
     body: Polyhedron
     friction: float
     asked: ReachSettings
-    simulated: bool = False
-    """Whether the hand is also to hold test wrenches with its motors."""
+    simulated: bool = False  # whether the hand is also to hold test wrenches with its motors
     execution: ExecutionSettings | None = None
     """Settings with which it is also to execute the grasp."""
 
@@ -98,14 +97,18 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
     reporter.document(told.document())
     show_simulated([each.simulated for each in found if each.simulated is not None], reporter)
     show_executed([each.executed for each in found if each.executed is not None], reporter)
-    if poses:
-        say_where_to_look(command, reporter)
+    beside = None if command.out is None else command.out / GRASPS
+    if poses and beside is not None and beside.is_file() and command.grasps.samefile(beside):
+        folder = shlex.quote(str(command.out))
+        reporter.say(f"see the hand in the grasps: graspproof report {folder}")
+    elif poses:
+        reporter.say(
+            f"give the folder of {GRASPS} as --out to have the hand drawn by `graspproof report`"
+        )
     return judged if all(each.good for each in found) else Exit.NEGATIVE
 
 
-def _reach(
-    command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter
-) -> Reaches:  # fmt: skip
+def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter) -> Reaches:
     if command.out is not None:
         remove_results(command.out, "reaches")
     job = ReachJob(
@@ -161,23 +164,8 @@ def _show(found: Reaches, reporter: Reporter) -> None:
         reporter.warn(f"{each.grasp}: {each.reason}: {each.explanation}")
 
 
-def say_where_to_look(command: hand_flags.Reach, reporter: Reporter) -> None:
-    """Say which command draws the hand in the grasps, where their file is beside the poses."""
-    out = command.out
-    if out is None or not (out / GRASPS).is_file() or not command.grasps.samefile(out / GRASPS):
-        reporter.say(
-            f"give the folder of {GRASPS} as --out to have the hand drawn by `graspproof report`"
-        )
-        return
-    reporter.say(f"see the hand in the grasps: graspproof report {shlex.quote(str(out))}")
-
-
 def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
-    """Find the largest mass in any orientation.
-
-    There is none for a hand whose motors or links are not known well enough, and for a grasp in
-    which motors cannot carry their links.
-    """
+    """Find the mass held in any orientation; None if the hand is not known well enough or weak."""
     unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
     if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
         return None

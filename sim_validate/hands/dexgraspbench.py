@@ -447,11 +447,7 @@ def reach_of_record(
 
 
 def recorded_postures(reach: RecordedReach, hand: Hand, servo_n_m_per_rad: float) -> Postures:
-    """Return where a record has a hand: open, touching, and as servos are told to squeeze.
-
-    The pushes are those with which fingertips, all of them taken to touch, best explain the
-    squeeze's torques.
-    """
+    """Return a record's postures, with the pushes that best explain the torques of its squeeze."""
     if reach.hand != hand.name:
         raise InputError(f"hand must be the recorded one, {reach.hand}, got {hand.name}")
     record = reach.record

@@ -9,14 +9,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from grasp_core.kinds import (
-    Direction,
-    HandClearance,
-    Quantity,
-    Seed,
-    Starts,
-    TorqueLimit,
-)
+from grasp_core.kinds import Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
 from sim_validate.kit.command_flags import (
     AtFriction,
     FirstOnly,

@@ -29,8 +29,7 @@ from sim_validate.kit.files import AboutGrasps
 from sim_validate.settings import ExecutionSettings
 
 TOUCHING_M = 1e-4
-"""How far a fingertip of the file may be from its contact [m]: ten times what `reach_with` allows.
-"""
+"""How far a fingertip of a file may be from its contact [m]: ten times what reaching allows."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -81,8 +81,7 @@ from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.settings import ExecutionSettings
 
 MOST_PUSH_N = 100.0
-"""Largest normal force of a fingertip in predictions, unless stated [N]: more than hands' motors
-give, so that they are what limits."""
+"""Largest normal force of a fingertip unless stated [N]: more than hands' motors give."""
 
 EXCESS = 0.05
 """Share of the applied load, at least, that no forces of a control can balance."""
@@ -507,5 +506,5 @@ def executed_by_hand(
 ) -> ExecutedGrasp:
     """Execute one grasp with a hand; a grasp that cannot be executed is a result with a reason."""
     execution = partial(execute_hand, hand, body, reach, friction, settings)
-    refused = (InputError, NoForcesError)
-    return result_of(reach.grasp, "", reach.contacts or (), execution, refused)
+    contacts = reach.contacts or ()
+    return result_of(reach.grasp, "", contacts, execution, (InputError, NoForcesError))

@@ -5,7 +5,7 @@ A question that cannot be decided leaves a reason; all other questions are still
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
@@ -30,7 +30,7 @@ from grasp_core.provenance import versions
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
-from grasp_core.records.contacts_json import ContactSet, Overrides, contact_sets_from_json
+from grasp_core.records.grasps_json import ContactSet, Overrides, contact_sets_from_json
 from grasp_core.solvers.ties import first_best
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter
@@ -38,8 +38,7 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.processes import each
 
 MOST_EDGES = 10_000
-"""Largest number of edges of all pyramids of a grasp together; their hull in six dimensions then
-takes ten seconds."""
+"""Most edges of all pyramids of a grasp, whose hull in six dimensions then takes ten seconds."""
 
 Answer = TypeVar("Answer")
 Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
@@ -148,17 +147,6 @@ class Analyses(RecordFile):
         """Numbers of grasps, and of grasps of each outcome."""
         counts = Counter(each.outcome for each in self.grasps)
         return {"grasps": len(self.grasps)} | {each.value: counts[each] for each in Outcome}
-
-
-def check_edges(sets: Iterable[ContactSet], edges: int) -> None:
-    """Refuse pyramids with so many edges that their hull would take minutes."""
-    for contacts in sets:
-        count = len(contacts.positions)
-        if count * edges > MOST_EDGES:
-            raise InputError(
-                f"grasp {contacts.id}: {count} contacts with {edges} edges each exceed "
-                f"{MOST_EDGES} edges; use --edges {MOST_EDGES // count} or less"
-            )
 
 
 def analyze(contacts: ContactSet, question: Question) -> Analysis:
@@ -272,8 +260,7 @@ def _resisted(contacts: ContactSet, wrench: ArrayLike, question: Question) -> Re
 
 DIGITS = 7
 STEP = 10.0**-DIGITS
-"""Step to which both ends of a printed interval are rounded; results are reproducible to this step.
-"""
+"""Step to which ends of a printed interval are rounded, and to which they are reproducible."""
 
 
 def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
@@ -282,7 +269,13 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
     text = read_text(command.contacts)
     with about(command.contacts):
         sets = contact_sets_from_json(text, overrides)
-    check_edges(sets, command.edges)
+    for contacts in sets:
+        count = len(contacts.positions)
+        if count * command.edges > MOST_EDGES:
+            raise InputError(
+                f"grasp {contacts.id}: {count} contacts with {command.edges} edges each exceed "
+                f"{MOST_EDGES} edges; use --edges {MOST_EDGES // count} or less"
+            )
     question = Question(command.max_normal_force_n, command.wrench, command.edges)
     found = each(partial(analyze, question=question), sets, jobs=command.jobs)
 

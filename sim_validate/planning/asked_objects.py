@@ -108,11 +108,7 @@ def asked_grasps(
     path: Path, reporter: Reporter, *, grasp: str | None = None, friction: float | None = None,
     seed: int | None = None, limit: int | None = None,
 ) -> Plan | None:  # fmt: skip
-    """Read the grasps that are asked for, and warn of what was changed in their mesh.
-
-    They have another friction or seed where one is given. None, with a word about it, if the file
-    holds no grasp.
-    """
+    """Read the grasps that are asked for, and warn of changes; None, with a word, without any."""
     saved = load_grasps(path)
     for note in saved.body.surface.notes():
         reporter.warn(f"{saved.body.name}: {note}")

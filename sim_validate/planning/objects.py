@@ -15,7 +15,7 @@ from grasp_core.files.records import record_of
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE
+from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE
 from scenes.drawing.pictures import MOST_NUMBERED, write_object_picture
 from scenes.example_objects import example_names
 from sim_validate.kit import command_flags

@@ -20,8 +20,7 @@ from grasp_core.kinds import METHODS
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.plan_search import carried
 from grasp_core.planning.planner import plan
-from grasp_core.planning.request import methods_for
-from grasp_core.planning.result import Moved, Plan
+from grasp_core.planning.result import Moved, Plan, methods_for
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types
@@ -71,10 +70,7 @@ def plan_object(
 def improved(
     body: Polyhedron, found: Plan, planning: command_flags.Planning, jobs: int, reporter: Reporter
 ) -> Plan:
-    """Move the contacts of each grasp to raise its quality; return the new plan, best first.
-
-    The plan keeps only one of several grasps that end at the same contacts.
-    """
+    """Move contacts to raise the quality; keep one of grasps that end alike, the best first."""
     results = each(partial(_improve, body, planning), found.grasps, jobs=jobs)
     done = list(
         reporter.counted(
@@ -156,8 +152,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
             found = replace(found, grasps=(best.grasp, *planned), absence=None)
         text = plan_to_json(body, found)
         if command.out:
-            path = write_text(command.out / "grasps.json", text)
-            reporter.say(f"wrote {path}")
+            reporter.say(f"wrote {write_text(command.out / 'grasps.json', text)}")
         if best is not None:
             from sim_validate.planning.best import write_best
 
@@ -170,10 +165,11 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         return Exit.NONE
     reporter.records(f"{len(found.grasps)} grasps of {body.name}", found.grasps)
     if command.planning.rank_by == "payload":  # which is not kept with grasps
-        payloads = [
-            (grasp.id, f"{carried(body, grasp, found.friction, found.finger):.4g}")
-            for grasp in found.grasps[:TABLE_ROWS]
-        ]
+        masses = (
+            carried(body, each.positions - body.center_of_mass, each.normals, found.friction,
+                    found.finger) for each in found.grasps[:TABLE_ROWS]
+        )  # fmt: skip
+        payloads = [(each.id, f"{kg:.4g}") for each, kg in zip(found.grasps, masses, strict=False)]
         reporter.table("what one squeeze carries", ("grasp", "payload kg"), payloads)
     if found.moves:
         show_gains(found.moves, reporter)

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Shape, frozen, frozen_indices, frozen_units
+from grasp_core.arrays import Array, Shape, frozen, frozen_units
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared
@@ -23,7 +23,7 @@ from grasp_core.figures import Shown, figures
 from grasp_core.files.records import FLAT, RecordFile, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
 from grasp_core.grasp_tables import ById
-from grasp_core.kinds import Count, Family, Friction, NotNegative, path_of
+from grasp_core.kinds import Count, Family, Friction, NotNegative, number, path_of
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -43,19 +43,13 @@ PROOFS = "proofs"
 MILLI = 1e3
 POLYGONS = tuple(f"region{i}_m" for i in range(FINGERS))
 BORDERS = tuple(f"border{i}_m" for i in range(FINGERS))
-FIELDS: Mapping[str, tuple[str, tuple[int | None, ...]]] = {
-    "normals": ("normals", (FINGERS, 3)), "friction": ("friction", (FINGERS,)),
-    "origin": ("origin_m", (3,)), "depths": ("depths_m", (FINGERS,)), "scale": ("scale_m", ()),
-    "centers": ("centers_m", (FINGERS, 3)), "radius": ("disc_radius_m", ()),
-    "limit": ("open_radius_m", ()), "open_choice": ("open_choice_m", (None, 3)),
-    "open_wrench": ("open_wrench", (None,)),
+FIELDS: Mapping[str, str] = {
+    "normals": "normals", "friction": "friction", "origin": "origin_m", "depths": "depths_m",
+    "scale": "scale_m", "centers": "centers_m", "radius": "disc_radius_m",
+    "limit": "open_radius_m", "open_choice": "open_choice_m", "open_wrench": "open_wrench",
 }  # fmt: skip
-"""Name and shape of the array in a proof file for fields of `CertifiedRegions`."""
-SHAPES: Mapping[str, tuple[int | None, ...]] = {
-    "axes": (6, 6), "codes": (None,), "forces": (None, FINGERS, 3),
-    **dict(FIELDS.values()), **dict.fromkeys((*POLYGONS, *BORDERS), (None, 3)),
-}  # fmt: skip
-"""Shape of each array in a proof file; None stands for any length."""
+"""Name of the array in a proof file for fields of `CertifiedRegions`."""
+ARRAYS = ("axes", "codes", "forces", *FIELDS.values(), *POLYGONS, *BORDERS)
 MOST_CORNERS = 1000
 """Largest number of corners of a region's polygon in a file."""
 SMALLEST_SCALE, LARGEST = 1e-6, 1e6
@@ -208,7 +202,7 @@ def proof_arrays(
         "forces": proved.cover.forces,
         **{
             name: np.asarray(empty[field] if known[field] is None else known[field])
-            for field, (name, _) in FIELDS.items()
+            for field, name in FIELDS.items()
         },
         **dict(zip((*POLYGONS, *BORDERS), (*polygons, *proved.borders), strict=True)),
     }
@@ -222,46 +216,34 @@ def load_regions(path: str | Path) -> CertifiedRegions:
     """
     path = path_of(path, "path")
     with about(f"{path}: expected a proof file as `graspproof regions` writes it"):
-        return regions_of(read_arrays(path, SHAPES))
+        return regions_of(read_arrays(path, ARRAYS))
 
 
 def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     """Build regions and their proof from arrays by name; nothing is verified yet."""
-    if missing := [name for name in SHAPES if name not in kept]:
+    if missing := [name for name in ARRAYS if name not in kept]:
         raise InputError(
             f"the array {missing[0]} is missing; certify again with `graspproof regions`"
         )
-    limit = np.asarray(kept["open_radius_m"])  # infinite where no open choice was found
-    known = np.where(np.isposinf(limit), 0.0, limit) if limit.dtype.kind == "f" else limit
-    finite = {**kept, "open_radius_m": known}
-    numbers = {name: frozen(finite[name], shape, name) for name, shape in SHAPES.items()}
-    scale = numbers["scale_m"].item()
-    if not SMALLEST_SCALE <= scale <= LARGEST:
-        raise InputError(
-            f"scale_m: expected a length from {SMALLEST_SCALE:g} to {LARGEST:g} m, got {scale:g}"
-        )
-    normals = frozen_units(numbers["normals"], (FINGERS, 3), "normals")
-    fields: dict[str, Any] = {
-        field: numbers[name] if shape else numbers[name].item()
-        for field, (name, shape) in FIELDS.items()
-    }
-    opened = {field: fields[field] for field in ("open_choice", "open_wrench")}
-    fields |= {field: value if len(value) else None for field, value in opened.items()}
-    fields |= {"limit": limit.item(), "normals": normals}
+    fields: dict[str, Any] = {field: kept[name][()] for field, name in FIELDS.items()}
+    for optional in ("open_choice", "open_wrench"):  # empty where nothing was found
+        fields[optional] = fields[optional] if np.size(fields[optional]) else None
+    scale = number(fields["scale"], "scale_m", least=SMALLEST_SCALE, most=LARGEST)
+    normals = frozen_units(kept["normals"], (FINGERS, 3), "normals")
+    forces = frozen(kept["forces"], (None, FINGERS, 3), "forces")
     return CertifiedRegions(
         regions=four(
-            _region(name, numbers[name], normal, scale)
+            _region(name, kept[name], normal, scale)
             for name, normal in zip(POLYGONS, normals, strict=True)
         ),
-        borders=four(numbers[name] for name in BORDERS),
-        cover=TwistCover(
-            numbers["axes"], frozen_indices(kept["codes"], (None,), "codes"), numbers["forces"]
-        ),
+        borders=four(kept[name] for name in BORDERS),
+        cover=TwistCover(kept["axes"], kept["codes"], forces),
         **fields,
     )
 
 
-def _region(name: str, polygon: Array, normal: Array, scale: float) -> ContactRegion:
+def _region(name: str, given: NDArray[Any], normal: Array, scale: float) -> ContactRegion:
+    polygon = frozen(given, (None, 3), name)
     if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
         raise InputError(
             f"{name}: expected a polygon of {FEWEST_CORNERS} to {MOST_CORNERS} corners within "
@@ -303,10 +285,7 @@ def certified(
     body: Polyhedron, grasps: Sequence[Grasp], friction: float, asked: Certifying, *,
     folder: Path | None, jobs: int, reporter: Reporter,
 ) -> Regions:  # fmt: skip
-    """Certify regions of grasps, in order; write each proof when it is ready, then regions.json.
-
-    Nothing is written if `folder` is None.
-    """
+    """Certify regions in order, and write each proof when it is ready, if there is a folder."""
     proofs = each(partial(_certify, body, friction, asked), grasps, jobs=jobs)
 
     def recorded() -> Iterator[GraspRegions]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.errors import about
 from grasp_core.files.text_files import write_text
-from grasp_core.objects.symmetries import Copies, copies_of
+from grasp_core.objects.standard_order import Copies, copies_of
 from scenes.drawing.clips import GraphicsError, write_trial_clip
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import Sheet, svg_of

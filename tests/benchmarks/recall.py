@@ -17,7 +17,7 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from grasp_core.errors import UndecidedError
-from grasp_core.planning.request import FAMILIES
+from grasp_core.planning.result import FAMILIES
 from sim_validate.kit.processes import available_cores, each
 
 OBJECTS = (

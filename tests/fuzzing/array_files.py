@@ -11,7 +11,7 @@ from pyarrow import parquet
 from sim_validate.datasets.columns import parquet_bytes, read_columns
 from sim_validate.datasets.rows import TABLES
 from sim_validate.kit.files import arrays_of
-from sim_validate.planning.regions import SHAPES, regions_of
+from sim_validate.planning.regions import ARRAYS, regions_of
 from tests.fuzzing.targets import Target
 
 MEMORY = Path("/dev/shm")  # noqa: S108 - a folder in memory, where there is one
@@ -45,7 +45,7 @@ def _plain(data: bytes, names: Any) -> dict[str, Any]:
 
 
 def _same_proof(data: bytes, found: Any) -> None:
-    kept = _plain(data, SHAPES)
+    kept = _plain(data, ARRAYS)
     np.testing.assert_array_equal(kept["centers_m"], found.centers)
     np.testing.assert_array_equal(kept["region2_m"], found.regions[2].polygon)
     np.testing.assert_array_equal(kept["codes"], found.cover.codes)
@@ -77,7 +77,7 @@ def _same_table(data: bytes, found: Any) -> None:
 
 
 TARGETS = (
-    Target("proof", lambda data: regions_of(arrays_of(data, SHAPES)), lambda: [npz(**_proof())],
+    Target("proof", lambda data: regions_of(arrays_of(data, ARRAYS)), lambda: [npz(**_proof())],
            _same_proof, "npz"),
     Target("table", _table, lambda: [parquet_bytes("objects", _rows(), TABLES)], _same_table),
 )  # fmt: skip

@@ -11,8 +11,7 @@ from grasp_core.files.records import RecordFile, record_of
 from grasp_core.files.text_files import text_of
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
-from grasp_core.records.contacts_json import Overrides, contact_sets_from_json
-from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.records import grasps_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
@@ -41,7 +40,7 @@ HASH = "0" * 64
 def grasps_seed() -> bytes:
     """A small `grasps.json`."""
     body = example_object("tetrahedron")
-    return plan_to_json(body, gc.plan(body, 0.5, limit=1)).encode()
+    return grasps_json.plan_to_json(body, gc.plan(body, 0.5, limit=1)).encode()
 
 
 def _same_grasps(data: bytes, found: Plan) -> None:
@@ -293,9 +292,9 @@ def _json(value: Any) -> bytes:
 
 
 TARGETS = (
-    Target("grasps", lambda data: grasps_from_json(text_of(data)), lambda: [grasps_seed()],
-           _same_grasps, "json"),
-    Target("contacts", lambda data: contact_sets_from_json(text_of(data), Overrides()),
+    Target("grasps", lambda data: grasps_json.grasps_from_json(text_of(data)),
+           lambda: [grasps_seed()], _same_grasps, "json"),
+    Target("contacts", lambda data: grasps_json.contact_sets_from_json(text_of(data)),
            lambda: [_json(CONTACTS), _json(GIVEN | {"friction": 0.3})], _same_contacts, "json"),
     Target("given", lambda data: given_from_json(text_of(data)), lambda: [_json(GIVEN)],
            _same_given, "json"),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import scenes
-from grasp_core.planning.request import FAMILIES
+from grasp_core.planning.result import FAMILIES
 from scenes.drawing.painting import View
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
 from scenes.example_objects import example_object

@@ -18,7 +18,7 @@ from grasp_core.families.free import Absence, place_free
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.quality.measures import Measure, resisted_loads
 from grasp_core.regions.certify_regions import certify_regions
-from sim_validate.planning.regions import SHAPES, proof_arrays, regions_of
+from sim_validate.planning.regions import ARRAYS, proof_arrays, regions_of
 from tests.judges import random_contacts
 from tests.tampering import (
     best_grasps,
@@ -306,7 +306,7 @@ def cut_tree_for_loads(seed):
 
 
 ProofFile = dataclasses.make_dataclass(
-    "ProofFile", SHAPES, frozen=True, eq=False,
+    "ProofFile", ARRAYS, frozen=True, eq=False,
     namespace={"verify": lambda self: regions_of(vars(self)).verify()},
 )  # fmt: skip
 """The arrays of a proof in a folder that `graspproof regions` writes."""
@@ -318,7 +318,7 @@ def proof_file(seed):
         return None
     body, _, grasps = planned(seed)
     arrays = proof_arrays(found, grasps[0], body)
-    return ProofFile(**{name: np.asarray(arrays[name]) for name in SHAPES})
+    return ProofFile(**{name: np.asarray(arrays[name]) for name in ARRAYS})
 
 
 TABLE = {

@@ -11,8 +11,7 @@ from grasp_core.families.disc_bounds import AttemptBounds, corners_of, disc_limi
 from grasp_core.families.placements import LEAST_RADIUS, PAIRINGS, Attempts
 from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, NORMAL, TILTED, PlannedCones
-from grasp_core.planning.quadruples import all_blocks
+from grasp_core.planning import quadruples as planned
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
@@ -103,11 +102,11 @@ NONE = np.empty((0, 4), dtype=np.int64)
 
 def attempts(body, kind, order, count=60):
     """Faces in finger order, axes and half-angles of some quadruples of a body."""
-    cones = PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
-    _, make = all_blocks(cones, len(body.faces), NONE)
+    cones = planned.PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
+    _, make = planned.all_blocks(cones, len(body.faces), NONE)
     wide = make(0)
     found = wide.coned(slice(None))
-    usable = np.flatnonzero(found.half_angles[:, kind] > LEAST_SPAN_ANGLE)
+    usable = np.flatnonzero(found.half_angles[:, kind] > planned.LEAST_SPAN_ANGLE)
     some = np.random.default_rng(0).permutation(usable)[:count]
     order = list(order)
     axes = found.axes[some, kind][:, order]
@@ -130,7 +129,7 @@ def test_bounds_are_the_optima_of_the_programs(name, family):
     body = OBJECTS[name]()
     construction, discs = CONSTRUCTIONS[family], AttemptBounds(face_shapes(body))
     seen = np.zeros(2, dtype=int)
-    for kind in (NORMAL, TILTED):
+    for kind in (planned.NORMAL, planned.TILTED):
         for order in construction.orders:
             some = attempts(body, kind, order)
             quick = discs.of(construction, some, LEAST_RADIUS)
@@ -147,7 +146,7 @@ def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below()
     body = example_object("random-14-1")
     discs = AttemptBounds(face_shapes(body))
     for family in FAMILIES:
-        some = attempts(body, TILTED, (0, 1, 2, 3), 200)
+        some = attempts(body, planned.TILTED, (0, 1, 2, 3), 200)
         every = discs.of(CONSTRUCTIONS[family], some, -np.inf)
         least = float(np.median(every))
         few = discs.of(CONSTRUCTIONS[family], some, least)

@@ -8,8 +8,7 @@ from grasp_core.families import placing
 from grasp_core.families.placements import LEAST_RADIUS, face_table
 from grasp_core.families.placing import CONSTRUCTIONS, MIXED, attempts_of, regions_of
 from grasp_core.objects.face_pieces import edge_rows, face_shapes, inscribed_radius
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, PlannedCones
-from grasp_core.planning.quadruples import all_blocks
+from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE, PlannedCones, all_blocks
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import ForceCone, four
 from scenes.example_objects import example_object

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from grasp_core.objects.sound_surface import close_pairs
-from grasp_core.objects.triangles import components
+from grasp_core.objects.build import close_pairs
+from grasp_core.objects.surface import components
 
 
 def judged(count, links):

@@ -10,7 +10,8 @@ import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
 from grasp_core.objects.booleans import hull
-from grasp_core.objects.curved_patches import clearest_point, clearing, flat_patches
+from grasp_core.objects.planar_faces import clearest_point, clearing, flat_patches
+from grasp_core.objects.surface import Mesh
 from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body, inside, met
 
 ROUNDING = 1e-9
@@ -29,7 +30,7 @@ def test_patches_keep_the_limits_and_come_largest_first():
     vertices, triangles = bumpy_ellipsoid(noise=0.001)
     extent = np.ptp(vertices, axis=0).max()
     for limits in (gc.PatchLimits(8.0, 0.02, 12), gc.PatchLimits(25.0, 0.004, 30)):
-        found = flat_patches(vertices, triangles, limits)
+        found = flat_patches(Mesh(vertices, triangles), limits)
         assert 4 <= len(found) <= limits.most
         assert max(face.spread for face in found) <= math.radians(limits.spread_deg) + ROUNDING
         assert max(face.depth for face in found) <= limits.depth * extent
@@ -52,7 +53,7 @@ def test_a_patch_of_one_large_triangle_keeps_the_limits_too():
     rise = 0.05 * math.tan(math.radians(4.0))
     solid = hull([*square, (0.0, 0.0, -rise), (0.0, 0.0, 0.03 + rise)])
     limits = gc.PatchLimits()
-    found = flat_patches(solid.vertices, solid.triangles, limits)
+    found = flat_patches(solid, limits)
     assert len(found) == 12
     assert max(face.depth for face in found) <= limits.depth * 0.1
 

@@ -5,7 +5,7 @@ import trimesh
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import coplanar_groups, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.triangles import border_loops
+from grasp_core.objects.surface import Mesh, border_loops
 from scenes.example_objects import example_object
 
 
@@ -34,9 +34,10 @@ def test_extra_triangles_and_border_points_do_not_change_the_faces():
 def test_a_fine_sphere_keeps_its_facets():
     """20,480 triangles with 0.6 degrees between neighbours: none may merge."""
     mesh = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
-    groups = coplanar_groups(mesh.vertices, mesh.faces, planar_slack(0.1, 0.0))
+    surface, slack = Mesh(mesh.vertices, mesh.faces), planar_slack(0.1, 0.0)
+    groups = coplanar_groups(surface, slack)
     assert len(groups) == len(mesh.faces) == 20480
-    assert len(coplanar_groups(mesh.vertices, mesh.faces, planar_slack(0.1, 0.0), most=200)) == 201
+    assert len(coplanar_groups(surface, slack, most=200)) == 201
 
 
 @pytest.mark.parametrize(
@@ -53,7 +54,7 @@ def test_a_shallow_roof_is_one_face_only_within_both_limits(limits, roof_faces):
     ridge = [[0.0, 0.5, 5e-5], [1.0, 0.5, 5e-5]]
     corners = [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (-0.3, 0.0)]
     solid = hull([*corners, *ridge])
-    assert len(coplanar_groups(solid.vertices, solid.triangles, **limits)) == 5 + roof_faces
+    assert len(coplanar_groups(solid, **limits)) == 5 + roof_faces
 
 
 def test_a_face_with_a_hole_is_tiled_by_convex_pieces():

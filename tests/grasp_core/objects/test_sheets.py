@@ -8,7 +8,7 @@ import trimesh
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
-from grasp_core.objects.sheets import sampled, winding_on, wound_alike
+from grasp_core.objects.shells import sampled, winding_on, wound_alike
 
 RADIUS = 0.05
 

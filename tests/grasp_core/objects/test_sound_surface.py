@@ -10,8 +10,8 @@ import trimesh
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.objects.booleans import Solid
-from grasp_core.objects.sound_surface import caps_of
-from grasp_core.objects.triangles import Edges
+from grasp_core.objects.build import caps_of
+from grasp_core.objects.surface import Edges, Mesh
 from tests.bad_input import mesh_texts
 
 TURN = trimesh.transformations.rotation_matrix(0.7, [3.0, 1.0, 2.0])[:3, :3]
@@ -261,7 +261,7 @@ def test_holes_that_meet_in_a_corner_are_closed_one_by_one():
     closed = 0
     for pair in pairs:
         left = np.delete(mesh.faces, pair, axis=0)
-        caps = caps_of(mesh.vertices, left)
+        caps = caps_of(Mesh(mesh.vertices, left))
         assert len(caps.widths) == len(caps.triangles) == 2
         assert {frozenset(t) for t in caps.triangles.tolist()} == {
             frozenset(t) for t in mesh.faces[list(pair)].tolist()
@@ -276,7 +276,7 @@ def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open(
     mesh = grid(2)
     gone = around(mesh, [0.05, 0.0, 0.0])
     left = np.delete(mesh.faces, gone, axis=0)
-    assert caps_of(mesh.vertices, left).hidden > 0.02 * mesh.volume
+    assert caps_of(Mesh(mesh.vertices, left)).hidden > 0.02 * mesh.volume
     with pytest.raises(gc.MeshError, match="belong to one triangle only") as caught:
         gc.Polyhedron.from_mesh(mesh.vertices, left)
     assert caught.value.reason is MeshRefusal.OPEN
@@ -287,7 +287,7 @@ def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open(
 def test_a_plane_border_of_any_shape_is_filled_without_overlap(count, dent):
     outline = star(count, dent)
     points, faces = ring(outline, 0.7)
-    caps = caps_of(points, faces)
+    caps = caps_of(Mesh(points, faces))
     whole = np.concatenate([faces, caps.triangles])
     assert Edges.of(whole).fault() is None
     assert len(caps.triangles) == count - 2
@@ -310,7 +310,7 @@ def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
         gone.append(int(rng.choice(np.setdiff1d(across[gone], gone))))
     for wound in (mesh.faces, mesh.faces[:, ::-1]):
         left = np.delete(wound, gone, axis=0)
-        caps = caps_of(mesh.vertices, left)
+        caps = caps_of(Mesh(mesh.vertices, left))
         whole = np.concatenate([left, caps.triangles])
         assert not Edges.of(whole).balance.any()
         assert abs(abs(Solid(mesh.vertices, whole).volume) - mesh.volume) <= caps.hidden
@@ -322,7 +322,7 @@ def test_edges_of_three_triangles_are_not_closed():
     points = np.vstack([mesh.vertices, [0.3, 0.3, 0.3]])
     fin = [*edge, len(mesh.vertices)]
     for added in (fin, fin[::-1]):
-        assert caps_of(points, np.vstack([mesh.faces, added])) is None
+        assert caps_of(Mesh(points, np.vstack([mesh.faces, added]))) is None
         with pytest.raises(gc.MeshError) as caught:
             gc.Polyhedron.from_mesh(points, np.vstack([mesh.faces, added]), faces="planar")
         assert caught.value.reason in {MeshRefusal.OPEN, MeshRefusal.NON_MANIFOLD}

@@ -8,14 +8,9 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.objects.booleans import hull
+from grasp_core.objects.face_pieces import clear_of_edges, shared_quadruples, with_halves
 from grasp_core.objects.on_faces import check_on_faces
-from grasp_core.objects.standard_order import (
-    clear_of_edges,
-    mirror_image,
-    shared_quadruples,
-    standard,
-    with_halves,
-)
+from grasp_core.objects.standard_order import mirror_image, standard
 from grasp_core.planning.quadruples import FIRST_FACES
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.objects.symmetries import SAME_GRASP, Copies, copies_of, symmetries
+from grasp_core.objects.standard_order import SAME_GRASP, Copies, copies_of, symmetries
 from grasp_core.values import Contact, ContactRegion, ForceCone, Witness, four
 from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.grasp_core.long_shapes import shape

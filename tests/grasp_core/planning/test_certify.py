@@ -11,7 +11,7 @@ import grasp_core as gc
 from grasp_core.planning import certify as module
 from grasp_core.planning.certify import Candidate, certify_each, witness_faults
 from grasp_core.planning.plan_search import PlanSearch
-from grasp_core.planning.request import PlanRequest
+from grasp_core.planning.result import PlanRequest
 from grasp_core.values import PUT_OFF
 from scenes.example_objects import example_object
 

@@ -12,7 +12,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.planning import plan_search
 from grasp_core.planning.plan_search import PlanSearch, found_elsewhere
-from grasp_core.planning.request import PlanRequest
+from grasp_core.planning.result import PlanRequest
 from grasp_core.processes import receive, send, unpacked
 from scenes.example_objects import example_object
 from tests.patience import HANGING_S

@@ -12,8 +12,7 @@ from grasp_core.kinds import METHODS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.objects.standard_order import standard
 from grasp_core.planning.certify import _place, faces_as_given
-from grasp_core.planning.planned_cones import PlannedCones
-from grasp_core.planning.quadruples import all_blocks
+from grasp_core.planning.quadruples import PlannedCones, all_blocks
 from scenes.example_objects import example_object
 from tests.benchmarks.objects import sphere_hull
 from tests.judges import pyramid_margin, random_rotation

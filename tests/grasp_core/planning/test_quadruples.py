@@ -11,8 +11,7 @@ from grasp_core.cones.tilting import SLIGHT, tilted_cones, widest_half_angles
 from grasp_core.families.disc_bounds import corners_of, widths_apart
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
-from grasp_core.planning.planned_cones import LEAST_SPAN_ANGLE, TILTED, PlannedCones
-from grasp_core.planning.quadruples import LARGEST_BLOCK, all_blocks, spanning_blocks
+from grasp_core.planning import quadruples as tables
 from scenes.example_objects import example_object
 from tests.benchmarks.objects import sphere_hull
 from tests.grasp_core.cones.reference_tilting import lowest_heights
@@ -23,25 +22,25 @@ BODIES = ("random-14-1", "chamfered-box", "l-bracket", "double-wedge-bar")
 
 
 def planned(body):
-    return PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
+    return tables.PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
 
 
 @pytest.mark.parametrize("name", ["random-40-1", "l-bracket", "tetrahedron"])
 def test_blocks_hold_every_quadruple_with_room_once(name):
     cones = planned(example_object(name))
     roomy = np.flatnonzero(cones.rooms > 0.0)
-    rooms, make = all_blocks(cones, len(cones.rooms), NONE)
+    rooms, make = tables.all_blocks(cones, len(cones.rooms), NONE)
     made = [make(place).faces for place in range(len(rooms))]
-    assert all(len(each) <= LARGEST_BLOCK for each in made)
+    assert all(len(each) <= tables.LARGEST_BLOCK for each in made)
     listed = np.concatenate(made)
     assert len(listed) == math.comb(len(roomy), 4)
     assert {tuple(each) for each in listed.tolist()} == set(combinations(roomy.tolist(), 4))
 
 
-@pytest.mark.parametrize("build", [all_blocks, spanning_blocks])
+@pytest.mark.parametrize("build", [tables.all_blocks, tables.spanning_blocks])
 def test_no_block_has_more_room_than_it_says_nor_than_the_one_before(build):
     cones = planned(example_object("random-40-1"))
-    rooms, make = build(cones, 40, NONE) if build is all_blocks else build(cones, 40)
+    rooms, make = build(cones, 40, NONE) if build is tables.all_blocks else build(cones, 40)
     assert len(rooms) >= 5
     assert (np.diff(rooms) <= 0.0).all()
     for place, room in enumerate(rooms):
@@ -51,8 +50,8 @@ def test_no_block_has_more_room_than_it_says_nor_than_the_one_before(build):
 def test_the_blocks_of_800_faces_are_not_listed_before_they_are_asked_for():
     body = sphere_hull(800)
     assert len(body.faces) == 800
-    rooms, make = all_blocks(planned(body), 800, NONE)
-    assert len(rooms) > math.comb(800, 4) / LARGEST_BLOCK
+    rooms, make = tables.all_blocks(planned(body), 800, NONE)
+    assert len(rooms) > math.comb(800, 4) / tables.LARGEST_BLOCK
     last = make(len(rooms) - 1)
     order = np.argsort(-last.cones.rooms, kind="stable")
     assert np.sort(order[-4:]).tolist() in last.faces.tolist()
@@ -69,9 +68,9 @@ def test_no_tilted_cones_are_wider_than_what_bounds_them():
     sines = span_sines(normals)
     quick = widest_half_angles(normals, thetas, sines)
     found = tilted_cones(normals, thetas).half_angles
-    usable = found > LEAST_SPAN_ANGLE
+    usable = found > tables.LEAST_SPAN_ANGLE
     assert (found[usable] <= quick[usable]).all()
-    tested = usable.sum(), (quick < LEAST_SPAN_ANGLE).sum()
+    tested = usable.sum(), (quick < tables.LEAST_SPAN_ANGLE).sum()
     assert min(tested) >= 500
     heights = np.where(sines > 0.0, sines, np.minimum(lowest_heights(normals), 0.0))
     widest = 0.5 * (thetas.max(axis=1) + np.arcsin(np.clip(heights, -1.0, 1.0))) + SLIGHT
@@ -99,11 +98,11 @@ def test_the_widest_half_angle_is_that_of_the_definition():
 def test_limits_before_cones_are_chosen_bound_those_after(name):
     body = example_object(name)
     cones, tested = planned(body), 0
-    _, make = all_blocks(cones, len(body.faces), NONE)
+    _, make = tables.all_blocks(cones, len(body.faces), NONE)
     wide = make(0)
     limits = cones.limits(wide.faces, wide.widest)
     coned = wide.coned(slice(None))
-    usable = coned.half_angles > LEAST_SPAN_ANGLE
+    usable = coned.half_angles > tables.LEAST_SPAN_ANGLE
     assert (coned.half_angles[usable] <= wide.widest[np.nonzero(usable)[0]]).all()
     for kind in range(2):
         held = usable[:, kind]
@@ -137,10 +136,10 @@ def test_no_pair_of_tilted_cones_has_larger_discs_than_its_widest_cones_allow():
 def test_widths_from_distances_bound_those_from_corners_however_axes_lean():
     body = example_object("random-14-1")
     cones = planned(body)
-    _, make = all_blocks(cones, 14, NONE)
+    _, make = tables.all_blocks(cones, 14, NONE)
     coned = make(0).coned(slice(None))
-    held = coned.half_angles[:, TILTED] > LEAST_SPAN_ANGLE
-    faces, axes = coned.faces[held], coned.axes[held, TILTED]
+    held = coned.half_angles[:, tables.TILTED] > tables.LEAST_SPAN_ANGLE
+    faces, axes = coned.faces[held], coned.axes[held, tables.TILTED]
     leaning = np.arccos(np.clip((axes * coned.normals[held]).sum(axis=-1), -1.0, 1.0))
     bounds = widths_apart(faces, cones._distances, cones._halves, leaning.max(axis=1))
     bounded = widths(corners_of(body).points[faces], axes)

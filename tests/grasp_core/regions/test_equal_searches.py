@@ -20,7 +20,7 @@ from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.planning.given_contacts import seat
 from grasp_core.quality import wrench_limits
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
-from grasp_core.records.contacts_json import ContactSet
+from grasp_core.records.grasps_json import ContactSet
 from grasp_core.regions.growth import Grounds, Proved, Sites, larger_inside, search_cover
 from scenes.example_objects import example_object
 from sim_validate.planning import analyze as analysis

@@ -8,13 +8,11 @@ from grasp_core.errors import SolverError
 from grasp_core.families import placing
 from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.placing import CONSTRUCTIONS
-from grasp_core.planning import family_search as promising_module
-from grasp_core.planning.family_search import SAME_MERIT, BestFirst
+from grasp_core.planning import method_search as promising_module
+from grasp_core.planning.method_search import SAME_MERIT, FamilySearch, MethodSearch
 from grasp_core.planning.plan_search import in_standard_order
-from grasp_core.planning.planned_cones import PlannedCones
-from grasp_core.planning.quadruples import all_blocks
-from grasp_core.planning.request import PlanRequest
-from grasp_core.planning.result import Tally
+from grasp_core.planning.quadruples import PlannedCones, all_blocks
+from grasp_core.planning.result import PlanRequest
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
 from tests.grasp_core.quadruples import leave_all
@@ -72,8 +70,11 @@ def opened(body, family, least):
         made.append(place)
         return blocks(place)
 
-    search = BestFirst(CONSTRUCTIONS[family], AttemptBounds(on.shapes), Tally())
-    return search.over((rooms, make), range(len(rooms)), lambda _: least[0]), made
+    class Opened(FamilySearch):
+        least = property(lambda _: least[0])
+
+    search = Opened(CONSTRUCTIONS[family], on.shapes, 0.4, MethodSearch(family))
+    return search.best_first((rooms, make), range(len(rooms))), made
 
 
 def bound(attempts):
