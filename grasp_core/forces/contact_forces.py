@@ -124,16 +124,15 @@ class Balance:
     def checked(self, f: Array, residual: float = RESIDUAL) -> Array | None:
         """Make forces (3k,) balance to rounding; None where they then break a limit."""
         # the least change that balances f is the pseudo-inverse of what is left
-        exact = f[None] - (f[None] @ self.G.T + self.w) @ self.inverse.T
-        along = exact[0, 0::3]
-        wrong = float(np.abs(exact @ self.G.T + self.w).max())
+        exact = f - self.inverse @ (self.G @ f + self.w)
+        along = exact[0::3]
+        wrong = float(np.abs(self.G @ exact + self.w).max())
         wrong = max(wrong, self.least - along.min(), along.max() - self.largest)
-        return exact[0] if wrong <= residual else None
+        return exact if wrong <= residual else None
 
     def in_space(self, f: Array) -> Array:
         """Turn local forces into forces in the object's frame, (k, 3) [N]."""
-        local = np.einsum("kij,nkj->nki", self.frames, f.reshape(1, -1, 3))
-        return self.scale * np.asarray(local[0], dtype=np.float64)
+        return self.scale * np.einsum("kij,kj->ki", self.frames, f.reshape(-1, 3))
 
 
 def balances(
@@ -241,19 +240,19 @@ def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> 
     minimised is, but for a constant, half the square of (sqrt(REGULAR) z, t + 1), so that the
     answer is the nearest point of a polyhedron.
     """
-    null, F0 = balance.null, -balance.w[None] @ balance.inverse.T
-    rows, along, pushes = balance.pyramids(friction * weights), null[0::3], F0[:, 0::3]
+    null, f0 = balance.null, -balance.inverse @ balance.w
+    rows, along, pushes = balance.pyramids(friction * weights), null[0::3], f0[0::3]
     # the pyramids widened by t, R f <= weight t, then (2) with the forces put in
     allowance = np.repeat(weights, len(rows) // len(weights))
-    C, D = [rows @ null, -along], [-F0 @ rows.T - allowance, pushes - balance.least]
+    C, d = [rows @ null, -along], [-rows @ f0 - allowance, pushes - balance.least]
     if math.isfinite(balance.largest):
         C.append(along)
-        D.append(balance.largest - pushes)
+        d.append(balance.largest - pushes)
     sides, root = np.vstack(C), math.sqrt(REGULAR)
     excess = np.zeros((len(sides), 1))
     excess[: len(rows), 0] = -allowance
-    z = least_distance(np.hstack([sides / root, excess]), np.hstack(D))[0, :-1] / root
-    return None if np.isnan(z).any() else balance.checked((F0 + z[None] @ null.T)[0])
+    z = least_distance(np.hstack([sides / root, excess]), np.concatenate(d))[:-1] / root
+    return None if np.isnan(z).any() else balance.checked(f0 + null @ z)
 
 
 def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
@@ -293,7 +292,7 @@ def least_imbalance(balance: Balance, friction: Array) -> Array:
         C.append(along)
         d.append(np.full(len(along), balance.largest))
     turned = np.vstack(C) @ back
-    z = least_distance(turned, (np.concatenate(d) + turned @ shift)[None])[0]
+    z = least_distance(turned, np.concatenate(d) + turned @ shift)
     if np.isnan(z).any():
         raise SolverError("no forces were found in the friction cones, though pure pushes are some")
     f = back @ (z - shift)

@@ -139,5 +139,5 @@ def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAM
     equalities = slice(len(program.b), None)
     rows = np.vstack([G, -program.c[None], -G[equalities]])
     limits = np.concatenate([h, [-kept], -h[equalities]])
-    (x,) = least_distance(rows, limits[None], accuracy=FOUND)
+    x = least_distance(rows, limits, accuracy=FOUND)
     return x if float((rows @ x - limits).max()) <= FEASIBLE else optimum.x  # nor if there is none
