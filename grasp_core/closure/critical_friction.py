@@ -140,12 +140,12 @@ def critical_friction_interval(
     if found[0]:
         ends.close(forces[0], float(upper[0]), exactly=True)
         ends.open(twists[0])
+    quick = ends.interval(points)
     if ends.settled:
-        return ends.interval(points)
-    slow, quick_half = search_interval(points, units), ends.interval(points)
-    if quick_half.forces is None:
-        return slow
-    return replace(slow, upper=ends.upper, forces=quick_half.forces)  # as `critical_friction` says
+        return quick
+    slow = search_interval(points, units)
+    # the upper end is the one that `critical_friction` gives
+    return slow if quick.forces is None else replace(slow, upper=quick.upper, forces=quick.forces)
 
 
 def _upper_ends(points: Array, units: Array) -> Array:

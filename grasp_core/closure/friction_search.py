@@ -155,14 +155,6 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
     return None if found is None else basis[:WRENCH] @ found
 
 
-def pushing_forces(arms: Array, normals: Array) -> Array | None:
-    """Find balanced forces that push at every contact, as some friction allows; None if none do."""
-    basis = null_space(grasp_map(arms))
-    pushes = np.einsum("kin,ki->kn", basis.reshape(*arms.shape, -1), normals)
-    found = _most_even(pushes)
-    return None if found is None else (basis @ found).reshape(arms.shape)
-
-
 def _most_pushes(rows: Array) -> Array | None:
     """Find weights (n,) >= 0 with rows @ weights = 0, as many of them positive as possible."""
     basis = null_space(rows)
@@ -183,18 +175,13 @@ def _most_pushes(rows: Array) -> Array | None:
 
 
 def _departing(outside: Array, pushes: Array) -> Array | None:
-    """Find the combination of the columns of `outside` that departs most evenly."""
-    found = _most_even(-pushes.T @ outside)
-    return None if found is None else outside @ found
-
-
-def _most_even(rows: Array) -> Array | None:
-    """Find x, from -1 to 1, for which the least of rows @ x is largest, and positive."""
+    """Find the combination of the columns of `outside` that departs most evenly, shares up to 1."""
+    rows = pushes.T @ outside
     m, n = rows.shape
     box = np.eye(n, n + 1)
-    sides = np.vstack([np.hstack([-rows, np.ones((m, 1))]), box, -box])
+    sides = np.vstack([np.hstack([rows, np.ones((m, 1))]), box, -box])
     found = _best(np.eye(n + 1)[n], sides, np.repeat([0.0, 1.0], [m, 2 * n]))
-    return None if found is None else found[:n]
+    return None if found is None else outside @ found[:n]
 
 
 def _best(c: Array, A: Array, b: Array) -> Array | None:
@@ -210,11 +197,14 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
 
 def search_interval(points: Array, units: Array) -> FrictionInterval:
     """Find the interval of the critical friction, as narrow as accuracy or proofs allow."""
-    for strict in (False, True):
-        found = _searched(Ends.of(points, units, strict=strict)).interval(points)
-        if found.verify():
-            return found
-    return FrictionInterval(0.0, math.inf, points, units, None, None)
+    ends = Ends.of(points, units)
+    hopeless = hopeless_twist(ends.cones.arms, units)
+    if hopeless is not None:
+        ends.opened(hopeless, math.inf)
+    if ends.lower < math.inf:
+        _try_little(ends)
+        _close_in(ends, max(FIRST_TRIAL, 2.0 * ends.lower))
+    return ends.interval(points)
 
 
 def soft_ends(cones: ContactCones, highest: float) -> "Ends":
@@ -223,22 +213,6 @@ def soft_ends(cones: ContactCones, highest: float) -> "Ends":
     _try(ends, min(2.0 * highest, LARGEST_FRICTION))
     if math.isfinite(ends.upper):
         _close_in(ends, max(min(FIRST_TRIAL, 0.5 * highest), FRICTIONLESS))
-    return ends
-
-
-def _searched(ends: "Ends") -> "Ends":
-    arms, units = ends.cones.arms, ends.cones.inward
-    hopeless = hopeless_twist(arms, units)
-    if hopeless is not None:
-        ends.opened(hopeless, math.inf)
-    if ends.lower == math.inf:
-        return ends
-    _try_little(ends)
-    _close_in(ends, max(FIRST_TRIAL, 2.0 * ends.lower))
-    if ends.forces is None and ends.lower < LARGEST_FRICTION:
-        pushing = pushing_forces(arms, units)
-        if pushing is not None:
-            ends.close(pushing, LARGEST_FRICTION)
     return ends
 
 
@@ -322,9 +296,6 @@ class Ends:
     points: Array | None = None
     """Positions of hard contacts, (k, 3) [m], for proofs in rational arithmetic; None of soft ones,
     whose proofs are in floating point."""
-    strict: bool = True
-    """Whether each step is proved in rational arithmetic; otherwise floats are used, whose proofs
-    rounding may invalidate."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None
@@ -341,10 +312,9 @@ class Ends:
     """Distance from `center` at which the next proofs are tried."""
 
     @classmethod
-    def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
+    def of(cls, points: Array, units: Array) -> "Ends":
         """Begin with nothing proved of hard contacts."""
-        arms, _, _ = unit_size(points)
-        return cls(ContactCones.at(arms, units, np.ones(len(arms))), points, strict)
+        return cls(ContactCones.at(unit_size(points)[0], units, np.ones(len(points))), points)
 
     @property
     def settled(self) -> bool:
@@ -395,10 +365,9 @@ class Ends:
                 return
 
     def _closes(self, forces: Array, friction: float) -> bool:
-        easy = self.points is None or not self.strict
-        if easy and proves_closure(self.cones.at_friction(friction), forces):
-            return True
-        return self.points is not None and closes(forces, self.points, self.cones.inward, friction)
+        if self.points is None:
+            return bool(proves_closure(self.cones.at_friction(friction), forces))
+        return closes(forces, self.points, self.cones.inward, friction)
 
     def open(self, twist: Array) -> None:
         """Raise the lower end to the friction up to which a twist separates."""
@@ -418,9 +387,8 @@ class Ends:
         if self.points is None:
             proved = bool(margin_ceiling(self.cones.at_friction(friction), twist) <= 0.0)
         else:
-            proved = not self.strict and friction < math.inf
             at_first = at_the_first(twist, self.points)
-            proved = proved or separates(at_first, self.points, self.cones.inward, friction)
+            proved = separates(at_first, self.points, self.cones.inward, friction)
         if proved:
             self.lower, self.twist = friction, twist
 
