@@ -430,10 +430,10 @@ def _ray(hand: CarryingHand, mass: float, way: Array) -> Ray:
     """Find how far a mass and the links are held along a direction, a unit vector (3,)."""
     weight = np.append(GRAVITY_M_PER_S2 * mass * way, np.zeros(3))
     found = hand.body.largest(weight, hand.weights @ way)
-    facet = hand.body.about_center(found.twist / hand.body.scale)
+    most = hand.most(found.facet, found.multipliers, rounding=2.0)
     return Ray(
-        mass, way, max(found.multiple, 0.0), hand.body.in_object_frame(found.local), facet,
-        found.multipliers, hand.most(facet, found.multipliers, rounding=2.0), hand.push_n,
+        mass, way, max(found.multiple, 0.0), found.forces, found.facet, found.multipliers, most,
+        hand.push_n,
     )  # fmt: skip
 
 
