@@ -13,7 +13,7 @@ import grasp_core as gc
 import grasp_core.quality.wrench_limits as checked
 from grasp_core.closure.contacts import to_center, to_origin
 from grasp_core.execution import carried_mass, squeeze_certificate
-from grasp_core.execution.payload import Payload
+from grasp_core.execution.carried_mass import Payload
 from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.quality.wrench_limits import body_of
 from tests.attacks.searching import Attack, cycled, power, tiny
