@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
-from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, FaceTable
+from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, Attempts, FaceTable, Fingers
 from grasp_core.geometry.vectors_kernel import across, balancing_weights, dotted
 from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
 from grasp_core.solvers.nearest_point_kernel import nearest
@@ -57,12 +57,13 @@ def room_for_program(common: int, rows: int, radii: int, n: int, excess: float) 
 
 
 @loop("numpy")
-def edges_of(faces: FaceTable, quadruple: Indices) -> int:
-    """Count the edges of four faces."""
-    count = 0
-    for finger in range(FINGERS):
-        count += int(faces.edges[quadruple[finger]])
-    return count
+def fingers_of(faces: FaceTable, attempts: Attempts, a: int) -> Fingers:
+    """Take the faces and cones of one attempt from their tables."""
+    four = attempts.faces[a]
+    return Fingers(
+        faces.normals[four], faces.origins[four], faces.frames[four], faces.E[four], faces.b[four],
+        faces.edges[four], faces.depths[four], attempts.axes[a], attempts.half_angles[a],
+    )  # fmt: skip
 
 
 @loop("numpy")

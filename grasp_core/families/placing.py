@@ -142,10 +142,10 @@ class Construction:
         for a in np.flatnonzero(placed.ends == LEFT).tolist():
             worth, placed.ends[a] = float(least[a]), NONE
             try:
+                fingers = kernel.fingers_of(table, attempts, a)
                 for pattern in self.patterns:
-                    program = kernel.program_of(pencil, table, attempts, a, pattern)
-                    if discs := largest_discs(program, worth):
-                        kernel.take(pencil, table, attempts, a, pattern, *discs, placed)
+                    if discs := largest_discs(kernel.program_of(pencil, fingers, pattern), worth):
+                        kernel.take(pencil, fingers, a, pattern, *discs, placed)
                         worth = surpassing(float(placed.merits[a]))
             except SolverError:
                 placed.ends[a] = LEFT
@@ -266,8 +266,9 @@ def place_best(
 ) -> float:
     """Enter the best placement of one attempt over given choices, and return its merit."""
     kernel, best, placed.ends[a] = compiled(REGULUS), -math.inf, NONE
+    fingers = kernel.fingers_of(table, attempts, a)
     for choice in choices:
-        usable, rows = kernel.regulus_program(table, attempts, a, choice)
+        usable, rows = kernel.regulus_program(fingers, choice)
         if not usable:
             continue
         A, equal = rows.At.T, len(rows.b) - rows.equalities
@@ -277,7 +278,7 @@ def place_best(
         # ties go to the first choice: rounding must not decide between equal ones
         if isinstance(found, Optimum) and found.value > best + kernel.SAME_OFFSET:
             x, best = nearest_optimum(program, found, GIVEN_UP), found.value
-            kernel.take(table, attempts, a, choice, x, best, placed)
+            kernel.take(fingers, a, choice, x, best, placed)
     return best
 
 
