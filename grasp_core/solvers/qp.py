@@ -1,8 +1,8 @@
-"""Solves strictly convex quadratic programs exactly on the active constraints.
+"""Finds points of least norm exactly on the active constraints.
 
-General ones are solved by qpsolvers,
+General ones are found by qpsolvers,
 
-    minimise x'Px/2 + q'x  subject to  G x <= h,  A x = b,  lower <= x <= upper.                 (1)
+    minimise |x|  subject to  C x <= d,  A x = b.                                                (1)
 
 ProxQP, the usual solver, calls some feasible programs of contact forces infeasible, so it is asked
 for the closest feasible point, and no solver's status is read: whoever asks checks the answer. A
@@ -10,7 +10,7 @@ solver stops anywhere within its tolerance, at a point that depends on where its
 memory. The conditions of optimality on the active constraints E x = e are linear equations with one
 answer,
 
-    [P E'; E 0] (x, u) = (-q, e),                                                                (2)
+    [1 E'; E 0] (x, u) = (0, e),                                                                 (2)
 
 and that answer is returned where it is feasible and as good.
 
@@ -21,7 +21,6 @@ Points nearest to the origin of a polyhedron are found by compiled code (`neares
 
 import importlib
 import warnings
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -34,9 +33,11 @@ from grasp_core.kinds import one_of
 
 PROXQP = "proxqp"
 """Name of the usual solver."""
-OPTIONS = {PROXQP: {"eps_abs": 1e-8, "max_iter": 300}}
-"""Options of solvers: absolute tolerance, and most iterations, as feasible programs of forces
-take about twenty while infeasible ones would go on for minutes."""
+OPTIONS: dict[str, dict[str, Any]] = {
+    PROXQP: {"eps_abs": 1e-8, "max_iter": 300, "primal_infeasibility_solving": True}
+}
+"""Options of solvers: absolute tolerance, most iterations, as feasible programs of forces take
+about twenty while infeasible ones would go on for minutes, and the closest feasible point."""
 ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
 """Slacks below which a constraint may count as active; the one with the least error is taken."""
 EXACT = 1e-6
@@ -48,63 +49,34 @@ NEAREST = 1e-11
 errors, and a hundredth of any difference that matters."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class QuadraticProgram:
-    """The data of the quadratic program (1)."""
-
-    P: Array  # matrix of the quadratic term, symmetric and positive definite, (n, n)
-    q: Array  # linear term of the objective, (n,)
-    G: Array  # matrix of the inequalities, (m, n)
-    h: Array  # right-hand sides of the inequalities, (m,)
-    A: Array  # matrix of the equalities, (p, n); p may be 0
-    b: Array  # right-hand sides of the equalities, (p,)
-    lower: Array  # lower bounds of x, (n,); minus infinity where there is no bound
-    upper: Array  # upper bounds of x, (n,); infinity where there is no bound
-
-
 def check_solver(name: str) -> None:
     """Refuse a solver that qpsolvers does not know or that is not installed."""
     if name != PROXQP:  # which is not loaded for this
         one_of(name, _qpsolvers().available_solvers, "solver")
 
 
-def minimize(program: QuadraticProgram, solver: str = PROXQP) -> Array | None:
-    """Solve a quadratic program, (n,); None where the solver returns no numbers."""
-    qpsolvers = _qpsolvers()
-    equations = (program.A, program.b) if len(program.b) else (None, None)
-    asked = qpsolvers.Problem(
-        program.P, program.q, program.G, program.h, *equations, lb=program.lower, ub=program.upper
-    )
+def least_norm(C: Array, d: Array, A: Array, b: Array, solver: str = PROXQP) -> Array | None:
+    """Solve (1), (n,); None where the solver returns no numbers."""
+    qpsolvers, n = _qpsolvers(), A.shape[1]
     options = dict(OPTIONS.get(solver, {}))
-    if solver == PROXQP:
-        options["primal_infeasibility_solving"] = bool(len(program.b))
     with warnings.catch_warnings():  # that a solver wants sparse matrices
         warnings.simplefilter("ignore", qpsolvers.warnings.SparseConversionWarning)
+        asked = qpsolvers.Problem(np.eye(n), np.zeros(n), C, d, A, b)
         answer = qpsolvers.solve_problem(asked, solver=solver, **options)
     if answer.x is None or not np.isfinite(answer.x).all():
         return None
-    return _polished(program, np.asarray(answer.x, dtype=np.float64))
-
-
-def _polished(program: QuadraticProgram, x: Array) -> Array:
-    """Solve (2) for the constraints active at x; return x itself if that is no better."""
-    P, q, A, b = program.P, program.q, program.A, program.b
-    below, above = np.isfinite(program.lower), np.isfinite(program.upper)
-    unit = np.eye(len(q))
-    C = np.vstack([program.G, unit[above], -unit[below]])
-    d = np.concatenate([program.h, program.upper[above], -program.lower[below]])
-    best, least = x, EXACT
+    best, least = np.asarray(answer.x, dtype=np.float64), EXACT
+    square = float(best @ best)
     for slack in ACTIVE:
-        active = d - C @ x < slack
+        active = d - C @ answer.x < slack
         E, e = np.vstack([A, C[active]]), np.concatenate([b, d[active]])
-        conditions = np.block([[P, E.T], [E, np.zeros((len(e), len(e)))]])
-        targets = np.concatenate([-q, e])
+        conditions = np.block([[np.eye(n), E.T], [E, np.zeros((len(e), len(e)))]])
+        targets = np.concatenate([np.zeros(n), e])
         solved = np.linalg.lstsq(conditions, targets, rcond=None)[0]
-        exact = np.asarray(solved, dtype=np.float64)[: len(q)]
+        exact = np.asarray(solved, dtype=np.float64)[:n]
         unmet = float(np.abs(conditions @ solved - targets).max())
         outside = float((C @ exact - d).max())
-        worse = float(0.5 * (exact @ P @ exact - x @ P @ x) + q @ (exact - x))
-        error = max(unmet, outside, worse)
+        error = max(unmet, outside, 0.5 * (float(exact @ exact) - square))
         if error < least:
             best, least = exact, error
     return best
