@@ -164,11 +164,7 @@ def _decided_quickly(cones: ContactCones) -> Answer | None:
 def decided_at_once(
     cones: ContactCones,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array, Array]:
-    """Decide what compiled code can prove of many sets of hard contacts with positive frictions.
-
-    Gives which sets are proved closed, and which separated; the margins, and the forces (g, k, 3)
-    and twists (g, 6) that prove it.
-    """
+    """Decide hard contacts with friction: closed, separated, margins, proving forces and twists."""
     friction = cones.friction[:, 0]
     forces, twists, margins = deepest_forces(cones.arms, cones.inward, friction, PRECISE)
     forces, twists = without_giants(forces, 2), without_giants(twists, 1)

@@ -89,10 +89,7 @@ def closing_forces(
 
 
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
-    """Return whether, for a nearby twist, no force in the friction cones has positive power.
-
-    The twist, (6,) [m/s, rad/s], is about the first contact.
-    """
+    """Return whether a twist about the first contact, nearly as given, separates at a friction."""
     arms, size = _arms(positions)
     unit = twist * np.repeat([1.0, size], 3)
     length = float(np.linalg.norm(unit))
@@ -185,10 +182,7 @@ def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) ->
 
 
 def _solution(rows: list[Exact], right: Exact) -> Exact | None:
-    """Solve rows @ x = right for six numbers, zero where the rows leave them free, or None.
-
-    Bareiss's elimination works on whole numbers, and divides them without remainder.
-    """
+    """Solve rows @ x = right for six numbers, free ones zero, by Bareiss's elimination; or None."""
     table = [_whole([*row, value]) for row, value in zip(rows, right, strict=True)]
     pivots, before = list[int](), 1
     for i in range(len(table)):

@@ -271,10 +271,7 @@ class HandPayload(Declared):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CarryingHand(Declared):
-    """Contacts on an object, with the motors of the hand behind them and the links they carry.
-
-    Everything is along the object's axes and about its centre of mass.
-    """
+    """Contacts, motors and links of a hand, in the object's axes, about its centre of mass."""
 
     arms: Bounded  # contact points from the centre of mass, (k, 3) [m]
     normals: UnitVectors  # into the object, (k, 3)
@@ -407,11 +404,7 @@ def carried_mass(hand: CarryingHand, gap: float = GAP) -> HandPayload:
 
 
 def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
-    """Bound the mass by rays; forces are as accurate as programs are.
-
-    Gives a certificate whose forces may not be balanced well enough, and the ray with its upper
-    bound.
-    """
+    """Bound the mass by rays, with forces as programs know them; and the ray of the upper bound."""
     # no forces are larger than all fingers' together
     mass = hand.push_n * float((1.0 + hand.friction).sum()) / GRAVITY_M_PER_S2
     rays = [_ray(hand, mass, way) for way in FIRST]

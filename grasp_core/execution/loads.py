@@ -160,11 +160,7 @@ class Reactions:
         return np.where(L > 0.0, found, np.where(room >= 0.0, np.inf, -np.inf))
 
     def worst_angles(self) -> tuple[Array, Array]:
-        """Find the least scale (4) of each contact and an angle of it, (k,) each, angles first.
-
-        Of equal minima one is taken by a rule with a margin (see `ties`). Where a contact slips
-        under the offset alone, its negative scale need not be the least one.
-        """
+        """Find an angle of the least scale (4) of each contact, (k,), by `ties`, and that scale."""
         k, step = len(self.friction), 2.0 * np.pi / ANGLES
         grid = np.tile(np.linspace(0.0, 2.0 * np.pi, ANGLES, endpoint=False), (k, 1))
         values = self.scales(grid)

@@ -125,10 +125,7 @@ def take_concurrent(fingers: Fingers, a: int, sides: Array, x: Array, placed: Pl
 def footprints(
     faces: FaceTable, attempts: Attempts, foci: Array, positions: Array, cut: Footprints
 ) -> None:
-    """Cut the faces of each attempt to where a line in the force cone meets the focus.
-
-    Takes `foci` (a, 3), and `positions` (a, 4, 3), which tell the sides.
-    """
+    """Cut faces to where a line in the force cone meets the focus, on the side of the contact."""
     polygons, counts, radii = cut
     most = polygons.shape[2]
     flat, heights, way = np.empty((2, most, 2)), np.empty(most), np.empty(3)

@@ -78,10 +78,7 @@ def corners_of(body: Polyhedron) -> Corners:
 def disc_limits(
     corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
 ) -> Array:
-    """Bound the smallest disc of quadruples (q, 4) with axes (q, 4, 3) from above, (q, 4).
-
-    Columns: a concurrent grasp, a pencil in each of the `PAIRINGS`; in units of the corners.
-    """
+    """Bound discs of quadruples from above, (q, 4): a concurrent grasp, then each of `PAIRINGS`."""
     limits = np.empty((len(faces), 1 + len(PAIRINGS)))
     given = map(np.ascontiguousarray, (normals, faces, axes, half_angles))
     compiled(KERNEL).fill_limits(corners, *given, limits)

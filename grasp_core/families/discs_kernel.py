@@ -81,10 +81,7 @@ def facets(axis: Array, half_angle: float, T: Array) -> Array:
 
 @loop("numpy")
 def balance(ways: Array, normals: Array, forces: Array) -> None:
-    """Scale four positively spanning directions to forces whose sum is zero, (4, 3).
-
-    Their parts along the normals sum to one.
-    """
+    """Scale spanning directions, (4, 3), to balanced forces with normal parts that sum to one."""
     weights, pushes = np.empty(FINGERS), 0.0
     balancing_weights(ways, weights)
     for finger in range(FINGERS):

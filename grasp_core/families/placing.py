@@ -199,10 +199,7 @@ def attempts_of(asked: Sequence[tuple[FaceQuadruple, Sequence[ForceCone]]]) -> A
 
 
 def largest_discs(program: Any, least: float) -> tuple[Array, float] | None:
-    """Find the largest four equal discs, then enlarge each, like `discs_kernel` but by HiGHS too.
-
-    Gives the variables (n,) and the largest smallest radius; None if it is proved to be less.
-    """
+    """Find discs like `discs_kernel`, by HiGHS too: variables and radius; None if it is less."""
     rows = compiled(DISCS).of_equal_radii(program)
     objective = np.eye(len(rows.At))[-1]
     first = maximize_above(LinearProgram(objective, np.array(rows.At.T), rows.b), least)
@@ -246,10 +243,7 @@ def regulus_bounds(
 
 
 def place_reguli(table: FaceTable, attempts: Attempts, placed: Placed) -> None:
-    """Place four contacts for each attempt on the lines of one regulus, near the faces' middles.
-
-    The merit is minus the largest offset t; no placement means none for the slopes tried.
-    """
+    """Place contacts on the lines of one regulus each; the merit is minus the largest offset."""
     merits, chosen = regulus_bounds(table, attempts)
     for a, (merit, choice) in enumerate(zip(merits.tolist(), chosen.tolist(), strict=True)):
         try:

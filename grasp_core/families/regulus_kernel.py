@@ -218,10 +218,7 @@ class _Line(NamedTuple):
 def regulus_bounds(
     faces: FaceTable, attempts: Attempts, any_choice: bool, bounds: Array, chosen: Indices
 ) -> None:
-    """Bound the merit, minus the largest offset t, over slopes; stop when none can be better.
-
-    If any choice will do, stop at the first.
-    """
+    """Bound minus the largest offset over slopes, until none is better, or any is feasible."""
     slopes, vertex = len(SLOPES), vertex_of(VARIABLES)
     enough = -np.inf if any_choice else -SAME_OFFSET
     for a in range(len(bounds)):

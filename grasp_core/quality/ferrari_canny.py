@@ -270,10 +270,7 @@ def is_unit(direction: Array) -> bool:
 
 
 def are_allowed(forces: Array, wrenches: WrenchSet) -> bool:
-    """Return whether wrenches of forces, one a row, are in a set, to `CHECK_SLACK` of its longest.
-
-    What all contacts together miss counts, so that more contacts do not allow more.
-    """
+    """Return whether forces, one a row, are allowed, to `CHECK_SLACK` shared by all contacts."""
     longest = 1.0 + float(wrenches.friction.max())
     return wrenches.holds(forces, CHECK_SLACK * longest / len(wrenches.friction))
 

@@ -127,10 +127,7 @@ def _unmet(C: Array, d: Array, x: Array, u: Array) -> tuple[float, float]:
 
 @loop()
 def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
-    """Step until the entering row is active; return the number of active rows, -1 on failure.
-
-    A remainder up to the length `least` counts as zero.
-    """
+    """Step until the entering row is active; return the number of active rows, -1 on failure."""
     entering, z = active.rows[count], active.z
     for _ in range(count + 1):
         square = _split(C[entering], active, count)
