@@ -30,7 +30,7 @@ def test_pushes_that_balance_without_friction_need_no_search(monkeypatch):
     grasp = gc.plan(
         example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1
     ).grasps[0]
-    monkeypatch.setattr(critical, "search_interval", None)
+    monkeypatch.setattr(critical, "searched", None)
     assert gc.critical_friction(grasp) == 0.0
     with pytest.raises(TypeError):
         gc.critical_friction(*BOX_SIDES)
@@ -59,7 +59,7 @@ def test_many_at_once_and_one_by_one_give_intervals_that_overlap(count):
     every = gc.critical_frictions(positions, normals)
     width = 1.0 + 1.1 * critical.FRICTION_ACCURACY
     for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
-        slow = friction_search.search_interval(points, units)
+        slow = friction_search.searched(points, units)
         if quick_ones[i]:
             assert every[i] == upper[i]
             assert slow.lower <= upper[i] <= width * slow.upper
