@@ -158,10 +158,8 @@ class _Limits:
         grip, back = held.grip, held.rotation  # rows times R are turned back to the object's axes
         change = grip.response @ load
         turned = np.einsum("kij,kj->ki", grip.frames, change) @ back
-        torques, rates = (
-            self.motors.torques(grip.squeeze @ back),
-            self.motors.levers @ turned.ravel(),
-        )
+        torques = self.motors.torques(grip.squeeze @ back)
+        rates = self.motors.levers @ turned.ravel()
         pushes = self.push_n - grip.local_squeeze[:, 0]
         room = np.append(pushes, self.motors.limits - np.sign(rates) * torques)
         return room, np.append(change[:, 0], np.abs(rates))

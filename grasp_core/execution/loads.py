@@ -167,9 +167,8 @@ class Reactions:
         lowest = values <= np.minimum(np.roll(values, 1, axis=1), np.roll(values, -1, axis=1))
         order = np.argsort(np.where(lowest, values, np.inf), axis=1, kind="stable")[:, :MINIMA]
         starts = np.take_along_axis(grid, order, axis=1)
-        across = np.arctan2(
-            self.start[:, 2:], self.start[:, 1:2]
-        )  # the worst where nothing changes
+        # the worst where nothing changes
+        across = np.arctan2(self.start[:, 2:], self.start[:, 1:2])
         angles = np.hstack([across, self._polished(starts, step), starts])
         found = self.scales(angles)
         chosen = [first_best(-row) for row in found]
@@ -196,10 +195,7 @@ class Reactions:
         for _ in range(GOLDEN_STEPS):
             inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
             left, right = np.linalg.eigvalsh(M - inner[..., None, None] * ball)[..., 0]
-            low, high = (
-                np.where(left < right, inner[0], low),
-                np.where(left < right, high, inner[1]),
-            )
+            low, high = np.where(left < right, (inner[0], high), (low, inner[1]))
         return 0.5 * (low + high)
 
     def _certificates(self, scale: float) -> tuple[Array, Array]:

@@ -405,11 +405,8 @@ class Settling:
         Where faces have several pieces, their hulls are tried first: a grasp that the hulls do not
         hold no piece holds, and the contacts on the hulls show which pieces are likely to be best.
         """
-        construction, shapes, least = (
-            self.construction,
-            chosen_shapes(self.shapes, faces),
-            end.least,
-        )
+        construction, least = self.construction, end.least
+        shapes = chosen_shapes(self.shapes, faces)
         if whole is None or not whole.merit > least:
             return None
         if all(len(shape.pieces) == 1 for shape in shapes):
@@ -426,9 +423,11 @@ class Settling:
 
     def _settle(self, done: Sequence[tuple[tuple[FaceShape, ...], End, Planned]]) -> None:
         """Enter the contacts on the true surface, with their regions."""
-        every = regions_of(self.construction.region, [planned for _, _, planned in done])
+        construction = self.construction
+        every = regions_of(construction.region, [planned for _, _, planned in done])
+        least = 0.0 if construction.limits else -math.inf  # discs however small
         for (shapes, end, (chosen, cones, placement)), regions in zip(done, every, strict=True):
-            place = partial(_placed_on, self.construction, cones)
+            place = partial(construction.place, cones=cones, least=least)
             try:
                 found = on_true_surface(shapes, chosen, cones, placement, regions, place)
             except SolverError:
@@ -444,13 +443,6 @@ class Settling:
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
     """Return the shapes of the faces that have room for a contact, in finger order."""
     return tuple(shape for face in faces if (shape := shapes[face]) is not None)
-
-
-def _placed_on(
-    construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
-) -> Placement | None:
-    """Place contacts on convex pieces, with discs however small; None if it is impossible."""
-    return construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
 
 
 def on_true_surface(
