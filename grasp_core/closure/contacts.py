@@ -154,10 +154,7 @@ def are_torsions(torsions: Array, friction: Array) -> bool:
 
 
 def unit_size(points: Array) -> tuple[Array, Array, Array]:
-    """Return arms from the mean contact over the longest, that centre, and that length.
-
-    The length is one where all contacts are in one place.
-    """
+    """Return arms from the mean contact over the longest, that centre, and that length, or one."""
     centers: Array = points.mean(axis=-2)
     arms = points - centers[..., None, :]
     lengths: Array = np.linalg.norm(arms, axis=-1).max(axis=-1)

@@ -44,7 +44,7 @@ from grasp_core.closure.friction_search import (
     FRICTION_ACCURACY,
     SHAVED,
     Ends,
-    search_interval,
+    searched,
     soft_ends,
 )
 from grasp_core.closure.proofs import CHECK_SLACK, ContactCones, proves_closure
@@ -140,12 +140,12 @@ def critical_friction_interval(
     if found[0]:
         ends.close(forces[0], float(upper[0]), exactly=True)
         ends.open(twists[0])
+    quick = ends.interval(points)
     if ends.settled:
-        return ends.interval(points)
-    slow, quick_half = search_interval(points, units), ends.interval(points)
-    if quick_half.forces is None:
-        return slow
-    return replace(slow, upper=ends.upper, forces=quick_half.forces)  # as `critical_friction` says
+        return quick
+    slow = searched(points, units).interval(points)
+    # the upper end is the one that `critical_friction` gives
+    return slow if quick.forces is None else replace(slow, upper=quick.upper, forces=quick.forces)
 
 
 def _upper_ends(points: Array, units: Array) -> Array:
@@ -153,7 +153,7 @@ def _upper_ends(points: Array, units: Array) -> Array:
     arms = unit_size(points)[0]
     for i in np.flatnonzero(~found):
         easy = _close_without_friction(arms[i], units[i])
-        upper[i] = 0.0 if easy else search_interval(points[i], units[i]).upper
+        upper[i] = 0.0 if easy else searched(points[i], units[i]).upper
     upper[upper <= REPORTED_AS_ZERO] = 0.0
     return upper
 

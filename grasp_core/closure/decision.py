@@ -25,7 +25,6 @@ from grasp_core.closure.proofs import (
 )
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program, nearest_wrench
 from grasp_core.compiled import compiled
-from grasp_core.declared import trusted
 from grasp_core.errors import SolverError
 from grasp_core.solvers.conic import minimize
 
@@ -131,8 +130,7 @@ def _decided_by_programs(cones: ContactCones) -> Answer:
     except SolverError:
         # nearly parallel normals: no solution, or none to within rounding; the twist towards the
         # nearest wrench may refute closure
-        G = in_frames(cones.maps, cones.frames)
-        _, twist = nearest_wrench(trusted(WrenchSet, G=G, friction=cones.friction, norm="l1"))
+        _, twist = nearest_wrench(WrenchSet.within(cones, "l1"))
         closed = False if refutes_closure(cones, twist) else None
         return Answer(-math.inf, np.zeros_like(cones.normals), twist, closed)
     if proves_closure(cones, forces):
@@ -166,11 +164,7 @@ def _decided_quickly(cones: ContactCones) -> Answer | None:
 def decided_at_once(
     cones: ContactCones,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array, Array, Array]:
-    """Decide what compiled code can prove of many sets of hard contacts with positive frictions.
-
-    Gives which sets are proved closed, and which separated; the margins, and the forces (g, k, 3)
-    and twists (g, 6) that prove it.
-    """
+    """Decide hard contacts with friction: closed, separated, margins, proving forces and twists."""
     friction = cones.friction[:, 0]
     forces, twists, margins = deepest_forces(cones.arms, cones.inward, friction, PRECISE)
     forces, twists = without_giants(forces, 2), without_giants(twists, 1)

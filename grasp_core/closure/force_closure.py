@@ -238,10 +238,7 @@ def force_closure(
 
 
 def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
-    """Compute the margins, (g,), that `force_closure` gives for many closed sets of contacts.
-
-    They are NaN where compiled code does not prove closure, which tells nothing.
-    """
+    """Compute margins of many closed sets of contacts, (g,); NaN where closure is not proved."""
     closed, margins, _, _ = _decided(positions, normals, friction)
     return np.where(closed, margins, math.nan)
 
@@ -249,10 +246,7 @@ def closing_margins(positions: Array, normals: Array, friction: float) -> Array:
 def certificates(
     positions: Array, normals: Array, friction: float
 ) -> list[ClosureCertificate | None]:
-    """Find the certificates that `force_closure` gives for many sets of contacts.
-
-    Each is as `ClosureCertificate.verify` accepts it; None leaves the set undecided.
-    """
+    """Find the certificates that `force_closure` gives for many sets of contacts, or None."""
     closed, margins, forces, wrenches = _decided(positions, normals, friction)
     points, units = np.array(positions), np.array(normals)
     mu = np.full(points.shape[1], friction)
@@ -271,11 +265,7 @@ def certificates(
 def _decided(
     positions: Array, normals: Array, friction: float
 ) -> tuple[NDArray[np.bool_], Array, Array, Array]:
-    """Decide what compiled code can prove, with the checks of `force_closure` and `verify`.
-
-    Gives which sets are closed; the proved margins, NaN where nothing is proved; forces that prove
-    closure, (g, k, 3), and wrenches that prove its opposite, (g, 6), where one of them is proved.
-    """
+    """Decide like `force_closure`: closed, proved margins or NaN, forces, wrenches, (g, ...)."""
     count = len(positions)
     if not (friction > 0.0 and count):
         never, nothing = np.zeros(count, dtype=bool), np.full(count, math.nan)

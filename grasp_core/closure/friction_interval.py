@@ -26,7 +26,7 @@ but for the rounding of their coordinates.
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 import numpy as np
 
@@ -35,7 +35,6 @@ from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_ta
 from grasp_core.declared import Declared
 from grasp_core.kinds import LARGEST_FRICTION, Range
 
-Number = TypeVar("Number", int, Fraction)
 Exact = list[Fraction]
 """A vector of rational numbers, without rounding."""
 
@@ -44,8 +43,7 @@ INDEPENDENT = (1e-6, 1e-9)
 tried in turn; the last one defines the rank that force closure asks for."""
 NEARLY_AT_REST = 1e-9
 """Speed below which a contact is meant to be at rest, for twists of unit size."""
-AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-UNITS: list[Exact] = [[Fraction(x) for x in axis] for axis in AXES]
+UNITS: list[Exact] = [[Fraction(int(i == axis)) for i in range(3)] for axis in range(3)]
 SAME = Fraction(1, 10**12)
 """Speed at which a contact that cannot be put to rest exactly still counts as at rest, for twists
 of unit size: moving it by this share of the contacts' size would put it to rest."""
@@ -82,22 +80,16 @@ def closing_forces(
     balanced = _balanced(near, positions, columns)
     if balanced is None:
         return None
-    whole, unit = balanced
-    directions, _ = _whole(normals)
-    above, below = friction.as_integer_ratio()
-    for force, normal in zip(whole, directions, strict=True):
-        along_squared, across_squared = _squares(force, normal)
-        inside = across_squared * below**2 < above**2 * along_squared
-        if not (inside and _dot(force, normal) > 0):
+    steepest = Fraction(friction) ** 2
+    for force, normal in zip(balanced, _vectors(normals), strict=True):
+        along, across = _squares(force, normal)
+        if not (across < steepest * along and _dot(force, normal) > 0):
             return None
-    return np.array([[x / unit for x in force] for force in whole])
+    return np.array(balanced, dtype=np.float64)
 
 
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
-    """Return whether, for a nearby twist, no force in the friction cones has positive power.
-
-    The twist, (6,) [m/s, rad/s], is about the first contact.
-    """
+    """Return whether a twist about the first contact, nearly as given, separates at a friction."""
     arms, size = _arms(positions)
     unit = twist * np.repeat([1.0, size], 3)
     length = float(np.linalg.norm(unit))
@@ -161,58 +153,21 @@ def _independent(rows: Array, least: float) -> list[int]:
     return found
 
 
-def _whole(rows: Array) -> tuple[list[list[int]], int]:
-    """Return floats as whole numbers over one power of two, which is given last."""
-    ratios = [[x.as_integer_ratio() for x in row] for row in rows.tolist()]
-    unit = max(below for row in ratios for _, below in row)
-    return [[above * (unit // below) for above, below in row] for row in ratios], unit
-
-
 def _balanced(
     forces: Array, positions: Array, columns: list[tuple[int, int]]
-) -> tuple[list[list[int]], int] | None:
-    """Change components of forces, listed as (contact, axis), until they balance exactly.
-
-    The forces are whole numbers over one positive number, which is given last.
-    """
-    (whole, unit), (points, _) = _whole(forces), _whole(positions)
+) -> list[Exact] | None:
+    """Change components of forces, listed as (contact, axis), until they balance exactly."""
+    balanced, points = _vectors(forces), _vectors(positions)
     arms = [[x - o for x, o in zip(point, points[0], strict=True)] for point in points]
-    total = [0] * WRENCH
-    for force, arm in zip(whole, arms, strict=True):
-        wrench = [*force, *_cross(arm, force)]
-        total = [sofar + part for sofar, part in zip(total, wrench, strict=True)]
-    wrenches = [[*AXES[axis], *_cross(arms[contact], AXES[axis])] for contact, axis in columns]
-    table = [[*row, missing] for *row, missing in zip(*wrenches, total, strict=True)]
-    determinant = _eliminated(table)
-    if not determinant:
+    wrenches = [[*force, *_cross(arm, force)] for force, arm in zip(balanced, arms, strict=True)]
+    total = [sum(parts, Fraction(0)) for parts in zip(*wrenches, strict=True)]
+    changing = [[*UNITS[axis], *_cross(arms[contact], UNITS[axis])] for contact, axis in columns]
+    changes = _solution([list(row) for row in zip(*changing, strict=True)], total)
+    if changes is None:
         return None
-    side = 1 if determinant > 0 else -1
-    balanced = [[side * determinant * x for x in force] for force in whole]
-    for (contact, axis), row in zip(columns, table, strict=True):
-        balanced[contact][axis] -= side * row[WRENCH]
-    return balanced, side * determinant * unit
-
-
-def _eliminated(table: list[list[int]]) -> int:
-    """Solve six equations (coefficients, right side) in place by Bareiss's elimination.
-
-    It divides without remainder, and gives the last column's denominator; 0 if singular.
-    """
-    before = 1
-    for k in range(WRENCH):
-        pivot = next((i for i in range(k, WRENCH) if table[i][k]), None)
-        if pivot is None:
-            return 0
-        table[k], table[pivot] = table[pivot], table[k]
-        lead = table[k]
-        for i, row in enumerate(table):
-            if i != k:
-                share = row[k]
-                table[i] = [
-                    (lead[k] * a - share * b) // before for a, b in zip(row, lead, strict=True)
-                ]
-        before = lead[k]
-    return before
+    for (contact, axis), change in zip(columns, changes, strict=True):
+        balanced[contact][axis] -= change
+    return balanced
 
 
 def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
@@ -227,23 +182,30 @@ def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) ->
 
 
 def _solution(rows: list[Exact], right: Exact) -> Exact | None:
-    """Solve rows @ x = right for six numbers, zero where the rows leave them free, or None."""
-    table = [[*row, value] for row, value in zip(rows, right, strict=True)]
-    pivots = list[int]()
-    for i, row in enumerate(table):
-        pivot = max(range(WRENCH), key=lambda column, row=row: abs(row[column]))
-        if not row[pivot]:
+    """Solve rows @ x = right for six numbers, free ones zero, by Bareiss's elimination; or None."""
+    table = [_whole([*row, value]) for row, value in zip(rows, right, strict=True)]
+    pivots, before = list[int](), 1
+    for i in range(len(table)):
+        lead = table[i]
+        pivot = max(range(WRENCH), key=lambda column, row=lead: abs(row[column]))
+        if not lead[pivot]:
             return None
         pivots.append(pivot)
-        table[i] = lead = [value / row[pivot] for value in row]
-        for j, other in enumerate(table):
-            if j != i and other[pivot]:
-                share = other[pivot]
-                table[j] = [a - share * b for a, b in zip(other, lead, strict=True)]
+        for j, row in enumerate(table):
+            if j != i:
+                pairs = zip(row, lead, strict=True)
+                table[j] = [(lead[pivot] * a - row[pivot] * b) // before for a, b in pairs]
+        before = lead[pivot]
     x = [Fraction(0)] * WRENCH
     for pivot, row in zip(pivots, table, strict=True):
-        x[pivot] = row[WRENCH]
+        x[pivot] = Fraction(row[WRENCH], before)
     return x
+
+
+def _whole(row: Exact) -> list[int]:
+    """Return the least whole numbers in the same ratios, up to a common factor."""
+    unit = math.lcm(*(x.denominator for x in row))
+    return [x.numerator * (unit // x.denominator) for x in row]
 
 
 def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fraction) -> bool:
@@ -255,17 +217,17 @@ def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fract
     return steep and _dot(velocity, normal) <= 0
 
 
-def _squares(vector: list[Number], normal: list[Number]) -> tuple[Number, Number]:
+def _squares(vector: Exact, normal: Exact) -> tuple[Fraction, Fraction]:
     """Return squares of a vector's parts along and across a normal, times the normal's square."""
     along = _dot(vector, normal) ** 2
     return along, _dot(vector, vector) * _dot(normal, normal) - along
 
 
-def _dot(a: list[Number], b: list[Number]) -> Number:
+def _dot(a: Exact, b: Exact) -> Fraction:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(a: list[Number], b: list[Number]) -> list[Number]:
+def _cross(a: Exact, b: Exact) -> Exact:
     return [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

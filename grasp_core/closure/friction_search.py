@@ -5,7 +5,8 @@ Solved: a narrow interval with proofs of both of its ends (see `friction_interva
 The two ends of the scale come first: contacts that no friction closes, and contacts that any
 friction closes; both are questions of linear programs. Otherwise Newton's method, as
 `critical_friction` describes it, says at which friction to solve the margin program next. What its
-answers prove is decided in rational arithmetic, whatever the program says about itself.
+answers prove is decided in rational arithmetic, whatever the program says about itself: in the end
+or, where floats have misled the search, at every step.
 
 Every friction. Let S be no contacts at first. Seek pushes l_i >= 0 along the normals of the others
 that balance with any forces at all at the contacts in S,
@@ -17,8 +18,7 @@ holds all contacts and the wrenches span six dimensions, every friction mu > 0 i
 each round, times mu or less those of the round before, are inside all cones, since what a later
 round does to a contact is small beside the push that the contact has already. Two rounds make a
 margin that grows with the square of mu, three one with its cube. Otherwise, by Stiemke's lemma, a
-twist leaves S at rest while all others depart along their normals; it separates up to the least
-ratio of departing to sliding, which is a positive friction.
+twist leaves S at rest while all others depart along their normals, up to some positive friction.
 
 No friction. Cones grow into the half-spaces n_i.f > 0 with the friction, so none is enough iff no
 balanced forces push at all contacts, or the wrenches do not span; that is, iff some twist makes
@@ -37,7 +37,7 @@ so the search begins below theirs. It is proved in floating point at the frictio
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,8 +81,6 @@ is that factor farther away."""
 NUDGE = 0.4
 """Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
 and by the error of Newton's method, which is its step's square over the friction."""
-HALVING = 6
-"""Number of trials after which the interval is halved once, whatever Newton's method suggests."""
 MOST_TRIALS = 80
 """Largest number of trials in one search: nine are usual, and some fifty where contacts are nearly
 degenerate."""
@@ -109,12 +107,8 @@ def combined(rounds: list[Array], friction: float, normals: Array) -> Array:
     return total
 
 
-def rounds(arms: Array, normals: Array) -> tuple[list[Array], Array | None]:
-    """Find out whether every positive friction is enough for force closure.
-
-    If so, the balanced forces of each round are given; otherwise none, and where one was found a
-    twist, (6,), under which contacts depart along their normals or are at rest.
-    """
+def rounds(arms: Array, normals: Array) -> list[Array]:
+    """Return the balanced forces of each round if every positive friction closes; else none."""
     maps = grasp_map(arms).reshape(WRENCH, -1, 3)
     pushes = np.einsum("wki,ki->wk", maps, normals)
     settled, found = np.zeros(len(arms), dtype=bool), list[Array]()
@@ -126,7 +120,7 @@ def rounds(arms: Array, normals: Array) -> tuple[list[Array], Array | None]:
         outside = null_space(held.T)
         weights = _most_pushes(outside.T @ pushes[:, free])
         if weights is None:
-            return [], _departing(outside, pushes[:, free])
+            return []
         forces = np.zeros_like(arms)
         forces[free] = weights[:, None] * normals[free]
         needed = -pushes[:, free] @ weights
@@ -134,8 +128,7 @@ def rounds(arms: Array, normals: Array) -> tuple[list[Array], Array | None]:
         forces[settled] = supporting.reshape(-1, 3)
         found.append(forces)
         settled[free[weights > 0.0]] = True
-    left = null_space(grasp_map(arms).T)
-    return ([], left[:, 0]) if left.shape[1] else (found, None)
+    return [] if null_space(grasp_map(arms).T).shape[1] else found
 
 
 def hopeless_twist(arms: Array, normals: Array) -> Array | None:
@@ -153,14 +146,6 @@ def hopeless_twist(arms: Array, normals: Array) -> Array | None:
     rows = np.vstack([-speeds, total, np.eye(n), -np.eye(n)])
     found = _best(total, rows, np.repeat([0.0, 1.0, LARGEST_VARIABLE], [k, 1, 2 * n]))
     return None if found is None else basis[:WRENCH] @ found
-
-
-def pushing_forces(arms: Array, normals: Array) -> Array | None:
-    """Find balanced forces that push at every contact, as some friction allows; None if none do."""
-    basis = null_space(grasp_map(arms))
-    pushes = np.einsum("kin,ki->kn", basis.reshape(*arms.shape, -1), normals)
-    found = _most_even(pushes)
-    return None if found is None else (basis @ found).reshape(arms.shape)
 
 
 def _most_pushes(rows: Array) -> Array | None:
@@ -182,21 +167,6 @@ def _most_pushes(rows: Array) -> Array | None:
     return np.where(found[n:] > 0.5, basis @ found[:n], 0.0)  # noqa: PLR2004 - between 0 and 1
 
 
-def _departing(outside: Array, pushes: Array) -> Array | None:
-    """Find the combination of the columns of `outside` that departs most evenly."""
-    found = _most_even(-pushes.T @ outside)
-    return None if found is None else outside @ found
-
-
-def _most_even(rows: Array) -> Array | None:
-    """Find x, from -1 to 1, for which the least of rows @ x is largest, and positive."""
-    m, n = rows.shape
-    box = np.eye(n, n + 1)
-    sides = np.vstack([np.hstack([-rows, np.ones((m, 1))]), box, -box])
-    found = _best(np.eye(n + 1)[n], sides, np.repeat([0.0, 1.0], [m, 2 * n]))
-    return None if found is None else found[:n]
-
-
 def _best(c: Array, A: Array, b: Array) -> Array | None:
     """Return where c.x is largest subject to A x <= b; None if it is not clearly positive there."""
     if not A.shape[1]:
@@ -208,13 +178,19 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
     return found.x if isinstance(found, Optimum) and found.value > POSITIVE else None
 
 
-def search_interval(points: Array, units: Array) -> FrictionInterval:
-    """Find the interval of the critical friction, as narrow as accuracy or proofs allow."""
-    for strict in (False, True):
-        found = _searched(Ends.of(points, units, strict=strict)).interval(points)
-        if found.verify():
-            return found
-    return FrictionInterval(0.0, math.inf, points, units, None, None)
+def searched(points: Array, units: Array) -> "Ends":
+    """Find ends of the critical friction as near each other as accuracy or proofs allow."""
+    strict = Ends.of(points, units)
+    for ends in (replace(strict, strict=False), strict):
+        hopeless = hopeless_twist(ends.cones.arms, units)
+        if hopeless is not None:
+            ends.opened(hopeless, math.inf)
+        if ends.lower < math.inf:
+            _try_little(ends)
+            _close_in(ends, max(FIRST_TRIAL, 2.0 * ends.lower))
+        if ends.proved:
+            return ends
+    return strict
 
 
 def soft_ends(cones: ContactCones, highest: float) -> "Ends":
@@ -223,22 +199,6 @@ def soft_ends(cones: ContactCones, highest: float) -> "Ends":
     _try(ends, min(2.0 * highest, LARGEST_FRICTION))
     if math.isfinite(ends.upper):
         _close_in(ends, max(min(FIRST_TRIAL, 0.5 * highest), FRICTIONLESS))
-    return ends
-
-
-def _searched(ends: "Ends") -> "Ends":
-    arms, units = ends.cones.arms, ends.cones.inward
-    hopeless = hopeless_twist(arms, units)
-    if hopeless is not None:
-        ends.opened(hopeless, math.inf)
-    if ends.lower == math.inf:
-        return ends
-    _try_little(ends)
-    _close_in(ends, max(FIRST_TRIAL, 2.0 * ends.lower))
-    if ends.forces is None and ends.lower < LARGEST_FRICTION:
-        pushing = pushing_forces(arms, units)
-        if pushing is not None:
-            ends.close(pushing, LARGEST_FRICTION)
     return ends
 
 
@@ -271,9 +231,7 @@ def _try(ends: "Ends", friction: float) -> Answer:
 def _try_little(ends: "Ends") -> None:
     """Look for a proof of closure at very small friction, or else for a first lower end."""
     units = ends.cones.inward
-    (every, twist), friction = rounds(ends.cones.arms, units), FRICTIONLESS
-    if twist is not None:
-        ends.open(twist)
+    every, friction = rounds(ends.cones.arms, units), FRICTIONLESS
     # friction is doubled: ten times from `FRICTIONLESS` to `LITTLE`
     while every and friction <= LITTLE and ends.forces is None:
         ends.close(combined(every, friction, units), friction, exactly=True)
@@ -323,17 +281,13 @@ class Ends:
     """Positions of hard contacts, (k, 3) [m], for proofs in rational arithmetic; None of soft ones,
     whose proofs are in floating point."""
     strict: bool = True
-    """Whether each step is proved in rational arithmetic; otherwise floats are used, whose proofs
-    rounding may invalidate."""
+    """Whether each step is proved in rational arithmetic, or only the last ones."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None
     """Forces (k, w) that prove the upper end, at that friction."""
     twist: Array | None = None
     """Twist at unit size that proves the lower end."""
-    share: float = 0.5
-    """Share of the upper end to try next while no lower end is known."""
-    trials: int = 0
     center: float = math.nan
     """Friction at which neither side could be proved, probably the threshold; NaN if there is none.
     """
@@ -341,10 +295,9 @@ class Ends:
     """Distance from `center` at which the next proofs are tried."""
 
     @classmethod
-    def of(cls, points: Array, units: Array, *, strict: bool = True) -> "Ends":
+    def of(cls, points: Array, units: Array) -> "Ends":
         """Begin with nothing proved of hard contacts."""
-        arms, _, _ = unit_size(points)
-        return cls(ContactCones.at(arms, units, np.ones(len(arms))), points, strict)
+        return cls(ContactCones.at(unit_size(points)[0], units, np.ones(len(points))), points)
 
     @property
     def settled(self) -> bool:
@@ -353,6 +306,17 @@ class Ends:
         around = self.upper <= self.center + self.spread and self.lower >= self.center - self.spread
         beyond = max(self.lower, self.spread) >= LARGEST_FRICTION
         return self.upper <= FRICTIONLESS or narrow or around or beyond
+
+    @property
+    def proved(self) -> bool:
+        """Return whether both ends of hard contacts are proved in rational arithmetic."""
+        if self.strict:
+            return True
+        last = replace(self, lower=0.0, strict=True)
+        if self.twist is not None:
+            last.opened(self.twist, self.lower)
+        closed = self.forces is None or last._closes(self.forces, self.upper)
+        return closed and last.lower == self.lower
 
     def interval(self, points: Array) -> FrictionInterval:
         """Return the proved interval of hard contacts, with forces that balance as floats can."""
@@ -418,8 +382,8 @@ class Ends:
         if self.points is None:
             proved = bool(margin_ceiling(self.cones.at_friction(friction), twist) <= 0.0)
         else:
-            proved = not self.strict and friction < math.inf
             at_first = at_the_first(twist, self.points)
+            proved = not self.strict and friction < math.inf
             proved = proved or separates(at_first, self.points, self.cones.inward, friction)
         if proved:
             self.lower, self.twist = friction, twist
@@ -429,20 +393,18 @@ class Ends:
         if not math.isnan(self.center):
             above = self.center + self.spread
             return above if self.upper > above else self.center - self.spread
-        self.trials += 1
         root = friction - margin / slope if slope > 0.0 and math.isfinite(margin) else math.nan
-        if self.lower < root < self.upper and self.trials % HALVING:
+        if self.lower < root < self.upper:
             # past itself, towards the wider side of the interval
             past = NUDGE * FRICTION_ACCURACY * root + (root - friction) ** 2 / root
             if self.upper - root > root - self.lower:
                 return root + min(past, 0.5 * (self.upper - root))
             return root - min(past, 0.5 * (root - self.lower))
-        if self.lower > 0.0:
-            # in the middle, measured by the cones' half-angles
-            highest = min(self.upper, 4.0 * LARGEST_FRICTION)
-            return math.tan(0.5 * (math.atan(self.lower) + math.atan(highest)))
-        self.share *= self.share
-        return max(2.0 * self.share * self.upper, FRICTIONLESS)
+        highest = min(self.upper, 4.0 * LARGEST_FRICTION)
+        if self.lower == 0.0:  # fast towards the least friction
+            return max(math.sqrt(0.25 * FRICTIONLESS * highest), FRICTIONLESS)
+        # in the middle, measured by the cones' half-angles
+        return math.tan(0.5 * (math.atan(self.lower) + math.atan(highest)))
 
 
 def _put_to_rest(

@@ -81,10 +81,7 @@ def _depth_in_cone(v: Array, i: int) -> float:
 
 @loop("numpy")
 def scale_to_middle(pair: Array, W: Array, middle: Array) -> bool:
-    """Fill in symmetric maps W_i of K and their inverses: W_i z_i = inverse(W_i) s_i = middle_i.
-
-    Gives false if rounding has put the point outside the cones.
-    """
+    """Fill in W_i and their inverses, W_i z_i = inverse(W_i) s_i; False outside the cones."""
     s, z = pair[0], pair[1]
     for i in range(len(s)):
         deep_s, deep_z = _depth_in_cone(s, i), _depth_in_cone(z, i)
@@ -110,14 +107,6 @@ def scale_to_middle(pair: Array, W: Array, middle: Array) -> bool:
                 W[0, i, j, 0] * z[i, 0] + W[0, i, j, 1] * z[i, 1] + W[0, i, j, 2] * z[i, 2]
             )
     return True
-
-
-@loop("numpy")
-def towards_the_border(middle: Array, wanted: Array) -> None:
-    """Aim where all products are zero: the scaled parts of the step sum to minus the middle."""
-    for i in range(len(wanted)):
-        for j in range(3):
-            wanted[i, j] = -middle[i, j]
 
 
 @loop("numpy")
@@ -191,8 +180,10 @@ def least_cone_sum(
             break
         if not (scale_to_middle(pair, W, middle) and _factor(columns, W, V, R)):
             break
-        # Mehrotra's predictor aims at the border; how far it gets says how far to aim at the middle
-        towards_the_border(middle, wanted)
+        # Mehrotra's predictor aims at the border, where all products are zero; how far it gets says
+        # how far to aim at the middle
+        for i in range(k):
+            wanted[i] = -middle[i]
         _direct(V, R, missing, wanted, step, turn)
         reach = min(1.0, longest_step(middle, step))
         towards_the_middle(middle, step, (1.0 - reach) ** 3 * gap / k, wanted)

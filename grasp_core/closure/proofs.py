@@ -183,11 +183,7 @@ def refutes_closure(cones: ContactCones, twist: Array) -> NDArray[np.bool_]:
 
 
 def proved_margin(cones: ContactCones, forces: Array, caution: float = 1.0) -> Array:
-    """Compute the margins (2) that forces prove, (...); minus infinity where they prove none.
-
-    They bound the optimum of the margin program from below: the forces' depth, less the cost of
-    balancing them.
-    """
+    """Compute the margins (2) that forces prove, (...); minus infinity where they prove none."""
     along, across = normal_and_tangential(forces, cones.normals)
     generators = cones.generators
     if generators.shape[-1] < WRENCH or not np.isfinite(generators).all():

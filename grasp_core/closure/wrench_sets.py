@@ -22,7 +22,7 @@ Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular co
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self, TypeAlias, get_args
 
 import numpy as np
@@ -34,14 +34,11 @@ from grasp_core.closure.contacts import (
     WRENCH,
     check_spread,
     contact_arrays,
-    contact_frames,
     contact_frictions,
     contact_torsions,
-    grasp_map,
     in_frames,
-    torsion_lengths,
-    with_torques,
 )
+from grasp_core.closure.proofs import ContactCones
 from grasp_core.declared import Declared, trusted
 from grasp_core.errors import InputError
 from grasp_core.kinds import Quantity, one_of, shown, value_of
@@ -123,18 +120,20 @@ class WrenchSet(Declared):
         one_of(norm, get_args(Norm), "norm")
         arms = scaled_arms(points, center, torque_scale)
         mu = contact_frictions(friction, len(points))
-        hard, torsions = cls.at(arms, units, mu, norm), contact_torsions(torsion_m, mu)
-        if torsions is None:
-            return hard
-        return replace(
-            hard, G=with_torques(hard.G, units, torsion_lengths(torsions, mu) / torque_scale)
-        )
+        torsions = contact_torsions(torsion_m, mu)
+        torsion = None if torsions is None else torsions / torque_scale
+        return cls.within(ContactCones.at(arms, units, mu, torsion), norm)
 
     @classmethod
-    def at(cls, arms: Array, normals: Array, friction: Array, norm: Norm = "l1") -> Self:
-        """Make the set of contacts with levers and inward unit normals, unchecked."""
-        G = in_frames(grasp_map(arms), contact_frames(normals))
-        return trusted(cls, G=G, friction=friction, norm=norm)
+    def at(cls, arms: Array, normals: Array, friction: Array) -> Self:
+        """Make the `l1` set of contacts with levers and inward unit normals, unchecked."""
+        return cls.within(ContactCones.at(arms, normals, friction), "l1")
+
+    @classmethod
+    def within(cls, cones: ContactCones, norm: Norm) -> Self:
+        """Make the set of forces within cones, unchecked."""
+        G = in_frames(cones.maps, cones.frames)
+        return trusted(cls, G=G, friction=cones.friction, norm=norm)
 
     def on_grid(self) -> "WrenchSet":
         """Round the set to a grid, so that searches do not depend on last digits."""

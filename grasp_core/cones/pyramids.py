@@ -27,10 +27,7 @@ def inscribed_share(sides: int = PYRAMID_SIDES) -> float:
 
 
 def pyramid_facets(axes: Array, half_angle: float, toward: Array, sides: int) -> Array:
-    """Compute inward unit normals g of pyramids in equally wide cones, (..., sides, 3).
-
-    A pyramid holds all v with g.v >= 0. Takes `axes`, `toward` (..., 3).
-    """
+    """Compute inward unit normals g, (..., sides, 3), of pyramids g.v >= 0 in equal cones."""
     first = toward - np.sum(toward * axes, axis=-1, keepdims=True) * axes
     first = first / np.linalg.norm(first, axis=-1, keepdims=True)
     across = facet_turns(sides) @ np.stack([first, np.cross(axes, first)], axis=-2)

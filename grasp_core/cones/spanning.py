@@ -69,10 +69,7 @@ def count_spanning(normals: ArrayLike, least: float) -> int:
 
 
 def span_sines(units: Array) -> Array:
-    """Compute sin(theta*) of many quadruples (q, 4, 3), (q,); negative where they do not span.
-
-    The negative value tells how far the worst weight in a vanishing combination is from positive.
-    """
+    """Compute sin(theta*) of quadruples, (q,); below zero, by how much a weight is too small."""
     sines = np.empty(len(units))
     compiled(KERNEL).fill_span_sines(np.ascontiguousarray(units), sines)
     return sines

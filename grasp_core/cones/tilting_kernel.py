@@ -160,10 +160,7 @@ def _half_angle(axes: Array, normals: Array, thetas: Array, floor: float) -> flo
 
 @loop()
 def _into_cap(vector: Array, center: Array, cosine: float, sine: float, unit: Array) -> None:
-    """Fill in the unit vector nearest to a vector in a cap around a centre.
-
-    A vector with no component across the centre gives the centre.
-    """
+    """Fill in the unit vector nearest to a vector in a cap around a centre, or the centre."""
     along, square = dotted(vector, center), 0.0
     for d in range(3):
         square += (vector[d] - along * center[d]) ** 2

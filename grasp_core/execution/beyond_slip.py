@@ -29,8 +29,6 @@ Source of the return to the cone: Simo and Hughes, "Computational Inelasticity",
 Following a structure until it yields everywhere is the pushover analysis of earthquake engineers.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,7 +80,7 @@ def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> 
     beyond = slips < sticking
     if beyond.any():
         begun = np.maximum(slips, sticking / FARTHEST)[beyond]
-        found[beyond] = _followed(grip, loads[beyond], begun, sticking[beyond], reach)
+        found[beyond] = _Followed(grip, loads[beyond], reach).losses(begun, sticking[beyond])
     return found
 
 
@@ -92,109 +90,88 @@ def _moved(motion: Array, reach: Array) -> Array:
     return np.maximum(moved / reach[0], turned / reach[3])
 
 
-@dataclass(slots=True, eq=False)
 class _Followed:
-    """Loads on their way: the last balance of each, and where each was lost first."""
+    """Loads past their first slips: the last balance of each, and where each was lost first."""
 
-    multiples: Array  # multiple of the last balance, (m,)
-    forces: Array  # contact forces then, (m, k, 3) [N]
-    motion: Array  # motion then, (m, 6) [m, rad]
-    share: Array  # that motion as a part of what is allowed, (m,)
-    lost: Array
-    """Least multiple at which the object is known to be lost, (m,); infinite if none is."""
-    beyond: Array
-    """Motion there as a part of what is allowed, (m,); infinite where nothing balances."""
+    def __init__(self, grip: Grip, loads: Array, reach: Array) -> None:
+        count = len(loads)
+        self.grip, self.loads, self.reach = grip, loads, reach
+        self.multiples = np.zeros(count)
+        self.forces = np.tile(grip.local_squeeze, (count, 1, 1))
+        self.motion = np.zeros((count, WRENCH))
+        # the motion as a part of what is allowed, at the last balance and where the object is lost;
+        # that and the multiple there are infinite where nothing balances, or is lost
+        self.share, self.beyond = np.zeros(count), np.full(count, np.inf)
+        self.lost = np.full(count, np.inf)
 
+    def losses(self, begun: Array, last: Array) -> Array:
+        """Find the multiples at which the object is lost, at most the last, (m,)."""
+        first = BEFORE * begun
+        for part in np.linspace(0.0, 1.0, RATIOS + 1):
+            self._raise(first * (last / first) ** part)
+        for _ in range(HALVINGS):
+            self._raise(0.5 * (self.multiples + self.lost))
+        between, room = np.full(len(last), 0.5), self.beyond - self.share
+        np.divide(1.0 - self.share, room, out=between, where=np.isfinite(self.beyond))
+        lost = np.where(np.isinf(self.lost), last, self.lost)
+        return np.minimum(self.multiples + between * (lost - self.multiples), last)
 
-def _followed(grip: Grip, loads: Array, begun: Array, last: Array, reach: Array) -> Array:
-    """Follow loads past their first slips; return where each is lost, at most at the last, (m,)."""
-    count = len(loads)
-    rest = np.tile(grip.local_squeeze, (count, 1, 1))
-    way = _Followed(
-        np.zeros(count), rest, np.zeros((count, WRENCH)), np.zeros(count), np.full(count, np.inf),
-        np.full(count, np.inf),
-    )  # fmt: skip
-    first = BEFORE * begun
-    for part in np.linspace(0.0, 1.0, RATIOS + 1):
-        _try(grip, way, loads, first * (last / first) ** part, reach)
-    for _ in range(HALVINGS):
-        _try(grip, way, loads, 0.5 * (way.multiples + way.lost), reach)
-    between = np.full(count, 0.5)
-    np.divide(1.0 - way.share, way.beyond - way.share, out=between, where=np.isfinite(way.beyond))
-    lost = np.where(np.isinf(way.lost), last, way.lost)
-    return np.minimum(way.multiples + between * (lost - way.multiples), last)
+    def _raise(self, multiples: Array) -> None:
+        """Raise loads to multiples, (m,), below those at which the object is known to be lost."""
+        own = np.flatnonzero(multiples < self.lost)
+        if not len(own):
+            return
+        tried, begun = multiples[own], (self.forces[own], self.motion[own])
+        forces, motion, met = self._balanced(*begun, tried[:, None] * self.loads[own])
+        again = np.flatnonzero(~met)
+        if len(again):
+            # in parts, each from the balance before
+            ends = np.linspace(self.multiples[own[again]], tried[again], PARTS + 1)[1:, :, None]
+            at, moved, found = begun[0][again], begun[1][again], np.ones(len(again), dtype=bool)
+            for load in ends * self.loads[own[again]]:
+                at, moved, met_here = self._balanced(at, moved, load)
+                found &= met_here
+                if not found.any():
+                    break
+            forces[again], motion[again], met[again] = at, moved, found
+        share = np.where(met, _moved(motion, self.reach), np.inf)
+        kept = share < 1.0
+        held, gone = own[kept], own[~kept]
+        self.multiples[held], self.share[held] = tried[kept], share[kept]
+        self.forces[held], self.motion[held] = forces[kept], motion[kept]
+        self.lost[gone], self.beyond[gone] = tried[~kept], share[~kept]
 
+    def _balanced(
+        self, forces: Array, start: Array, loads: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Solve (2) for loads, (m, 6), from known forces, (m, k, 3), and motions, (m, 6).
 
-def _try(grip: Grip, way: _Followed, loads: Array, multiples: Array, reach: Array) -> None:
-    """Raise loads to multiples, (m,), where they are below those at which the object is lost."""
-    own = np.flatnonzero(multiples < way.lost)
-    if not len(own):
-        return
-    tried = multiples[own]
-    begun = way.forces[own], way.motion[own]
-    forces, motion, met = _balanced(grip, *begun, tried[:, None] * loads[own], reach)
-    again = np.flatnonzero(~met)
-    if len(again):
-        ends = np.linspace(way.multiples[own[again]], tried[again], PARTS + 1)[1:, :, None]
-        forces[again], motion[again], met[again] = _in_parts(
-            grip, begun[0][again], begun[1][again], ends * loads[own[again]], reach
-        )
-    share = np.where(met, _moved(motion, reach), np.inf)
-    kept = share < 1.0
-    held, gone = own[kept], own[~kept]
-    way.multiples[held], way.share[held] = tried[kept], share[kept]
-    way.forces[held], way.motion[held] = forces[kept], motion[kept]
-    way.lost[gone], way.beyond[gone] = tried[~kept], share[~kept]
-
-
-def _in_parts(
-    grip: Grip, forces: Array, motion: Array, loads: Array, reach: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Solve (2) for one load after the other, (PARTS, m, 6), each from the balance before."""
-    found = np.ones(len(forces), dtype=bool)
-    for load in loads:
-        forces, motion, met = _balanced(grip, forces, motion, load, reach)
-        found &= met
-        if not found.any():
-            break
-    return forces, motion, found
-
-
-def _balanced(
-    grip: Grip, forces: Array, start: Array, loads: Array, reach: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Solve (2) for loads, (m, 6), from known forces, (m, k, 3), and motions, (m, 6).
-
-    No step of Newton's method is longer than a reach, (6,): near the end of balance it would fly.
-
-    Gives the forces, the motions, and which were found, (m,).
-    """
-    scale = np.repeat([1.0, 1.0 / grip.size], 3)
-    rest = grip.local_squeeze
-    stiff, maps = grip.response @ grip.grasp_stiffness, grip.local_maps  # D_i and W_i F_i
-    softening = grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)  # C of (2)
-    rows, columns = stiff.reshape(-1, WRENCH), maps.transpose(1, 0, 2).reshape(WRENCH, -1)
-    most = MET * float(np.abs(rest).max())
-    motion = start.copy()
-    found = np.zeros(len(loads), dtype=bool)
-    after = forces
-    for _ in range(MOST_STEPS):
-        tried = forces + ((motion - start) @ rows.T).reshape(forces.shape)
-        after, slope = _returned(tried, grip.friction)
-        left: Array = (
-            (after - rest).reshape(len(loads), -1) @ columns.T - motion @ softening.T + loads
-        )
-        found = np.abs(left * scale).max(axis=1) <= most
-        if found.all():
-            break
-        tangent = (maps @ slope @ stiff).sum(axis=1) - softening
-        tangent *= scale[:, None] * scale
-        size = np.abs(tangent).max(axis=(1, 2), keepdims=True)
-        tangent -= SINGULAR * size * np.eye(WRENCH)
-        solved = np.asarray(np.linalg.solve(tangent, -(left * scale)[..., None]), dtype=float)
-        step = np.where(found[:, None], 0.0, solved[..., 0] * scale)
-        motion = motion + step / np.maximum(np.abs(step / reach).max(axis=1, keepdims=True), 1.0)
-    return after, motion, found
+        No step of Newton's method is longer than the reach: near the end of balance it would fly.
+        """
+        grip, count = self.grip, len(loads)
+        scale, rest = np.repeat([1.0, 1.0 / grip.size], 3), grip.local_squeeze
+        stiff, maps = grip.response @ grip.grasp_stiffness, grip.local_maps  # D_i and W_i F_i
+        softening = grip.grasp_stiffness + np.einsum("kij,kjl->il", maps, stiff)  # C of (2)
+        rows, columns = stiff.reshape(-1, WRENCH), maps.transpose(1, 0, 2).reshape(WRENCH, -1)
+        most = MET * float(np.abs(rest).max())
+        motion, after, found = start.copy(), forces, np.zeros(count, dtype=bool)
+        for _ in range(MOST_STEPS):
+            tried = forces + ((motion - start) @ rows.T).reshape(forces.shape)
+            after, slope = _returned(tried, grip.friction)
+            left: Array = (after - rest).reshape(count, -1) @ columns.T
+            left = left - motion @ softening.T + loads
+            found = np.abs(left * scale).max(axis=1) <= most
+            if found.all():
+                break
+            tangent = (maps @ slope @ stiff).sum(axis=1) - softening
+            tangent *= scale[:, None] * scale
+            size = np.abs(tangent).max(axis=(1, 2), keepdims=True)
+            tangent -= SINGULAR * size * np.eye(WRENCH)
+            solved = np.asarray(np.linalg.solve(tangent, -(left * scale)[..., None]), dtype=float)
+            step = np.where(found[:, None], 0.0, solved[..., 0] * scale)
+            longest = np.abs(step / self.reach).max(axis=1, keepdims=True)
+            motion = motion + step / np.maximum(longest, 1.0)
+        return after, motion, found
 
 
 def _returned(tried: Array, friction: Array) -> tuple[Array, Array]:

@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen
-from grasp_core.closure.contacts import WRENCH, cross_matrix, grasp_map
+from grasp_core.closure.contacts import cross_matrix, grasp_map
 from grasp_core.declared import ByValue, trusted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.grips import Grip, check_grip
@@ -73,59 +73,43 @@ AT_REST = 1e-9
 class Held:
     """A grip in equilibrium under a load."""
 
+    start: Grip  # the grip at rest
     grip: Grip  # the grip in this pose: arms, normals and forces as they are now
     moved: Array  # displacement of the centre of mass, (3,) [m]
     rotation: Array  # orientation of the object against the one at rest, (3, 3)
-    tips: Array  # displacements of the tips' centres, (k, 3) [m]
-    load: Array
-    """External wrench on the object, (6,) [N, N m], about the centre of mass."""
 
-    @property
-    def forces(self) -> Array:
-        """Contact forces on the object, world axes, (k, 3) [N]."""
-        return self.grip.squeeze
+    def under(self, load: Array) -> "Held":
+        """Find the equilibrium under a load, starting from this one, under a load nearby."""
+        held, scale = self, np.repeat([1.0, self.start.size], 3)
+        unit = np.linalg.norm(self.start.squeeze, axis=1).sum()
+        unit += float(np.linalg.norm(load / scale))
+        for _ in range(MOST_NEWTON):
+            left = grasp_map(held.grip.arms) @ held.grip.squeeze.ravel() + load
+            if float(np.abs(left / scale).max()) <= SETTLED * unit:
+                return held
+            held = held.stepped(held.grip.compliance @ left)
+            if not np.isfinite(held.grip.arms).all():
+                break
+        raise SolverError("no equilibrium of the loaded grip was found")
 
-
-def at_rest(grip: Grip) -> Held:
-    """Return a grip as it is before any load."""
-    return Held(grip, np.zeros(3), np.eye(3), np.zeros_like(grip.arms), np.zeros(WRENCH))
-
-
-def under(held: Held, start: Grip, load: Array) -> Held:
-    """Find the equilibrium under a load, starting from one under a load nearby."""
-    size = start.size
-    scale = np.repeat([1.0, size], 3)
-    unit = np.linalg.norm(start.squeeze, axis=1).sum() + float(np.linalg.norm(load / scale))
-    for _ in range(MOST_NEWTON):
-        left = grasp_map(held.grip.arms) @ held.forces.ravel() + load
-        if float(np.abs(left / scale).max()) <= SETTLED * unit:
-            return Held(held.grip, held.moved, held.rotation, held.tips, load)
-        held = stepped(held, start, held.grip.compliance @ left)
-        if not np.isfinite(held.grip.arms).all():
-            break
-    raise SolverError("no equilibrium of the loaded grip was found")
-
-
-def stepped(held: Held, start: Grip, step: Array) -> Held:
-    """Move the object by a translation and a turn, and let the tips follow."""
-    shift, turn = step[:3], step[3:]
-    R = rotation(turn)
-    grip = held.grip
-    radii = grip.tip_radius_m[:, None]
-    # a tip's centre is at r - rho n from the centre of mass, and rolls by rho (t x n) on the face
-    half = rotation(0.5 * turn)
-    centers = (grip.arms - radii * grip.normals) @ R.T
-    centers += radii * cross(turn, grip.normals @ half.T)
-    normals = grip.normals @ R.T
-    arms = centers + radii * normals
-    moved = held.moved + shift
-    tips = moved + centers - (start.arms - radii * start.normals)
-    forces = start.squeeze - np.einsum("kij,kj->ki", start.stiffness, tips)
-    turned = trusted(
-        Grip, arms=arms, normals=normals, friction=grip.friction, squeeze=forces,
-        stiffness=grip.stiffness, tip_radius_m=grip.tip_radius_m,
-    )  # fmt: skip
-    return Held(turned, moved, R @ held.rotation, tips, held.load)
+    def stepped(self, step: Array) -> "Held":
+        """Move the object by a translation and a turn, and let the tips follow."""
+        shift, turn = step[:3], step[3:]
+        start, grip, R = self.start, self.grip, rotation(turn)
+        radii = grip.tip_radius_m[:, None]
+        # a tip's centre is at r - rho n from the centre of mass, and rolls by rho (t x n) on the
+        # face
+        half = rotation(0.5 * turn)
+        centers = (grip.arms - radii * grip.normals) @ R.T
+        centers += radii * cross(turn, grip.normals @ half.T)
+        normals, moved = grip.normals @ R.T, self.moved + shift
+        tips = moved + centers - (start.arms - radii * start.normals)
+        forces = start.squeeze - np.einsum("kij,kj->ki", start.stiffness, tips)
+        turned = trusted(
+            Grip, arms=centers + radii * normals, normals=normals, friction=grip.friction,
+            squeeze=forces, stiffness=grip.stiffness, tip_radius_m=grip.tip_radius_m,
+        )  # fmt: skip
+        return Held(start, turned, moved, R @ self.rotation)
 
 
 def rotation(turn: Array) -> Array:
@@ -174,10 +158,8 @@ class _Limits:
         grip, back = held.grip, held.rotation  # rows times R are turned back to the object's axes
         change = grip.response @ load
         turned = np.einsum("kij,kj->ki", grip.frames, change) @ back
-        torques, rates = (
-            self.motors.torques(grip.squeeze @ back),
-            self.motors.levers @ turned.ravel(),
-        )
+        torques = self.motors.torques(grip.squeeze @ back)
+        rates = self.motors.levers @ turned.ravel()
         pushes = self.push_n - grip.local_squeeze[:, 0]
         room = np.append(pushes, self.motors.limits - np.sign(rates) * torques)
         return room, np.append(change[:, 0], np.abs(rates))
@@ -223,18 +205,18 @@ def first_slip(
     limits = _Limits(max_push_n, motors_for(motors, len(grip.friction)))
     _check_rest(grip, max_push_n)
     _check_torques(grip, limits.motors)
+    rest = Held(grip, grip, np.zeros(3), np.eye(3))
     if not grip.stable:
-        return _ended(at_rest(grip), 0.0, "unstable", -1)
+        return _ended(rest, 0.0, "unstable", -1)
     if model == "finite":
-        return _finite(grip, load, limits)
-    rest = at_rest(grip)
+        return _finite(rest, load, limits)
     multiple, event, place = _next_event(rest, load, limits)
     if event == "none":
         return _ended(rest, multiple, event, place)
     motion = multiple * grip.compliance @ load
     local = grip.local_squeeze + multiple * (grip.response @ load)
     forces = np.einsum("kij,kj->ki", grip.frames, local)
-    moved = Held(grip.squeezed(forces), motion[:3], rotation(motion[3:]), rest.tips, rest.load)
+    moved = Held(grip, grip.squeezed(forces), motion[:3], rotation(motion[3:]))
     return _ended(moved, multiple, event, place)
 
 
@@ -297,9 +279,10 @@ def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, i
     return float(slips.min()), "slip", int(np.argmin(slips))
 
 
-def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
-    held, reached, part = at_rest(start), 0.0, 1.0
-    farthest = FARTHEST * float(start.local_squeeze[:, 0].max()) / float(np.abs(load).max())
+def _finite(held: Held, load: Array, most: _Limits) -> FirstSlip:
+    """Follow the equilibrium from rest until something happens."""
+    reached, part = 0.0, 1.0
+    farthest = FARTHEST * float(held.grip.local_squeeze[:, 0].max()) / float(np.abs(load).max())
     for _ in range(MOST_STEPS):
         if not held.grip.stable or part < SMALLEST_STEP:
             return _ended(held, reached, "unstable", -1)
@@ -313,7 +296,7 @@ def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
         if reached + step > farthest:
             return _ended(held, math.inf, "none", -1)
         try:
-            moved, multiple = _followed(held, start, load, reached + step, most)
+            moved, multiple = _followed(held, load, reached + step, most)
         except SolverError:  # where the equilibrium ends no step is short enough
             part *= 0.5
             continue
@@ -321,17 +304,15 @@ def _finite(start: Grip, load: Array, most: _Limits) -> FirstSlip:
     raise SolverError("the load of first slip was not met; the grip may be nearly unstable")
 
 
-def _followed(
-    held: Held, start: Grip, load: Array, multiple: float, most: _Limits
-) -> tuple[Held, float]:
+def _followed(held: Held, load: Array, multiple: float, most: _Limits) -> tuple[Held, float]:
     """Follow the equilibrium to a multiple of the load, or back to where a contact slips."""
-    held = under(held, start, multiple * load)
+    held = held.under(multiple * load)
     for _ in range(CORRECTIONS):  # the response grew on the way
         over = _overshoot(held, load, most)
         if over <= MET * multiple:
             break
         multiple -= over
-        held = under(held, start, multiple * load)
+        held = held.under(multiple * load)
     return held, multiple
 
 
@@ -356,6 +337,6 @@ def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:
     axis = held.rotation - held.rotation.T
     sine = 0.5 * math.hypot(axis[2, 1], axis[0, 2], axis[1, 0])
     return FirstSlip(
-        multiple, event, contact, held.forces, held.grip.arms, held.grip.normals,
+        multiple, event, contact, held.grip.squeeze, held.grip.arms, held.grip.normals,
         float(np.linalg.norm(held.moved)), math.atan2(sine, cosine), joint,
     )  # fmt: skip

@@ -160,20 +160,15 @@ class Reactions:
         return np.where(L > 0.0, found, np.where(room >= 0.0, np.inf, -np.inf))
 
     def worst_angles(self) -> tuple[Array, Array]:
-        """Find the least scale (4) of each contact and an angle of it, (k,) each, angles first.
-
-        Of equal minima one is taken by a rule with a margin (see `ties`). Where a contact slips
-        under the offset alone, its negative scale need not be the least one.
-        """
+        """Find an angle of the least scale (4) of each contact, (k,), by `ties`, and that scale."""
         k, step = len(self.friction), 2.0 * np.pi / ANGLES
         grid = np.tile(np.linspace(0.0, 2.0 * np.pi, ANGLES, endpoint=False), (k, 1))
         values = self.scales(grid)
         lowest = values <= np.minimum(np.roll(values, 1, axis=1), np.roll(values, -1, axis=1))
         order = np.argsort(np.where(lowest, values, np.inf), axis=1, kind="stable")[:, :MINIMA]
         starts = np.take_along_axis(grid, order, axis=1)
-        across = np.arctan2(
-            self.start[:, 2:], self.start[:, 1:2]
-        )  # the worst where nothing changes
+        # the worst where nothing changes
+        across = np.arctan2(self.start[:, 2:], self.start[:, 1:2])
         angles = np.hstack([across, self._polished(starts, step), starts])
         found = self.scales(angles)
         chosen = [first_best(-row) for row in found]
@@ -200,10 +195,7 @@ class Reactions:
         for _ in range(GOLDEN_STEPS):
             inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
             left, right = np.linalg.eigvalsh(M - inner[..., None, None] * ball)[..., 0]
-            low, high = (
-                np.where(left < right, inner[0], low),
-                np.where(left < right, high, inner[1]),
-            )
+            low, high = np.where(left < right, (inner[0], high), (low, inner[1]))
         return 0.5 * (low + high)
 
     def _certificates(self, scale: float) -> tuple[Array, Array]:

@@ -314,22 +314,21 @@ class BestSqueeze(Declared):
 
     def _fits(self, survival: Survival) -> bool:
         cases, r = len(survival.friction), len(self.cuts.cases)
+        # a contact or a joint, and not both
+        if self.joint == -1:
+            named = 0 <= self.contact < survival.contacts
+        else:
+            named = self.contact == -1 and 0 <= self.joint < len(survival.motors.limits)
         return (
             r > 0
             and bool((self.cuts.cases < cases).all())
             and len(self.multipliers) == r + 2 * cases + survival.torque_rows
             and bool((self.multipliers >= 0.0).all())
             and len(self.proofs) == cases
-            and self._names_one(survival.contacts, len(survival.motors.limits))
+            and named
             and len(self.direction) == self.loads.axes.shape[1]
             and abs(float(np.linalg.norm(self.direction)) - 1.0) <= ROUNDING
         )
-
-    def _names_one(self, contacts: int, joints: int) -> bool:
-        """Return whether the fields name a contact or a joint, and not both."""
-        if self.joint == -1:
-            return 0 <= self.contact < contacts
-        return self.contact == -1 and 0 <= self.joint < joints
 
     def _survives(self, survival: Survival, rows: Rows) -> bool:
         local = self.grip.local_squeeze

@@ -31,9 +31,9 @@ As P3 makes the weights of the force directions positive, nothing else changes. 
 all fingers and behind all of them is tried first; mixed sides follow on faces that would have no
 regions. With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
 
-Before any program, discs are bounded by the distance s_i along the axis between the planes across
-it through the focus and through the disc's centre. The two points of the disc's border across the
-axis see the focus at no less than r, hence
+Before any program, `placing_kernel` bounds discs by the distance s_i along the axis between the
+planes across it through the focus and through the disc's centre. The two points of the disc's
+border across the axis see the focus at no less than r, hence
 
     r <= s_i tan(half_angle).                                                            (5)
 
@@ -47,18 +47,17 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.families.disc_bounds_kernel import reaches
 from grasp_core.families.discs_kernel import (
     TURNS,
     Program,
     balance,
-    edges_of,
     empty_rows,
     facets,
+    fingers_of,
     largest_last,
     room_for_program,
 )
-from grasp_core.families.placements import Attempts, Corners, FaceTable, Footprints, Placed
+from grasp_core.families.placements import Attempts, FaceTable, Fingers, Footprints, Placed
 from grasp_core.geometry.polygons import ON_LINE
 from grasp_core.geometry.vectors_kernel import dotted
 from grasp_core.values import FINGERS
@@ -71,51 +70,32 @@ FEWEST = 3
 
 
 @loop("numpy")
-def reach_limit(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> float:
-    """Bound the discs by (5) if the focus is before or behind all fingers; else infinity."""
-    if abs(sides.sum()) < FINGERS:
-        return np.inf
-    corners = Corners(faces.corners, faces.edges)
-    before, behind = reaches(corners, attempts.faces[a], attempts.axes[a])
-    # the least s_i is at most the weighted mean of all s_i
-    return (before if sides[0] > 0.0 else behind) * np.tan(attempts.half_angles[a])
-
-
-@loop("numpy")
-def concurrent_program(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> Program:
+def concurrent_program(fingers: Fingers, sides: Array) -> Program:
     """Build the program of one attempt for given sides (4) of its fingers."""
-    quadruple, each = attempts.faces[a], len(TURNS)
-    count = FINGERS * each + edges_of(faces, quadruple)
+    each, (E, limits) = len(TURNS), (fingers.E, fingers.b)
+    count = FINGERS * each + fingers.edges.sum()
     program, row = room_for_program(count, count, RADII, VARIABLES, 0.0), 0
     A, b = program.A, program.b
-    for finger in range(FINGERS):
-        face, columns = quadruple[finger], (Y + 2 * finger, RADII + finger)
-        aim = A[row : row + each], b[row : row + each]
-        _aim_rows(faces, attempts, (a, finger), sides[finger], columns, aim)
+    for i in range(FINGERS):
+        y, r = Y + 2 * i, RADII + i
+        _aim_rows(fingers, i, sides[i], (y, r), (A[row : row + each], b[row : row + each]))
         row += each
         # (2): the disc stays inside the face
-        y, r = columns
-        for e in range(faces.edges[face]):
-            A[row, y], A[row, y + 1] = faces.E[face, e, 0], faces.E[face, e, 1]
-            A[row, r], b[row] = 1.0, faces.b[face, e]
+        for e in range(fingers.edges[i]):
+            A[row, y], A[row, y + 1], A[row, r] = E[i, e, 0], E[i, e, 1], 1.0
+            b[row] = limits[i, e]
             row += 1
     return program
 
 
 @loop("numpy")
 def _aim_rows(
-    faces: FaceTable,
-    attempts: Attempts,
-    place: tuple[int, int],
-    side: float,
-    columns: tuple[int, int],
-    rows: tuple[Array, Array],
+    fingers: Fingers, i: int, side: float, columns: tuple[int, int], rows: tuple[Array, Array]
 ) -> None:
     """Fill in the rows (1) of one finger, with its disc's centre and radius in given columns."""
-    (a, finger), (y, r), (A, b) = place, columns, rows
-    face = attempts.faces[a, finger]
-    T, o, n = faces.frames[face], faces.origins[face], faces.normals[face]
-    G = facets(attempts.axes[a, finger], attempts.half_angles[a], T)
+    (y, r), (A, b) = columns, rows
+    T, o, n = fingers.frames[i], fingers.origins[i], fingers.normals[i]
+    G = facets(fingers.axes[i], fingers.half_angle, T)
     for m in range(len(G)):
         # (4): the sign of the facets is the side
         for j in range(3):
@@ -124,47 +104,42 @@ def _aim_rows(
         A[m, y], A[m, y + 1] = dotted(T[:, 0], G[m]), dotted(T[:, 1], G[m])
         A[m, r] = np.sqrt(A[m, y] ** 2 + A[m, y + 1] ** 2)
         # (3) takes eps |g.n| from the limit
-        b[m] = -dotted(G[m], o) - float(faces.depths[face]) * abs(dotted(G[m], n))
+        b[m] = -dotted(G[m], o) - fingers.depths[i] * abs(dotted(G[m], n))
 
 
 @loop("numpy")
-def take_concurrent(
-    faces: FaceTable, attempts: Attempts, a: int, sides: Array, x: Array, placed: Placed
-) -> None:
+def take_concurrent(fingers: Fingers, a: int, sides: Array, x: Array, placed: Placed) -> None:
     """Fill in contacts, forces and the focus from the program's variables."""
-    quadruple, ways = attempts.faces[a], np.empty((FINGERS, 3))
+    ways = np.empty((FINGERS, 3))
     placed.foci[a, 0] = x[:Y]
-    for finger in range(FINGERS):
-        face, y = quadruple[finger], Y + 2 * finger
+    for i in range(FINGERS):
+        o, y, z = fingers.origins[i], x[Y + 2 * i], x[Y + 2 * i + 1]
         for j in range(3):
-            T = faces.frames[face, j]
-            placed.positions[a, finger, j] = faces.origins[face, j] + T[0] * x[y] + T[1] * x[y + 1]
-            ways[finger, j] = sides[finger] * (x[j] - placed.positions[a, finger, j])
-    balance(ways, faces.normals[quadruple], placed.forces[a])
+            T = fingers.frames[i, j]
+            placed.positions[a, i, j] = o[j] + T[0] * y + T[1] * z
+            ways[i, j] = sides[i] * (x[j] - placed.positions[a, i, j])
+    balance(ways, fingers.normals, placed.forces[a])
 
 
 @loop("numpy")
 def footprints(
     faces: FaceTable, attempts: Attempts, foci: Array, positions: Array, cut: Footprints
 ) -> None:
-    """Cut the faces of each attempt to where a line in the force cone meets the focus.
-
-    Takes `foci` (a, 3), and `positions` (a, 4, 3), which tell the sides.
-    """
+    """Cut faces to where a line in the force cone meets the focus, on the side of the contact."""
     polygons, counts, radii = cut
     most = polygons.shape[2]
     flat, heights, way = np.empty((2, most, 2)), np.empty(most), np.empty(3)
     A, b = np.empty((len(TURNS), 6)), np.empty(len(TURNS))
     for a in range(len(counts)):
+        fingers = fingers_of(faces, attempts, a)
         for finger in range(FINGERS):
-            face = attempts.faces[a, finger]
-            T, o = faces.frames[face], faces.origins[face]
+            T, o = fingers.frames[finger], fingers.origins[finger]
             for j in range(3):
                 way[j] = foci[a, j] - positions[a, finger, j]
-            side = 1.0 if dotted(attempts.axes[a, finger], way) > 0.0 else -1.0
-            _aim_rows(faces, attempts, (a, finger), side, (3, 5), (A, b))
-            count = int(faces.edges[face])
-            flat[0, :count] = faces.flat[face, :count]
+            side = 1.0 if dotted(fingers.axes[finger], way) > 0.0 else -1.0
+            _aim_rows(fingers, finger, side, (3, 5), (A, b))
+            count = int(fingers.edges[finger])
+            flat[0, :count] = faces.flat[attempts.faces[a, finger], :count]
             for m in range(len(A)):
                 row = A[m, 3], A[m, 4], b[m] - dotted(A[m], foci[a])
                 count = _clip(flat, heights, count, row)

@@ -53,14 +53,12 @@ from grasp_core.families.placements import (
     FaceTable,
     face_table,
 )
-from grasp_core.families.placing import KERNEL as PLACING
-from grasp_core.families.placing import Construction, regulus_bounds
+from grasp_core.families.placing import KERNEL, Construction, regulus_bounds
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import FINGERS, FaceQuadruple
 
-KERNEL = "grasp_core.families.disc_bounds_kernel"
 LEAST_SINE = 1e-6
 """Half angles between axes with a sine up to this are so small that they bound no width."""
 
@@ -80,13 +78,10 @@ def corners_of(body: Polyhedron) -> Corners:
 def disc_limits(
     corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
 ) -> Array:
-    """Bound the smallest disc of quadruples (q, 4) with axes (q, 4, 3) from above, (q, 4).
-
-    Columns: a concurrent grasp, a pencil in each of the `PAIRINGS`; in units of the corners.
-    """
+    """Bound discs of quadruples from above, (q, 4): a concurrent grasp, then each of `PAIRINGS`."""
     limits = np.empty((len(faces), 1 + len(PAIRINGS)))
     given = map(np.ascontiguousarray, (normals, faces, axes, half_angles))
-    compiled(KERNEL).fill(corners, *given, limits)
+    compiled(KERNEL).fill_limits(corners, *given, limits)
     return limits
 
 
@@ -163,7 +158,7 @@ class AttemptBounds:
             return np.where(merits == -np.inf, -np.inf, np.inf)
         # hulls stand for faces of several pieces: they offer no less than any piece
         bounds, pencil = np.empty(len(attempts.faces)), construction.family == "pencil"
-        kernel = compiled(PLACING)
+        kernel = compiled(KERNEL)
         kernel.bounds(pencil, self._table, attempts, construction.patterns, least, bounds)
         # a proved bound may be off by what the check of multipliers allows
         return bounds + RESIDUAL

@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
-from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, FaceTable
+from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, Attempts, FaceTable, Fingers
 from grasp_core.geometry.vectors_kernel import across, balancing_weights, dotted
 from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
-from grasp_core.solvers.nearest_point_kernel import solve as solve_nearest
+from grasp_core.solvers.nearest_point_kernel import nearest
 from grasp_core.solvers.ties import FEASIBLE, FOUND, SAME_VALUE
 from grasp_core.values import FINGERS
 
@@ -57,12 +57,13 @@ def room_for_program(common: int, rows: int, radii: int, n: int, excess: float) 
 
 
 @loop("numpy")
-def edges_of(faces: FaceTable, quadruple: Indices) -> int:
-    """Count the edges of four faces."""
-    count = 0
-    for finger in range(FINGERS):
-        count += int(faces.edges[quadruple[finger]])
-    return count
+def fingers_of(faces: FaceTable, attempts: Attempts, a: int) -> Fingers:
+    """Take the faces and cones of one attempt from their tables."""
+    four = attempts.faces[a]
+    return Fingers(
+        faces.normals[four], faces.origins[four], faces.frames[four], faces.E[four], faces.b[four],
+        faces.edges[four], faces.depths[four], attempts.axes[a], attempts.half_angles[a],
+    )  # fmt: skip
 
 
 @loop("numpy")
@@ -80,10 +81,7 @@ def facets(axis: Array, half_angle: float, T: Array) -> Array:
 
 @loop("numpy")
 def balance(ways: Array, normals: Array, forces: Array) -> None:
-    """Scale four positively spanning directions to forces whose sum is zero, (4, 3).
-
-    Their parts along the normals sum to one.
-    """
+    """Scale spanning directions, (4, 3), to balanced forces with normal parts that sum to one."""
     weights, pushes = np.empty(FINGERS), 0.0
     balancing_weights(ways, weights)
     for finger in range(FINGERS):
@@ -170,46 +168,7 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
     second = bounded(c, rows, -np.inf)
     b[-1] = -(second - SAME_VALUE * (1.0 + abs(second)))
     # that there is such a point shows that both bounds are reached
-    proved = second < np.inf and _nearest(A, b, x)
-    return (PLACED if proved else LEFT), first
-
-
-@loop("numpy")
-def _nearest(A: Array, b: Array, x: Array) -> bool:
-    """Find the point of A x <= b nearest to the origin; return False if that is not proved."""
-    count, n = A.shape
-    size, d, largest = 0.0, np.empty((1, count)), 1.0
-    for k in range(count):
-        size = max(size, -b[k])
-    if size <= 0.0:  # the origin is nearest to itself, which no disc program asks for
-        return False
-    for k in range(count):
-        d[0, k] = b[k] / size
-    near, u = np.zeros((1, n)), np.zeros((1, count))
-    solve_nearest(A, d, near, u)
-    unmet, excess = _unmet(A, d[0], near[0], u[0])
-    for j in range(n):
-        largest = max(largest, abs(near[0, j]))
-        x[j] = size * near[0, j]
-    return unmet <= FOUND * largest and excess * size <= FEASIBLE
-
-
-@loop("numpy")
-def _unmet(A: Array, d: Array, x: Array, u: Array) -> tuple[float, float]:
-    """Return by how much x and u miss the conditions of a nearest point, and a row A x <= d."""
-    unmet, excess, every = 0.0, -np.inf, 0.0
-    for j in range(len(x)):
-        total = x[j]
-        for k in range(len(d)):
-            total += u[k] * A[k, j]
-        unmet, every = max(unmet, abs(total)), every + total
-    for k in range(len(d)):
-        slack = d[k]
-        for j in range(len(x)):
-            slack -= A[k, j] * x[j]
-        excess, every = max(excess, -slack), every + slack
-        unmet = max(unmet, max(-slack, -u[k]))
-        if u[k] != 0.0:
-            unmet = max(unmet, slack)
-    # a sum shows whether any of them is not a number, which a comparison may not
-    return (unmet if abs(every) < np.inf else np.inf), excess
+    if not second < np.inf:
+        return LEFT, first
+    unmet, excess = nearest(A, b, x)
+    return (PLACED if unmet <= FOUND and excess <= FEASIBLE else LEFT), first

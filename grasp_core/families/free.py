@@ -191,7 +191,7 @@ def smallest_forces(
     # (5) in z: -(G_f Z) z <= G_f f_0 - depth
     rows = np.einsum("ksi,kiz->ksz", facets, Z.reshape(len(points), 3, -1)).reshape(-1, Z.shape[1])
     here = np.einsum("ksi,ki->ks", facets, f_0.reshape(-1, 3)).ravel()
-    (z,) = least_distance(-rows, (here - depth)[None])
+    z = least_distance(-rows, here - depth)
     return None if np.isnan(z).any() else (f_0 + Z @ z).reshape(-1, 3)
 
 
@@ -243,7 +243,7 @@ def _nearest_to_middles(
     free = right[int((sizes > SAME_PLANE * sizes[0]).sum()) :].T
     middles = np.concatenate([piece.corners.mean(axis=0) for piece in pieces])
     y = start + free @ (free.T @ (middles - start))
-    (step,) = least_distance(rows @ free, (limits - rows @ y)[None])
+    step = least_distance(rows @ free, limits - rows @ y)
     return start if np.isnan(step).any() else y + free @ step
 
 

@@ -50,8 +50,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
-from grasp_core.families.discs_kernel import Program, balance, edges_of, room_for_program
-from grasp_core.families.placements import LEAST_RADIUS, Attempts, FaceTable, Placed
+from grasp_core.families.discs_kernel import Program, balance, room_for_program
+from grasp_core.families.placements import LEAST_RADIUS, Fingers, Placed
 from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_direction
 from grasp_core.values import FINGERS
 
@@ -62,49 +62,43 @@ ONE = 4
 
 
 @loop("numpy")
-def pencil_program(faces: FaceTable, attempts: Attempts, a: int, signs: Array) -> Program:
+def pencil_program(fingers: Fingers, signs: Array) -> Program:
     """Build the program of one attempt for one order of the foci, by signs of k u as in (4).
 
     The common radius leaves R = r + the largest depth, by (3) and (6).
     """
-    quadruple, near = attempts.faces[a], signs[0] > 0.0
-    common = 1 + FINGERS + edges_of(faces, quadruple) + (FINGERS if near else 0)
-    deepest = faces.depths[quadruple].max()
-    program = room_for_program(common, common + FINGERS, BALL, VARIABLES, deepest)
+    near, u = signs[0] > 0.0, focus_direction(fingers.axes)
+    common = 1 + FINGERS + fingers.edges.sum() + (FINGERS if near else 0)
+    program = room_for_program(common, common + FINGERS, BALL, VARIABLES, fingers.depths.max())
     A, b = program.A, program.b
-    u = focus_direction(attempts.axes[a])
-    s, y = _centers(faces, attempts, (a, u), signs)
+    s, y = _centers(fingers, u, signs)
     # the foci are 2 k apart
     A[0, K], b[0] = -2.0, -LEAST_RADIUS
-    row = _disc_rows(faces, attempts, a, (s, y), (A, b))
+    row = _disc_rows(fingers, (s, y), A, b)
     if near:
-        row = _near_rows(faces, attempts, (a, u), s, (A, b), row)
-    for finger in range(FINGERS):
+        row = _near_rows(fingers, u, s, (A, b), row)
+    for i in range(FINGERS):
         # (3) loses eps by (6)
-        A[row, RADII + finger], A[row, BALL] = 1.0, -1.0
-        b[row] = -faces.depths[quadruple[finger]]
+        A[row, RADII + i], A[row, BALL], b[row] = 1.0, -1.0, -fingers.depths[i]
         row += 1
     return program
 
 
 @loop("numpy")
-def _centers(
-    faces: FaceTable, attempts: Attempts, place: tuple[int, Array], signs: Array
-) -> tuple[Array, Array]:
+def _centers(fingers: Fingers, u: Array, signs: Array) -> tuple[Array, Array]:
     """Write (1) as functions of (x0, k, 1): depths s (4, 5), plane points of centres (4, 2, 5)."""
-    (a, u), s, y = place, np.empty((FINGERS, 5)), np.empty((FINGERS, 2, 5))
-    for finger in range(FINGERS):
-        face, axis = attempts.faces[a, finger], attempts.axes[a, finger]
-        n, o, T = faces.normals[face], faces.origins[face], faces.frames[face]
-        turned, along = signs[finger] * u, dotted(n, axis)
-        _heights(n, turned, o, s[finger])
+    s, y = np.empty((FINGERS, 5)), np.empty((FINGERS, 2, 5))
+    for i in range(FINGERS):
+        n, o, T, axis = fingers.normals[i], fingers.origins[i], fingers.frames[i], fingers.axes[i]
+        turned, along = signs[i] * u, dotted(n, axis)
+        _heights(n, turned, o, s[i])
         for j in range(5):
-            s[finger, j] /= along
+            s[i, j] /= along
         for t in range(2):
-            _heights(T[:, t], turned, o, y[finger, t])
+            _heights(T[:, t], turned, o, y[i, t])
             back = dotted(T[:, t], axis)
             for j in range(5):
-                y[finger, t, j] -= back * s[finger, j]
+                y[i, t, j] -= back * s[i, j]
     return s, y
 
 
@@ -117,76 +111,59 @@ def _heights(d: Array, turned: Array, o: Array, found: Array) -> None:
 
 
 @loop("numpy")
-def _disc_rows(
-    faces: FaceTable,
-    attempts: Attempts,
-    a: int,
-    centers: tuple[Array, Array],
-    rows: tuple[Array, Array],
-) -> int:
+def _disc_rows(fingers: Fingers, centers: tuple[Array, Array], A: Array, b: Array) -> int:
     """Fill in, from row 1 on, the rows (2) and those that keep discs in faces; return the next."""
-    (s, y), (A, b), psi, row = centers, rows, attempts.half_angles[a], 1
-    for finger in range(FINGERS):
-        face, r = attempts.faces[a, finger], RADII + finger
-        lean = angle_between(faces.normals[face], attempts.axes[a, finger])
+    (s, y), psi, row = centers, fingers.half_angle, 1
+    for i in range(FINGERS):
+        r, lean = RADII + i, angle_between(fingers.normals[i], fingers.axes[i])
         # (2), with eps off the limit by (6)
         for j in range(ONE):
-            A[row, j] = -np.sin(psi) * s[finger, j]
+            A[row, j] = -np.sin(psi) * s[i, j]
         A[row, BALL], A[row, r] = 1.0, 1.0 if lean >= psi else np.cos(psi - lean)
-        b[row] = np.sin(psi) * s[finger, ONE] - faces.depths[face]
+        b[row] = np.sin(psi) * s[i, ONE] - fingers.depths[i]
         row += 1
-        for e in range(faces.edges[face]):
-            E = faces.E[face, e]
+        for e in range(fingers.edges[i]):
+            E = fingers.E[i, e]
             for j in range(ONE):
-                A[row, j] = E[0] * y[finger, 0, j] + E[1] * y[finger, 1, j]
+                A[row, j] = E[0] * y[i, 0, j] + E[1] * y[i, 1, j]
             A[row, r] = 1.0
-            b[row] = faces.b[face, e] - (E[0] * y[finger, 0, ONE] + E[1] * y[finger, 1, ONE])
+            b[row] = fingers.b[i, e] - (E[0] * y[i, 0, ONE] + E[1] * y[i, 1, ONE])
             row += 1
     return row
 
 
 @loop("numpy")
-def _near_rows(
-    faces: FaceTable,
-    attempts: Attempts,
-    place: tuple[int, Array],
-    s: Array,
-    rows: tuple[Array, Array],
-    row: int,
-) -> int:
+def _near_rows(fingers: Fingers, u: Array, s: Array, rows: tuple[Array, Array], row: int) -> int:
     """Fill in the rows (5), which keep the foci of cell B near each other; return the next row."""
-    (a, u), (A, b) = place, rows
-    for finger in range(FINGERS):
-        face, T = attempts.faces[a, finger], faces.frames[attempts.faces[a, finger]]
+    A, b = rows
+    for i in range(FINGERS):
+        T = fingers.frames[i]
         # u_1 = u and u_2 = -u
-        toward = (1.0 if finger < FINGERS // 2 else -1.0) * dotted(attempts.axes[a, finger], u)
+        toward = (1.0 if i < FINGERS // 2 else -1.0) * dotted(fingers.axes[i], u)
         for j in range(ONE):
-            A[row, j] = -toward * s[finger, j]
+            A[row, j] = -toward * s[i, j]
         A[row, K] += 2.0
-        A[row, RADII + finger] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
+        A[row, RADII + i] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
         # (6) takes eps |n.u| from the limit
-        off = faces.depths[face] * abs(dotted(faces.normals[face], u))
-        b[row] = toward * s[finger, ONE] - off
+        off = fingers.depths[i] * abs(dotted(fingers.normals[i], u))
+        b[row] = toward * s[i, ONE] - off
         row += 1
     return row
 
 
 @loop("numpy")
-def take_pencil(
-    faces: FaceTable, attempts: Attempts, a: int, signs: Array, x: Array, placed: Placed
-) -> None:
+def take_pencil(fingers: Fingers, a: int, signs: Array, x: Array, placed: Placed) -> None:
     """Fill in contacts, forces along the axes and foci from the program's variables."""
-    u = focus_direction(attempts.axes[a])
-    _, y = _centers(faces, attempts, (a, u), signs)
-    for finger in range(FINGERS):
-        face = attempts.faces[a, finger]
-        first, second = y[finger, 0, ONE], y[finger, 1, ONE]
+    u = focus_direction(fingers.axes)
+    _, y = _centers(fingers, u, signs)
+    for i in range(FINGERS):
+        first, second = y[i, 0, ONE], y[i, 1, ONE]
         for j in range(ONE):
-            first += y[finger, 0, j] * x[j]
-            second += y[finger, 1, j] * x[j]
+            first += y[i, 0, j] * x[j]
+            second += y[i, 1, j] * x[j]
         for j in range(3):
-            T = faces.frames[face, j]
-            placed.positions[a, finger, j] = faces.origins[face, j] + T[0] * first + T[1] * second
+            T = fingers.frames[i, j]
+            placed.positions[a, i, j] = fingers.origins[i, j] + T[0] * first + T[1] * second
     for pair in range(2):
         placed.foci[a, pair] = x[:3] + signs[2 * pair] * x[K] * u
-    balance(attempts.axes[a], faces.normals[attempts.faces[a]], placed.forces[a])
+    balance(fingers.axes, fingers.normals, placed.forces[a])

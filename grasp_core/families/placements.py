@@ -72,6 +72,20 @@ class Attempts(NamedTuple):
     half_angles: Array  # half-angle that the four cones of an attempt share, (a,) [rad]
 
 
+class Fingers(NamedTuple):
+    """The faces and cones of one attempt, in finger order, with the letters of both tables."""
+
+    normals: Array
+    origins: Array
+    frames: Array
+    E: Array
+    b: Array
+    edges: Indices
+    depths: Array
+    axes: Array
+    half_angle: float
+
+
 class Corners(NamedTuple):
     """Corners of faces, in arrays as long as the largest number of corners."""
 

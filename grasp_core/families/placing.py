@@ -142,10 +142,10 @@ class Construction:
         for a in np.flatnonzero(placed.ends == LEFT).tolist():
             worth, placed.ends[a] = float(least[a]), NONE
             try:
+                fingers = kernel.fingers_of(table, attempts, a)
                 for pattern in self.patterns:
-                    program = kernel.program_of(pencil, table, attempts, a, pattern)
-                    if discs := largest_discs(program, worth):
-                        kernel.take(pencil, table, attempts, a, pattern, *discs, placed)
+                    if discs := largest_discs(kernel.program_of(pencil, fingers, pattern), worth):
+                        kernel.take(pencil, fingers, a, pattern, *discs, placed)
                         worth = surpassing(float(placed.merits[a]))
             except SolverError:
                 placed.ends[a] = LEFT
@@ -199,10 +199,7 @@ def attempts_of(asked: Sequence[tuple[FaceQuadruple, Sequence[ForceCone]]]) -> A
 
 
 def largest_discs(program: Any, least: float) -> tuple[Array, float] | None:
-    """Find the largest four equal discs, then enlarge each, like `discs_kernel` but by HiGHS too.
-
-    Gives the variables (n,) and the largest smallest radius; None if it is proved to be less.
-    """
+    """Find discs like `discs_kernel`, by HiGHS too: variables and radius; None if it is less."""
     rows = compiled(DISCS).of_equal_radii(program)
     objective = np.eye(len(rows.At))[-1]
     first = maximize_above(LinearProgram(objective, np.array(rows.At.T), rows.b), least)
@@ -246,10 +243,7 @@ def regulus_bounds(
 
 
 def place_reguli(table: FaceTable, attempts: Attempts, placed: Placed) -> None:
-    """Place four contacts for each attempt on the lines of one regulus, near the faces' middles.
-
-    The merit is minus the largest offset t; no placement means none for the slopes tried.
-    """
+    """Place contacts on the lines of one regulus each; the merit is minus the largest offset."""
     merits, chosen = regulus_bounds(table, attempts)
     for a, (merit, choice) in enumerate(zip(merits.tolist(), chosen.tolist(), strict=True)):
         try:
@@ -266,8 +260,9 @@ def place_best(
 ) -> float:
     """Enter the best placement of one attempt over given choices, and return its merit."""
     kernel, best, placed.ends[a] = compiled(REGULUS), -math.inf, NONE
+    fingers = kernel.fingers_of(table, attempts, a)
     for choice in choices:
-        usable, rows = kernel.regulus_program(table, attempts, a, choice)
+        usable, rows = kernel.regulus_program(fingers, choice)
         if not usable:
             continue
         A, equal = rows.At.T, len(rows.b) - rows.equalities
@@ -277,7 +272,7 @@ def place_best(
         # ties go to the first choice: rounding must not decide between equal ones
         if isinstance(found, Optimum) and found.value > best + kernel.SAME_OFFSET:
             x, best = nearest_optimum(program, found, GIVEN_UP), found.value
-            kernel.take(table, attempts, a, choice, x, best, placed)
+            kernel.take(fingers, a, choice, x, best, placed)
     return best
 
 
@@ -410,11 +405,8 @@ class Settling:
         Where faces have several pieces, their hulls are tried first: a grasp that the hulls do not
         hold no piece holds, and the contacts on the hulls show which pieces are likely to be best.
         """
-        construction, shapes, least = (
-            self.construction,
-            chosen_shapes(self.shapes, faces),
-            end.least,
-        )
+        construction, least = self.construction, end.least
+        shapes = chosen_shapes(self.shapes, faces)
         if whole is None or not whole.merit > least:
             return None
         if all(len(shape.pieces) == 1 for shape in shapes):
@@ -431,9 +423,11 @@ class Settling:
 
     def _settle(self, done: Sequence[tuple[tuple[FaceShape, ...], End, Planned]]) -> None:
         """Enter the contacts on the true surface, with their regions."""
-        every = regions_of(self.construction.region, [planned for _, _, planned in done])
+        construction = self.construction
+        every = regions_of(construction.region, [planned for _, _, planned in done])
+        least = 0.0 if construction.limits else -math.inf  # discs however small
         for (shapes, end, (chosen, cones, placement)), regions in zip(done, every, strict=True):
-            place = partial(_placed_on, self.construction, cones)
+            place = partial(construction.place, cones=cones, least=least)
             try:
                 found = on_true_surface(shapes, chosen, cones, placement, regions, place)
             except SolverError:
@@ -449,13 +443,6 @@ class Settling:
 def chosen_shapes(shapes: Shapes, faces: FaceQuadruple) -> tuple[FaceShape, ...]:
     """Return the shapes of the faces that have room for a contact, in finger order."""
     return tuple(shape for face in faces if (shape := shapes[face]) is not None)
-
-
-def _placed_on(
-    construction: Construction, cones: Cones, pieces: tuple[FacePiece, ...]
-) -> Placement | None:
-    """Place contacts on convex pieces, with discs however small; None if it is impossible."""
-    return construction.place(pieces, cones, 0.0 if construction.limits else -math.inf)
 
 
 def on_true_surface(

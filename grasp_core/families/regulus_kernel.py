@@ -55,13 +55,13 @@ from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import (
     TURNS,
     balance,
-    edges_of,
     empty_rows,
     facets,
+    fingers_of,
     measure,
     vertex_of,
 )
-from grasp_core.families.placements import PLACED, Attempts, FaceTable, Placed
+from grasp_core.families.placements import PLACED, Attempts, FaceTable, Fingers, Placed
 from grasp_core.geometry.vectors_kernel import angle_between, cross, dotted, focus_direction
 from grasp_core.solvers.lp_kernel import (
     INFEASIBLE,
@@ -135,9 +135,9 @@ def _interval(axes: Array, half_angle: float, u: Array, pair: int) -> tuple[floa
 
 
 @loop()
-def pair_frames(faces: FaceTable, attempts: Attempts, a: int) -> PairFrames:
+def pair_frames(fingers: Fingers) -> PairFrames:
     """Compute the frames of one attempt; slopes of too asymmetric pairs are not usable."""
-    axes, half_angle, slopes = attempts.axes[a], attempts.half_angles[a], len(SLOPES)
+    axes, half_angle, slopes = fingers.axes, fingers.half_angle, len(SLOPES)
     u, normal = focus_direction(axes), np.empty(3)
     frames = PairFrames(
         u, np.empty((2, 3)), np.empty((2, 3)), np.zeros((2, slopes)),
@@ -155,7 +155,7 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int) -> PairFrames:
         least, largest = _interval(axes, half_angle, u, pair)
         if largest <= least:
             continue
-        along = _facets_along(faces, attempts, (a, pair), frames)
+        along = _facets_along(fingers, pair, frames)
         for s in range(slopes):
             # the sign of the slope is that of x
             tau = resultant * np.tan(least + SLOPES[s] * (largest - least))
@@ -165,16 +165,12 @@ def pair_frames(faces: FaceTable, attempts: Attempts, a: int) -> PairFrames:
 
 
 @loop()
-def _facets_along(
-    faces: FaceTable, attempts: Attempts, place: tuple[int, int], frames: PairFrames
-) -> Array:
+def _facets_along(fingers: Fingers, pair: int, frames: PairFrames) -> Array:
     """Compute normals of the facets of a pair's pyramids along u, v, N, (2, facets, 3)."""
-    a, pair = place
     found = np.empty((2, len(TURNS), 3))
     for each in range(2):
         finger = 2 * pair + each
-        frame = faces.frames[attempts.faces[a, finger]]
-        G = facets(attempts.axes[a, finger], attempts.half_angles[a], frame)
+        G = facets(fingers.axes[finger], fingers.half_angle, fingers.frames[finger])
         for m in range(len(G)):
             found[each, m, 0] = dotted(G[m], frames.u)
             found[each, m, 1] = dotted(G[m], frames.v[pair])
@@ -222,20 +218,18 @@ class _Line(NamedTuple):
 def regulus_bounds(
     faces: FaceTable, attempts: Attempts, any_choice: bool, bounds: Array, chosen: Indices
 ) -> None:
-    """Bound the merit, minus the largest offset t, over slopes; stop when none can be better.
-
-    If any choice will do, stop at the first.
-    """
+    """Bound minus the largest offset over slopes, until none is better, or any is feasible."""
     slopes, vertex = len(SLOPES), vertex_of(VARIABLES)
     enough = -np.inf if any_choice else -SAME_OFFSET
     for a in range(len(bounds)):
-        frames = pair_frames(faces, attempts, a)
+        fingers = fingers_of(faces, attempts, a)
+        frames = pair_frames(fingers)
         bounds[a], chosen[a] = -np.inf, NONE
         for i in range(slopes):
             for j in range(slopes):
                 if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] > enough:
                     continue
-                rows, gap = _rows(faces, attempts.faces[a], frames, (i, j))
+                rows, gap = _rows(fingers, frames, (i, j))
                 worth = bounds[a] + SAME_OFFSET
                 best, side = _best_side(rows, gap, worth, vertex)
                 if best > worth:
@@ -244,39 +238,31 @@ def regulus_bounds(
 
 
 @loop()
-def regulus_program(
-    faces: FaceTable, attempts: Attempts, a: int, choice: tuple[int, int, int]
-) -> tuple[bool, Rows]:
+def regulus_program(fingers: Fingers, choice: tuple[int, int, int]) -> tuple[bool, Rows]:
     """Build the program for given slopes and side; return also whether the slopes are usable."""
-    frames, (i, j, side) = pair_frames(faces, attempts, a), choice
-    rows, gap = _rows(faces, attempts.faces[a], frames, (i, j))
+    frames, (i, j, side) = pair_frames(fingers), choice
+    rows, gap = _rows(fingers, frames, (i, j))
     rows.At[P, 0], rows.b[0] = (-1.0 if side == PLUS else 1.0), -gap
     return frames.usable[0, i] and frames.usable[1, j], rows
 
 
 @loop()
 def take(
-    faces: FaceTable,
-    attempts: Attempts,
-    a: int,
-    choice: tuple[int, int, int],
-    x: Array,
-    merit: float,
-    placed: Placed,
+    fingers: Fingers, a: int, choice: tuple[int, int, int], x: Array, merit: float, placed: Placed
 ) -> None:
     """Fill in contacts, forces and foci from the variables of a program."""
-    frames, quadruple, ways = pair_frames(faces, attempts, a), attempts.faces[a], np.empty((4, 3))
+    frames, ways = pair_frames(fingers), np.empty((FINGERS, 3))
     placed.foci[a] = 0.0
     for finger in range(FINGERS):
-        line, n = _line(frames, choice[:2], finger), faces.normals[quadruple[finger]]
+        line, n = _line(frames, choice[:2], finger), fingers.normals[finger]
         passing = x[:3] + x[K] * line.k + x[P] * line.p
         ways[finger] = x[X + line.pair] * line.x + x[Z + line.pair] * line.z
         contact = passing - ways[finger]
         # takes away what the program's answer may be off the plane
-        off = dotted(n, contact - faces.origins[quadruple[finger]])
+        off = dotted(n, contact - fingers.origins[finger])
         placed.positions[a, finger] = contact - off * n
         placed.foci[a, line.pair] += 0.5 * passing
-    balance(ways, faces.normals[quadruple], placed.forces[a])
+    balance(ways, fingers.normals, placed.forces[a])
     placed.ends[a], placed.merits[a] = PLACED, merit
 
 
@@ -312,26 +298,23 @@ def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
 
 
 @loop("numpy")
-def _rows(
-    faces: FaceTable, quadruple: Indices, frames: PairFrames, slopes: tuple[int, int]
-) -> tuple[Rows, float]:
+def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tuple[Rows, float]:
     """Build the rows, the first left for the gap (8) and equalities last; return also the gap."""
-    count = 1 + FINGERS * (4 + 1 + 1) + 4 + edges_of(faces, quadruple)
+    count = 1 + FINGERS * (4 + 1 + 1) + 4 + fingers.edges.sum()
     rows = empty_rows(VARIABLES, count)
     rows = Rows(rows.At, rows.b, rows.norms, FINGERS)
     row, equality = 1, count - FINGERS
     rows.b[0] = 0.0
     for finger in range(FINGERS):
-        face, line = quadruple[finger], _line(frames, slopes, finger)
-        row = _edge_rows(faces, face, line, rows, row)
-        row = _offset_rows(faces, face, line, rows, row)
-        n = faces.normals[face]
+        line, n = _line(frames, slopes, finger), fingers.normals[finger]
+        row = _edge_rows(fingers, finger, line, rows, row)
+        row = _offset_rows(fingers, finger, line, rows, row)
         # (7): the passing point is high enough over the face
         _add(line, n, (0.0, -1.0), rows, row)
         rows.b[row] = -LEAST_DEPTH
         # the contact lies in the plane of its face
         _add(line, n, (1.0, -1.0), rows, equality + finger)
-        rows.b[equality + finger] = dotted(n, faces.origins[face])
+        rows.b[equality + finger] = dotted(n, fingers.origins[finger])
         row += 1
     for pair in range(2):
         for bound in range(2):
@@ -346,28 +329,28 @@ def _rows(
 
 
 @loop()
-def _edge_rows(faces: FaceTable, face: int, line: _Line, rows: Rows, row: int) -> int:
+def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
-    edge, frame = np.empty(3), faces.frames[face]
-    for e in range(faces.edges[face]):
+    edge, frame, E = np.empty(3), fingers.frames[i], fingers.E[i]
+    for e in range(fingers.edges[i]):
         for j in range(3):
-            edge[j] = frame[j, 0] * faces.E[face, e, 0] + frame[j, 1] * faces.E[face, e, 1]
+            edge[j] = frame[j, 0] * E[e, 0] + frame[j, 1] * E[e, 1]
         _add(line, edge, (1.0, -1.0), rows, row)
-        rows.b[row] = faces.b[face, e] - LEAST_INSET + dotted(edge, faces.origins[face])
+        rows.b[row] = fingers.b[i, e] - LEAST_INSET + dotted(edge, fingers.origins[i])
         row += 1
     return row
 
 
 @loop()
-def _offset_rows(faces: FaceTable, face: int, line: _Line, rows: Rows, row: int) -> int:
+def _offset_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (5), which make t the largest offset from the middle of the face."""
     along = np.empty(3)
     for axis in range(2):
         for sign in (1.0, -1.0):
             for j in range(3):
-                along[j] = sign * faces.frames[face][j, axis]
+                along[j] = sign * fingers.frames[i, j, axis]
             _add(line, along, (1.0, -1.0), rows, row)
-            rows.At[T, row], rows.b[row] = -1.0, dotted(along, faces.origins[face])
+            rows.At[T, row], rows.b[row] = -1.0, dotted(along, fingers.origins[i])
             row += 1
     return row
 

@@ -50,7 +50,7 @@ from grasp_core.errors import InputError, NoForcesError, SolverError
 from grasp_core.kinds import LARGEST, SMALLEST, number, one_of, several, shown
 from grasp_core.solvers import conic, qp
 from grasp_core.solvers.conic import ConicProgram
-from grasp_core.solvers.qp import PROXQP, QuadraticProgram, check_solver, least_distance
+from grasp_core.solvers.qp import PROXQP, check_solver, least_distance
 from grasp_core.values import Contact, Grasp
 
 RESIDUAL = 1e-6
@@ -113,38 +113,38 @@ class Balance:
         most = CLEARLY * np.sqrt(1.0 + friction**2).sum()
         return bool(np.linalg.norm(self.w.reshape(2, 3), axis=1).max() > most * self.largest)
 
-    def pyramids(self, friction: Array) -> Array:
-        """Return rows R with R @ f <= 0 in pyramids inside the friction cones, (16 k, 3 k)."""
+    def sides(self, friction: Array) -> tuple[Array, Array]:
+        """Return rows C and limits d of forces, C f <= d: pyramids inside the cones, then (2)."""
         count, each = len(friction), np.arange(len(friction))
-        rows = np.zeros((count, PYRAMID_SIDES, count, 3))
+        rows, along = np.zeros((count, PYRAMID_SIDES, count, 3)), np.eye(3 * count)[0::3]
         rows[each, :, each, 0] = -friction[:, None] * inscribed_share()
         rows[each, :, each, 1:] = facet_turns(PYRAMID_SIDES)
-        return rows.reshape(count * PYRAMID_SIDES, 3 * count)
+        C, d = [rows.reshape(-1, 3 * count), -along], [np.zeros(count * PYRAMID_SIDES)]
+        d.append(np.full(count, -self.least))
+        if math.isfinite(self.largest):
+            C.append(along)
+            d.append(np.full(count, self.largest))
+        return np.vstack(C), np.concatenate(d)
 
     def checked(self, f: Array, residual: float = RESIDUAL) -> Array | None:
         """Make forces (3k,) balance to rounding; None where they then break a limit."""
         # the least change that balances f is the pseudo-inverse of what is left
-        exact = f[None] - (f[None] @ self.G.T + self.w) @ self.inverse.T
-        along = exact[0, 0::3]
-        wrong = float(np.abs(exact @ self.G.T + self.w).max())
+        exact = f - self.inverse @ (self.G @ f + self.w)
+        along = exact[0::3]
+        wrong = float(np.abs(self.G @ exact + self.w).max())
         wrong = max(wrong, self.least - along.min(), along.max() - self.largest)
-        return exact[0] if wrong <= residual else None
+        return exact if wrong <= residual else None
 
     def in_space(self, f: Array) -> Array:
         """Turn local forces into forces in the object's frame, (k, 3) [N]."""
-        local = np.einsum("kij,nkj->nki", self.frames, f.reshape(1, -1, 3))
-        return self.scale * np.asarray(local[0], dtype=np.float64)
+        return self.scale * np.einsum("kij,kj->ki", self.frames, f.reshape(-1, 3))
 
 
 def balances(
     arms: Array, normals: Array, wrenches: Array, normal_force: tuple[float, float], *,
     by_load: bool,
 ) -> list[Balance]:  # fmt: skip
-    """Scale contacts and external wrenches to unit size.
-
-    Takes `arms` (k, 3) [m]; `normals` (k, 3); `wrenches` (force, torque), (n, 6) [N, N m];
-    `normal_force` [N].
-    """
+    """Scale contacts, (k, 3) [m], and wrenches, (n, 6) [N, N m], to unit size."""
     least, largest = normal_force
     size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
     frames = contact_frames(normals)
@@ -184,15 +184,7 @@ def in_cones(f: Array | None, friction: Array) -> bool:
 
 def least_norm(balance: Balance, friction: Array, solver: str) -> Array | None:
     """Find balanced forces of least norm, (3k,), in pyramids or else in cones; None without any."""
-    n, rows = len(balance.inverse), balance.pyramids(friction)
-    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
-    lower[0::3], upper[0::3] = balance.least, balance.largest
-    f = qp.minimize(
-        QuadraticProgram(
-            np.eye(n), np.zeros(n), rows, np.zeros(len(rows)), balance.G, -balance.w, lower, upper
-        ),
-        solver,
-    )
+    f = qp.least_norm(*balance.sides(friction), balance.G, -balance.w, solver)
     f = None if f is None else balance.checked(f)
     return f if in_cones(f, friction) else least_norm_in_cones(balance, friction)
 
@@ -218,10 +210,7 @@ def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
 
 
 def least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
-    """Find forces (3k,) that need the least r, each contact having the friction r times its weight.
-
-    The iteration starts from a coefficient on the way to it.
-    """
+    """Find forces (3k,) of least r, the friction being r times a weight, from some coefficient."""
     best, friction = None, start
     for _ in range(ROUNDS):
         better = _toward_less_friction(balance, friction, weights)
@@ -241,19 +230,14 @@ def _toward_less_friction(balance: Balance, friction: float, weights: Array) -> 
     minimised is, but for a constant, half the square of (sqrt(REGULAR) z, t + 1), so that the
     answer is the nearest point of a polyhedron.
     """
-    null, F0 = balance.null, -balance.w[None] @ balance.inverse.T
-    rows, along, pushes = balance.pyramids(friction * weights), null[0::3], F0[:, 0::3]
-    # the pyramids widened by t, R f <= weight t, then (2) with the forces put in
-    allowance = np.repeat(weights, len(rows) // len(weights))
-    C, D = [rows @ null, -along], [-F0 @ rows.T - allowance, pushes - balance.least]
-    if math.isfinite(balance.largest):
-        C.append(along)
-        D.append(balance.largest - pushes)
-    sides, root = np.vstack(C), math.sqrt(REGULAR)
-    excess = np.zeros((len(sides), 1))
-    excess[: len(rows), 0] = -allowance
-    z = least_distance(np.hstack([sides / root, excess]), np.hstack(D))[0, :-1] / root
-    return None if np.isnan(z).any() else balance.checked((F0 + z[None] @ null.T)[0])
+    f0, root = -balance.inverse @ balance.w, math.sqrt(REGULAR)
+    C, d = balance.sides(friction * weights)
+    # the pyramids, which come first, are widened by t: R f <= weight t
+    excess = np.zeros(len(C))
+    excess[: len(weights) * PYRAMID_SIDES] = np.repeat(weights, PYRAMID_SIDES)
+    sides = np.column_stack([C @ balance.null / root, -excess])
+    z = least_distance(sides, d - C @ f0 - excess)[:-1] / root
+    return None if np.isnan(z).any() else balance.checked(f0 + balance.null @ z)
 
 
 def lower_friction(balance: Balance, weights: Array, forces: Array) -> Array:
@@ -284,16 +268,10 @@ def least_imbalance(balance: Balance, friction: Array) -> Array:
     The square of what (1) leaves, and a little of the forces' own size, is f'Pf/2 + q'f but for a
     constant: with P = L L', the least |L'f + inv(L) q|.
     """
-    n = balance.G.shape[1]
-    rows, along = balance.pyramids(friction), np.eye(n)[0::3]
-    L = np.linalg.cholesky(balance.G.T @ balance.G + REGULAR * np.eye(n))
+    L = np.linalg.cholesky(balance.G.T @ balance.G + REGULAR * np.eye(balance.G.shape[1]))
     back, shift = np.linalg.inv(L).T, np.linalg.solve(L, balance.G.T @ balance.w)
-    C, d = [rows, -along], [np.zeros(len(rows)), np.full(len(along), -balance.least)]
-    if math.isfinite(balance.largest):
-        C.append(along)
-        d.append(np.full(len(along), balance.largest))
-    turned = np.vstack(C) @ back
-    z = least_distance(turned, (np.concatenate(d) + turned @ shift)[None])[0]
+    C, d = balance.sides(friction)
+    z = least_distance(C @ back, d + C @ back @ shift)
     if np.isnan(z).any():
         raise SolverError("no forces were found in the friction cones, though pure pushes are some")
     f = back @ (z - shift)

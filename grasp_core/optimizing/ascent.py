@@ -48,8 +48,7 @@ from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.grounds import Grounds
 from grasp_core.optimizing.search import Found, Searching
-from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
-from grasp_core.quality.inner_polytope import InnerPolytope
+from grasp_core.quality.ferrari_canny import FerrariCanny, InnerPolytope, wrench_set_quality
 from grasp_core.quality.measures import (
     CLOSED_GAP,
     FERRARI_CANNY,

@@ -134,10 +134,7 @@ def _wrench(G: Array, force: Array, point: Array) -> None:
 
 @loop()
 def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
-    """Choose seven points, each as far as possible from the affine hull of those before.
-
-    Gives the height from which on points see a simplex; -1 if all points are flat.
-    """
+    """Choose seven points, each farthest from the hull of others; return the slack, -1 if flat."""
     wrenches, mean = np.empty((len(edges), D)), np.zeros(D)
     for i in range(len(edges)):
         _wrench(G, edges[i], wrenches[i])

@@ -277,10 +277,7 @@ def measured_set(
 
 
 def _without_rests(wrenches: WrenchSet, loads: Array, forces: Array, ball: FerrariCanny) -> Array:
-    """Return the multiples of loads that forces and a ball show by (3), (m,).
-
-    They are minus infinity where the ball is not above rounding.
-    """
+    """Return the multiples of loads that forces and a ball show by (3), (m,), or minus infinity."""
     radius = ball.lower - _rounding(wrenches)
     if not radius > 0.0:
         return np.full(len(loads), -np.inf)
@@ -313,10 +310,7 @@ def _rounding(wrenches: WrenchSet) -> float:
 
 
 class TaskLimit(NamedTuple):
-    """The multiple of a load that contacts in closure resist, by local forces (3k,), at most.
-
-    The limiting twist, (6,), has demand one.
-    """
+    """The largest resisted multiple of a load, local forces (3k,), and a twist of demand one."""
 
     multiple: float
     forces: Array

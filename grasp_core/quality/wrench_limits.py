@@ -50,11 +50,13 @@ from grasp_core.closure.contacts import (
     contact_frames,
     contact_frictions,
     contact_torsions,
-    grasp_map,
     in_frames,
+    to_center,
+    to_origin,
     torsion_lengths,
-    with_torques,
+    unit_size,
 )
+from grasp_core.closure.proofs import ContactCones
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
@@ -89,10 +91,12 @@ class Farthest(NamedTuple):
 
     multiple: float
     """Negative, if at all, by rounding."""
-    local: Array
-    """Local forces over the largest normal force that resist it, (k, 3) or (k, 4)."""
-    twist: Array
-    """Twist y of the limiting facet, scaled and about the contacts' mean, (6,)."""
+    forces: Array
+    """Contact forces that resist it, (k, 3) [N]."""
+    torques: Array | None
+    """Torques about the inward normals with them, (k,) [N m]; None without torsion."""
+    facet: Array
+    """Twist y of the limiting facet about the centre, (6,)."""
     multipliers: Array
     """Multipliers m of the joints, (joints,) [1/(N m)]."""
 
@@ -109,17 +113,15 @@ class WrenchBody:
         self.count = k = len(arms)
         self.motors = motors_for(motors, k)
         # at the contacts' own middle and at unit size all numbers are of order one
-        self.middle = arms.mean(axis=0)  # a far centre would swamp the levers
-        arms = arms - self.middle
-        self.size = float(np.linalg.norm(arms, axis=1).max()) or 1.0
+        units, self.middle, size = unit_size(arms)  # a far centre would swamp the levers
+        self.size = float(size)
         self.scale = np.array([1.0] * 3 + [self.size] * 3)
         self.frames = contact_frames(normals)
-        hard = in_frames(grasp_map(arms / self.size), self.frames)
-        self.lengths = lengths = None if torsions is None else torsion_lengths(torsions, friction)
-        self.G = hard if lengths is None else with_torques(hard, normals, lengths / self.size)
-        self.bounded = WrenchSet(self.G, friction, "linf")
-        self.width = LOCAL if torsions is not None else 3
-        levers = in_frames(self.motors.levers, self.frames)
+        self.lengths = None if torsions is None else torsion_lengths(torsions, friction)
+        torsion = None if torsions is None else torsions / size
+        cones = ContactCones.at(units, normals, friction, torsion)
+        self.bounded, self.width = WrenchSet.within(cones, "linf"), cones.width
+        self.G, levers = self.bounded.G, in_frames(self.motors.levers, self.frames)
         self.levers = levers if torsions is None else np.zeros((0, LOCAL * k))
         # (1) in units of f_max: G f + lambda w = 0, then 0 <= normal parts <= 1, then the torques
         # of each joint over its limit, both ways
@@ -159,19 +161,15 @@ class WrenchBody:
                 f"against it ({power:.3g}), so that they bound nothing"
             )
         multipliers = self.max_normal_force * (more - less) / (power * -self.motors.limits)
-        local = answer.x[:-1].reshape(k, self.width)
-        return Farthest(share * float(answer.x[-1]), local, answer.z[:6] / power, multipliers)
-
-    def in_object_frame(self, local: Array) -> Array:
-        """Turn local forces over the largest normal force, (k, 3) or (k, 4), to forces (k, 3)."""
-        return self.max_normal_force * np.einsum("kij,kj->ki", self.frames, local[:, :3])
+        local = self.max_normal_force * answer.x[:-1].reshape(k, self.width)
+        forces = np.einsum("kij,kj->ki", self.frames, local[:, :3])
+        torques = None if self.lengths is None else self.lengths * local[:, 3]
+        facet = to_origin(answer.z[:6] / power, self.middle, self.size)
+        return Farthest(share * float(answer.x[-1]), forces, torques, facet, multipliers)
 
     def support(self, facet: Array, multipliers: Array) -> float:
         """Bound the support of the body by (3), for a twist about the centre, (6,)."""
-        return self.scaled_support(self.scaled(facet), multipliers)
-
-    def scaled_support(self, twist: Array, multipliers: Array) -> float:
-        """Bound the support of the body by (3), for a scaled twist about the contacts' mean."""
+        twist = to_center(facet, self.middle, self.size)
         slopes = twist @ self.G - multipliers @ self.levers
         pushed = self.max_normal_force * self.bounded.reach(slopes)[0]
         return pushed + self.motors.relaxed(multipliers)
@@ -196,17 +194,6 @@ class WrenchBody:
         """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""
         moved = np.append(wrench[:3], wrench[3:] - cross(self.middle, wrench[:3]))
         return moved / self.scale
-
-    def scaled(self, facet: Array) -> Array:
-        """Move a facet about the centre to a scaled twist about the contacts' mean."""
-        twist = facet * self.scale
-        twist[:3] += cross(facet[3:], self.middle)
-        return twist
-
-    def about_center(self, facet: Array) -> Array:
-        """Move a facet about the contacts' mean to the centre, (6,)."""
-        slides = cross(facet[3:], self.middle)
-        return np.concatenate([facet[:3] - slides, facet[3:]])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -300,16 +287,9 @@ def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
     """Find the largest multiple of an external wrench, (6,), that a body holds, with its proof."""
     found = body.largest(wrench, np.zeros(len(body.levers)))
     limit = max(found.multiple, 0.0)
+    upper = max(limit, body.support(found.facet, found.multipliers))
     return WrenchLimit(
-        wrench=wrench,
-        limit=limit,
-        upper=max(limit, body.scaled_support(found.twist, found.multipliers)),
-        forces=body.in_object_frame(found.local),
-        facet=body.about_center(found.twist / body.scale),
-        motor_multipliers=found.multipliers,
-        torques=None
-        if body.lengths is None
-        else body.max_normal_force * body.lengths * found.local[:, 3],
+        wrench, limit, upper, found.forces, found.facet, found.multipliers, found.torques
     )
 
 
@@ -331,7 +311,8 @@ def attains(body: WrenchBody, found: WrenchLimit) -> bool:
 
 def bounds(body: WrenchBody, found: WrenchLimit) -> bool:
     """Return whether the facet proves that no multiple above the upper one is resisted."""
-    load, twist = body.about_middle(found.wrench), body.scaled(found.facet)
+    load = body.about_middle(found.wrench)
+    twist = to_center(found.facet, body.middle, body.size)
     power, length = float(twist @ load), float(np.linalg.norm(load))
     # facet and multipliers have to be short enough for rounding
     long, middle = np.abs(found.facet * body.scale), float(np.linalg.norm(body.middle))
@@ -340,7 +321,7 @@ def bounds(body: WrenchBody, found: WrenchLimit) -> bool:
     if not ((moved + pulled) * length <= LONGEST and abs(power + 1.0) <= MOST_OFF):
         return False
     # (3): h(y) is at most the upper limit times -y.w, but for rounding
-    bound = body.scaled_support(twist, found.motor_multipliers)
+    bound = body.support(found.facet, found.motor_multipliers)
     largest = body.max_normal_force * body.bounded.size
     slack = largest * min(LAST_DIGITS * float(np.linalg.norm(twist)), HELD / length)
     return bound <= found.upper * min(1.0, -power) * (1.0 + FACET_SLACK) + slack

@@ -104,28 +104,7 @@ def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
             return _solved(program, strategy)
         except SolverError as error:
             failure = error
-    return _refuted_by_least_violation(program, failure)
-
-
-def _refuted_by_least_violation(program: LinearProgram, failure: SolverError) -> Infeasible:
-    """Prove a program infeasible by its least violation of some row.
-
-    The program with the violation as a further variable always has an optimum; the violation is
-    kept above -1 to bound it.
-    """
-    G, h = program.stacked()
-    rows = len(program.b)
-    relaxed = np.vstack([G, -G[rows:]])
-    limits = np.concatenate([h, -h[rows:]])
-    violation = np.append(np.zeros(G.shape[1]), -1.0)
-    with_violation = np.vstack([np.hstack([relaxed, -np.ones((len(relaxed), 1))]), violation])
-    limits = np.append(limits, 1.0)
-    answer = _solved(LinearProgram(violation, with_violation, limits), STRATEGIES[0])
-    if not isinstance(answer, Optimum) or answer.value > -RESIDUAL:
-        raise failure
-    multipliers = answer.multipliers[: len(G)].copy()
-    multipliers[rows:] -= answer.multipliers[len(G) : -1]
-    return _checked_ray(program, multipliers)
+    raise failure
 
 
 def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:

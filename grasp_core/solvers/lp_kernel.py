@@ -69,10 +69,7 @@ class Vertex(NamedTuple):
 
 @loop("numpy")
 def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int]:
-    """Find a best vertex of a program, or a row that contradicts others.
-
-    Takes `c` (n,). Gives how it ended, and the row that contradicts the basis, if one does.
-    """
+    """Find a best vertex: how that ended, and the row that contradicts the basis, if one does."""
     n, count, idle = len(c), len(rows.b), 0
     basis, y, x = vertex
     inverse, value = _corner(c, count, vertex)

@@ -1,8 +1,9 @@
-"""Finds the nearest points of polyhedra with the same normals by a dual active-set method.
+"""Finds the nearest point of a polyhedron by a dual active-set method, and checks it.
 
-    minimise |x|  subject to  C x <= d,  for every row d of D.
+    minimise |x|  subject to  C x <= d.
 
-Solved: x and multipliers u >= 0 with x = -C'u, which `qp` checks.
+A point x is nearest iff C x <= d and x = -C'u for some u >= 0 that vanishes off the active rows,
+where equality holds. Whoever asks is told by how much x and u miss these conditions.
 
 Method. With the rows a_1 .. a_q active, x is the nearest point of where these hold with equality,
 and their multipliers are not negative: x = 0 without any. If x violates a row a, write
@@ -56,39 +57,44 @@ class Active(NamedTuple):
 
 
 @loop()
-def solve(C: Array, D: Array, X: Array, U: Array) -> None:
-    """Find the nearest point of each polyhedron.
+def nearest(C: Array, d: Array, x: Array) -> tuple[float, float]:
+    """Find the nearest point, (v,), of the polyhedron C x <= d.
 
-    Takes `C` (m, v); `D`, `U` (n, m); `X` (n, v).
+    Gives by how much it misses the conditions, where the farthest row is at one and relative to x
+    if that is larger, and by how much it misses a row; infinite where none was found.
     """
-    m, v = C.shape
-    norms = np.empty(m)
+    (m, v), size = C.shape, 0.0
+    for k in range(m):
+        size = max(size, -d[k])
+    x.fill(0.0)
+    if size == 0.0:  # the origin is nearest to itself
+        return 0.0, -d.min()
+    unit, norms, u = d / size, np.empty(m), np.zeros(m)
     for k in range(m):
         norms[k] = max(np.sqrt(_dot(C[k], C[k])), TINY)
     active = Active(
-        np.empty(v + 1, np.int64), np.empty(m, np.bool_), np.empty((v, v)),
+        np.empty(v + 1, np.int64), np.zeros(m, np.bool_), np.empty((v, v)),
         np.empty((v, v + 1)), np.empty(v + 1), np.empty(v), np.empty(v),
     )  # fmt: skip
-    for i in range(len(D)):
-        count = _solve(C, D[i], norms, active, X[i])
-        if count < 0:
-            X[i].fill(0.0)
-            _contradiction(active, -1 - count, U[i])
-            continue
-        _recompute(D[i], active, count, X[i])
-        for j in range(count):
-            U[i, active.rows[j]] = active.u[j]
+    count = _active_at(C, unit, norms, active, x)
+    if count < 0:
+        return np.inf, np.inf
+    _recompute(unit, active, count, x)
+    largest = 1.0
+    for j in range(count):
+        u[active.rows[j]] = active.u[j]
+    for j in range(v):
+        largest = max(largest, abs(x[j]))
+    unmet, excess = _unmet(C, unit, x, u)
+    for j in range(v):
+        x[j] *= size
+    return unmet / largest, excess * size
 
 
 @loop()
-def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
-    """Find one nearest point; return how many rows are active there.
-
-    Where none was found, -1 less the number of rows that were active last is returned, or -1.
-    """
+def _active_at(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
+    """Find the rows that are active at the nearest point; return their number, or -1."""
     count = 0
-    x.fill(0.0)
-    active.inside.fill(False)
     for _ in range(MOST * (len(x) + 1)):
         entering, excess = _violated(C, d, norms, active.inside, x)
         if entering < 0:
@@ -96,31 +102,32 @@ def _solve(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
         active.rows[count], active.u[count] = entering, 0.0
         count = _enter(C, active, count, excess, DEPENDENT * norms[entering], x)
         if count < 0:
-            return count
+            break
     return -1
 
 
 @loop()
-def _contradiction(active: Active, count: int, weights: Array) -> None:
-    """Fill in weights with which the entering row and active rows sum to nothing.
-
-    They prove that no point meets these rows, if they are not negative and the sum of their
-    right-hand sides is below zero; whoever uses them checks that.
-    """
-    if count == 0:
-        return
-    weights[active.rows[count]] = 1.0
-    for j in range(count):
-        weights[active.rows[j]] = max(-active.r[j], 0.0)
+def _unmet(C: Array, d: Array, x: Array, u: Array) -> tuple[float, float]:
+    """Return by how much x and u miss the conditions of a nearest point, and a row C x <= d."""
+    unmet, excess, every = 0.0, -np.inf, 0.0
+    for j in range(len(x)):
+        total = x[j]
+        for k in range(len(d)):
+            total += u[k] * C[k, j]
+        unmet, every = max(unmet, abs(total)), every + total
+    for k in range(len(d)):
+        slack = d[k] - _dot(C[k], x)
+        excess, every = max(excess, -slack), every + slack
+        unmet = max(unmet, max(-slack, -u[k]))
+        if u[k] != 0.0:
+            unmet = max(unmet, slack)
+    # a sum shows whether any of them is not a number, which a comparison may not
+    return (unmet if abs(every) < np.inf else np.inf), excess
 
 
 @loop()
 def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
-    """Step until the entering row is active; return the number of active rows.
-
-    On failure, -1 less that number is returned. `least` is the length up to which a remainder
-    counts as zero.
-    """
+    """Step until the entering row is active; return the number of active rows, -1 on failure."""
     entering, z = active.rows[count], active.z
     for _ in range(count + 1):
         square = _split(C[entering], active, count)
@@ -139,7 +146,7 @@ def _enter(C: Array, active: Active, count: int, excess: float, least: float, x:
             active.inside[entering] = True
             return count + 1
         count = _drop(C, active, count, leaving)
-    return -1 - count
+    return -1
 
 
 @loop()

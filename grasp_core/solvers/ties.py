@@ -85,10 +85,7 @@ def few_digits(number: float, share: float) -> float:
 
 
 def ranks(values: ArrayLike, share: float = SAME_SHARE) -> Indices:
-    """Rank numbers, (n,): 0 for the smallest and all that equal it, 1 for the next, and so on.
-
-    Takes `values` (n,).
-    """
+    """Rank numbers, (n,): 0 for the smallest and all that equal it, 1 for the next, and so on."""
     numbers = np.asarray(values, dtype=np.float64)
     order = np.argsort(numbers, kind="stable")
     ordered = numbers[order]
@@ -112,10 +109,7 @@ def largest_first(values: ArrayLike) -> list[int]:
 
 
 def first_best(values: ArrayLike, margin: float | None = None) -> int:
-    """Find the index of the first value that equals the largest one within a margin.
-
-    Takes `values` (n,).
-    """
+    """Find the index of the first value, (n,), that equals the largest one within a margin."""
     numbers = np.asarray(values, dtype=np.float64)
     best = float(numbers.max())
     allowed = SAME_SHARE * abs(best) if margin is None else margin
@@ -129,15 +123,11 @@ def surpassing(best: float) -> float:
 
 
 def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAME_VALUE) -> Array:
-    """Find the optimum of a program that is nearest to the origin, (n,).
-
-    Gives a point that meets all rows with such a value; the optimum itself if the nearest one
-    cannot be found.
-    """
+    """Find the optimum nearest to the origin, (n,), or the optimum itself if it cannot be found."""
     G, h = program.stacked()
     kept = optimum.value - share * (1.0 + abs(optimum.value))
     equalities = slice(len(program.b), None)
     rows = np.vstack([G, -program.c[None], -G[equalities]])
     limits = np.concatenate([h, [-kept], -h[equalities]])
-    (x,) = least_distance(rows, limits[None], accuracy=FOUND)
+    x = least_distance(rows, limits, accuracy=FOUND)
     return x if float((rows @ x - limits).max()) <= FEASIBLE else optimum.x  # nor if there is none

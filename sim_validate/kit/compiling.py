@@ -92,7 +92,7 @@ PLANNING = Loops(
      "quality.ferrari_canny"),
     (
         partial(_planned, "concurrent", "pencil"),
-        partial(least_distance, CONTACTS[0][:3], -np.ones((1, 3))),
+        partial(least_distance, CONTACTS[0][:3], -np.ones(3)),
         partial(force_closure, *CONTACTS, FRICTION), partial(critical_friction, *CONTACTS),
         partial(_planned, "regulus"), partial(ferrari_canny, *CONTACTS, FRICTION, torque_scale=1.0),
         partial(toward, np.zeros((1, 3)), *np.array(CONTACTS)[:, None], np.full((1, 4), FRICTION)),

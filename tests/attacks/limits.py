@@ -11,8 +11,9 @@ import numpy as np
 
 import grasp_core as gc
 import grasp_core.quality.wrench_limits as checked
+from grasp_core.closure.contacts import to_center, to_origin
 from grasp_core.execution import carried_mass, squeeze_certificate
-from grasp_core.execution.payload import Payload
+from grasp_core.execution.carried_mass import Payload
 from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.quality.wrench_limits import body_of
 from tests.attacks.searching import Attack, cycled, power, tiny
@@ -80,8 +81,7 @@ def facet_of(c, rng):
 def weakest_ways(c):
     """Twists by how little power contact forces have on them, (6, 6)."""
     body = body_of(c.positions - c.center, c.normals, c.friction, c.max_normal_force, c.motors, 0.0)
-    ways = np.linalg.svd(body.G)[0].T / body.scale
-    return np.array([body.about_center(way) for way in ways])[::-1]
+    return to_origin(np.linalg.svd(body.G)[0].T, body.middle, body.size)[::-1]
 
 
 def lowered(c, best, off, facet, multipliers, rng):
@@ -133,9 +133,9 @@ def any_slack(monkeypatch):
     """A facet's slack grows with its length, as it once did."""
 
     def bounds(body, found):
-        twist = body.scaled(found.facet)
+        twist = to_center(found.facet, body.middle, body.size)
         far = body.bounded.size * float(np.linalg.norm(twist))
-        bound = body.scaled_support(twist, found.motor_multipliers)
+        bound = body.support(found.facet, found.motor_multipliers)
         return bound <= found.upper + 1e-12 * body.max_normal_force * far
 
     monkeypatch.setattr(checked, "bounds", bounds)

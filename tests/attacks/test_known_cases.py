@@ -11,8 +11,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.objects.face_pieces import unit_pieces
-from grasp_core.quality.ferrari_canny import FerrariCanny
-from grasp_core.quality.inner_polytope import RAYS, InnerPolytope
+from grasp_core.quality.ferrari_canny import RAYS, FerrariCanny, InnerPolytope
 from grasp_core.quality.wrench_limits import WrenchLimit
 from tests.attacks import contacts, faces, limits, wrench_sets
 from tests.attacks.searching import attacked

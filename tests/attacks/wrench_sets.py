@@ -15,8 +15,7 @@ import grasp_core.quality.measures as resisted
 from grasp_core.closure import wrench_sets
 from grasp_core.closure.wrench_sets import WrenchSet, into_cones
 from grasp_core.quality import ferrari_canny
-from grasp_core.quality.ferrari_canny import FerrariCanny, wrench_set_quality
-from grasp_core.quality.inner_polytope import RAYS, InnerPolytope
+from grasp_core.quality.ferrari_canny import RAYS, FerrariCanny, InnerPolytope, wrench_set_quality
 from grasp_core.quality.measures import Measure, resisted_loads, task_limits
 from tests.attacks.searching import Attack, always, cycled, power
 from tests.judges import random_contacts

@@ -54,7 +54,7 @@ from grasp_core.compiled import compiled, state_of
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 found = gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, 0.5)
 print(found.forces.tobytes().hex(), found.margin.hex())
-print(state_of(compiled("grasp_core.solvers.nearest_point_kernel").solve))
+print(state_of(compiled("grasp_core.solvers.nearest_point_kernel").nearest))
 """
 
 

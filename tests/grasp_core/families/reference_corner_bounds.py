@@ -1,11 +1,11 @@
-"""Reference for `disc_bounds_kernel`: its bounds (1) and (2) in NumPy."""
+"""Reference for `placing_kernel`: its bounds (1) and (2) in NumPy."""
 
 from itertools import combinations
 
 import numpy as np
 
 from grasp_core.families.disc_bounds import pencil_radius_bounds
-from grasp_core.families.disc_bounds_kernel import SAME_AXIS
+from grasp_core.families.placing_kernel import SAME_AXIS
 from grasp_core.values import FINGERS
 from tests.judges import balancing_weights
 

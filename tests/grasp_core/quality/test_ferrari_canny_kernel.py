@@ -12,7 +12,7 @@ import grasp_core as gc
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.quality import ferrari_canny as module
-from grasp_core.quality.inner_polytope import InnerPolytope
+from grasp_core.quality.ferrari_canny import InnerPolytope
 from scenes.example_objects import example_object
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 from tests.tampering.changes import forged

@@ -1,14 +1,11 @@
 """Compiled nearest points by the conditions of optimality, and what becomes of wrong ones."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.optimize import nnls
 
 from grasp_core.compiled import compiled
-from grasp_core.solvers import qp as module
-from grasp_core.solvers.qp import least_distance
+from grasp_core.solvers.qp import KERNEL, NEAREST, least_distance
 
 NEAR = 1e-9
 CLOSE = 1e-10
@@ -44,8 +41,8 @@ def unmet(C, d, x):
 def test_points_are_nearest():
     moved = 0
     for C, D, points in polyhedra(240):
-        found = least_distance(C, D)
-        for d, x, known in zip(D, found, points, strict=True):
+        for d, known in zip(D, points, strict=True):
+            x = least_distance(C, d)
             assert unmet(C, d, x) <= CLOSE
             assert np.linalg.norm(x) <= np.linalg.norm(known) * (1.0 + NEAR)
             moved += x.any()
@@ -55,9 +52,8 @@ def test_points_are_nearest():
 def test_a_corner_and_an_edge_by_hand():
     C = np.array([[-1.0, 0.0], [0.0, -1.0], [1.0, 1.0]])
     D = np.array([[-3.0, -4.0, 8.0], [-3.0, 1.0, 8.0], [1.0, 1.0, -2.0], [1.0, 1.0, 0.0]])
-    np.testing.assert_allclose(
-        least_distance(C, D), [[3, 4], [3, 0], [-1, -1], [0, 0]], rtol=0.0, atol=1e-14
-    )
+    for d, expected in zip(D, [[3, 4], [3, 0], [-1, -1], [0, 0]], strict=True):
+        np.testing.assert_allclose(least_distance(C, d), expected, rtol=0.0, atol=1e-14)
 
 
 def test_where_nothing_is_feasible_no_point_is_found():
@@ -68,44 +64,30 @@ def test_where_nothing_is_feasible_no_point_is_found():
         C[1] = 0.0 if trial % 2 else -C[0]
         D = rng.uniform(0.5, 1.0, size=(3, 12))
         D[1, 0], D[1, 1] = -1.0, -0.5
-        found = least_distance(C, D)
+        found = np.array([least_distance(C, d) for d in D])
         assert np.isnan(found[1]).all()
         assert not np.isnan(found[[0, 2]]).any()
 
 
-def test_no_variables_and_no_polyhedra_leave_nothing_to_find():
-    assert least_distance(np.ones((3, 2)), np.empty((0, 3))).shape == (0, 2)
-    assert least_distance(np.empty((3, 0)), np.ones((5, 3))).shape == (5, 0)
+def test_without_variables_rows_hold_or_nothing_is_found():
+    assert least_distance(np.empty((3, 0)), np.ones(3)).shape == (0,)
+    kernel, none = compiled(KERNEL), np.empty(0)
+    assert kernel.nearest(np.empty((3, 0)), -np.ones(3), none) == (np.inf, np.inf)
 
 
-def spoiled(change):
-    kernel = compiled(module.KERNEL)
-
-    def solve(C, D, X, U):
-        kernel.solve(C, D, X, U)
-        change(X, U)
-
-    return SimpleNamespace(solve=solve)
-
-
-def times(factor, which):
-    def change(*answer):
-        answer[which][:] *= factor
-
-    return change
-
-
-@pytest.mark.parametrize(
-    "change",
-    [times(1.0 + 1e-9, 0), times(1.0 + 1e-9, 1), times(0.0, 0), times(0.0, 1), times(-1.0, 1),
-     times(np.nan, 0), times(np.nan, 1)],
-)  # fmt: skip
-def test_wrong_answers_are_not_taken(monkeypatch, change):
+@pytest.mark.parametrize("factor", [1.0 + 1e-9, 0.0, -1.0, np.nan])
+@pytest.mark.parametrize("which", ["point", "multipliers"])
+def test_wrong_answers_are_not_taken(factor, which):
+    """Of polyhedra whose farthest row is at one, as the kernel scales them."""
+    missed, kernel = compiled(KERNEL)._unmet, compiled(KERNEL)
     for C, D, _ in polyhedra(12):
-        expected = least_distance(C, D)
-        with monkeypatch.context() as patch:
-            patch.setattr(module, "compiled", lambda _: spoiled(change))
-            found = least_distance(C, D)
-        taken = ~np.isnan(found[:, 0])
-        np.testing.assert_allclose(found[taken], expected[taken], rtol=0.0, atol=NEAR)
-        assert not taken[expected.any(axis=1)].any()
+        for d in D[D.min(axis=1) < 0.0]:
+            x, d = np.empty(C.shape[1]), d / -d.min()
+            off, excess = kernel.nearest(C, d, x)
+            assert max(off, excess) <= NEAREST
+            slack, u = d - C @ x, np.zeros(len(d))
+            active = np.flatnonzero(slack <= NEAR * max(np.abs(x).max(), 1.0))
+            u[active] = nnls(C[active].T, -x)[0]
+            assert missed(C, d, x, u)[0] <= NEAR
+            x, u = (factor * x, u) if which == "point" else (x, factor * u)
+            assert not missed(C, d, x, u)[0] <= NEAREST * max(np.abs(x).max(), 1.0)
