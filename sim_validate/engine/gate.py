@@ -54,7 +54,8 @@ from grasp_core.provenance import versions
 from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, Load, Schedule, first_touch
+from scenes.mujoco.closure_scene import Scene
+from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, Load, Schedule
 from sim_validate.engine.rig import (
     Rig,
     SimulatedLimit,
@@ -447,7 +448,8 @@ def worst_touch(
     size = rigid.scene(body, contacts, 1.0).layout.grasp_size_m
     depth = DEPTH * body.radius
     fingers = replace(rigid.fingers, indentation=depth / size)
-    normals, depths = first_touch(replace(rigid, fingers=fingers).scene(body, contacts, 1.0))
+    scene = replace(rigid, fingers=fingers).scene(body, contacts, 1.0)
+    normals, depths = Bench(scene).touched(tips_of(scene))
     turned = angles(normals, np.array([contact.normal for contact in contacts]))
     off = np.abs(depths / depth - 1.0)
     errors = np.nan_to_num(np.maximum(turned / NORMAL_ERROR, off / DEPTH_ERROR), nan=np.inf)
@@ -461,9 +463,14 @@ def angles(normals: Array, faces: Array) -> Array:
     return np.arctan2(across, np.einsum("ki,ki->k", normals, faces))
 
 
-def require_touch(bench: Bench) -> None:
+def tips_of(scene: Scene) -> list[str]:
+    """Return the names of the fingertips of a scene."""
+    return [f"finger{finger}" for finger in range(len(scene.layout.contacts))]
+
+
+def require_touch(bench: Bench[Scene]) -> None:
     """Check that each fingertip touches the object at its start as the face lies."""
-    normals = bench.first_normals()
+    normals, _ = bench.touched(tips_of(bench.scene), one=False)
     turned = angles(normals, bench.scene.layout.frames[:, :, 0])
     finger = int(np.argmax(np.nan_to_num(turned, nan=np.inf)))
     if not turned[finger] <= NORMAL_ERROR:

@@ -74,7 +74,7 @@ class Watched:
 class Rig:
     """An object without load, squeezed by its fingers."""
 
-    bench: Bench
+    bench: Bench[Scene]
     setup: Setup
     friction: float
     """The friction at which the object is to be held."""
@@ -99,7 +99,7 @@ class Rig:
     def watch(self, load: Load, settling_frictions: Sequence[float] | None = None) -> Watched:
         """Simulate one whole hold, and keep all motion since the fingers closed."""
         (schedule,) = self.holds([load], settling_frictions)
-        (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
+        (motion,) = self._simulated([schedule])
         (found,) = self._traced([schedule], [motion])
         before = [] if self.closed is None else [self.closed.joints[-1:]]
         count = len(motion.joints)
@@ -140,7 +140,7 @@ class Rig:
         assert self.closed is not None  # noqa: S101 - rigid fingers have not closed
         protocol = self.setup.friction
         trial = Schedule.settle(self.idle, settling_friction, self.bench.sample_s, protocol)
-        (motion,) = self.bench.run([trial], self.closed.state)
+        (motion,) = self._simulated([trial])
         return replace(self, closed=motion.after(self.closed), settled=True)
 
     def release(
@@ -161,8 +161,14 @@ class Rig:
 
     def joints(self, trials: Sequence[Schedule]) -> Array:
         """Return joint positions in trials, from closed fingers on, (trials, n, 7 + 3k)."""
-        motions = self.bench.run(trials, self.closed and self.closed.state)
-        return np.array([motion.joints for motion in motions])
+        return np.array([motion.joints for motion in self._simulated(trials)])
+
+    def _simulated(
+        self, trials: Sequence[Schedule], ends: EarlyEnds | None = None
+    ) -> tuple[Motion, ...]:
+        told = [trial.told(self.bench.scene.layout) for trial in trials]
+        start = self.closed and self.closed.state
+        return self.bench.simulated(told, start, ends and ends.following)
 
     def _traces(
         self, trials: Sequence[Schedule], limits: Thresholds | None = None
@@ -171,7 +177,7 @@ class Rig:
         if limits is not None and not self.whole:
             at = None if closed is None or not len(closed.joints) else closed.joints[-1]
             ends = EarlyEnds(bench.scene.layout, trials, bench.sample_s, limits, at)
-        return self._traced(trials, bench.run(trials, closed and closed.state, ends))
+        return self._traced(trials, self._simulated(trials, ends))
 
     def _traced(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
         closed = self.closed
@@ -194,12 +200,13 @@ def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
 
 
 def squeezed(
-    bench: Bench, setup: Setup, forces: Array, friction: float,
+    bench: Bench[Scene], setup: Setup, forces: Array, friction: float,
     settling_friction: float | None = None,
 ) -> Rig:  # fmt: skip
     """Close the fingers of a compiled scene on the unloaded object."""
     high = settling_friction or setup.hold.settling_friction * friction
-    (closed,) = bench.run([Schedule.squeeze(forces, high, bench.sample_s, setup.hold)])
+    closing = Schedule.squeeze(forces, high, bench.sample_s, setup.hold)
+    (closed,) = bench.simulated([closing.told(bench.scene.layout)])
     return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed)
 
 
@@ -338,7 +345,7 @@ class CriticalFriction(Declared):
 
 
 def released_friction(
-    bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup, *,
+    bench: Bench[Scene], positions: Array, normals: Array, predicted: float, setup: Setup, *,
     whole: bool = False,
 ) -> CriticalFriction:  # fmt: skip
     """Measure the critical friction of a grasp whose scene is compiled with any friction."""

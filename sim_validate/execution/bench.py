@@ -27,9 +27,6 @@ the cone counts only if the contact slides by more than `TOUCHED` in it, or if t
 full load.
 """
 
-# pyright: basic, reportAttributeAccessIssue=false
-# MuJoCo ships no types for its core; plain arrays and numbers leave this module.
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -44,11 +41,11 @@ from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held import HeldLayout, hinged, rotations
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, palm_armature
 from scenes.mujoco.mjcf_text import quaternion
-from sim_validate.engine.bench import Health, batch, compiled, mujoco, stepped, touched
+from sim_validate.engine.bench import FREE, PALM, Bench, Health, Motion, Told
 from sim_validate.execution.paths import WHOLE, Drive, Table
 
-FREE, PALM = 6, 12
-"""Joint velocities up to the end of the object's, and up to the end of the palm's."""
+KEPT = ("qvel", "qfrc_constraint", "state")
+"""What is read beside the positions of joints."""
 BOUNDLESS = 1e100
 """Size from which on a number of the simulator says nothing."""
 LAID = 1e-7
@@ -110,131 +107,75 @@ def begun_motion(motion: HeldMotion, count: int) -> HeldMotion:
     return HeldMotion(**first, health=Health())
 
 
-class HeldBench:
+class HeldBench(Bench[HeldScene]):
     """A compiled scene of execution on which many trials run at once."""
 
     def __init__(
         self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
         lost_m: float = math.inf, step_s: float | None = None,
     ) -> None:  # fmt: skip
-        self.scene, self.threads, self.lost_m = scene, threads, lost_m
-        self.model = compiled(scene.xml)
-        if step_s is None:
-            step_s = float(self.model.opt.timestep)
-        self.model.opt.timestep = self.step_s = step_s
-        self.chunk = max(1, round(sample_s / step_s))
-        self.sample_s = self.chunk * step_s
-        if sample_s == SAMPLE_S and abs(self.sample_s - SAMPLE_S) > WHOLE * SAMPLE_S:
+        step_s = scene.physics.timestep if step_s is None else step_s
+        chunk = max(1, round(sample_s / step_s))
+        if sample_s == SAMPLE_S and abs(chunk * step_s - SAMPLE_S) > WHOLE * SAMPLE_S:
             raise InputError(
                 f"physics.timestep must divide the sample of {SAMPLE_S:g} s, got {step_s:g} s; "
                 "take 0.00125 s"
             )
-        self.body = self.model.body("object").id
-        self.tips = [self.model.geom(name).id for name in scene.layout.tip_names]
+        super().__init__(scene, threads=threads, chunk=chunk, step_s=step_s, kept=KEPT)
+        self.lost_m = lost_m
+        self.tips = self.shapes(scene.layout.tip_names)
+        self.rubbing = slice(min(self.tips), max(self.tips) + 1)
 
-    def run(
-        self, drives: Sequence[Drive], start: Array | None = None, friction: Array | None = None,
-        lost: Sequence[tuple[float, float]] | None = None,
-    ) -> tuple[HeldMotion, ...]:  # fmt: skip
-        """Simulate trials, all from the same state or from their own start.
+    def run(self, drives: Sequence[Drive], start: Array | None = None) -> tuple[HeldMotion, ...]:
+        """Simulate trials, all from the same state, (size,), or from one each, (n, size)."""
+        losing = _Losing([drive.lost or (self.lost_m, math.inf) for drive in drives])
+        told = [self._told_by(drive, fresh=start is None) for drive in drives]
+        motions = self.simulated(told, start, losing.following)
+        return tuple(
+            self._motion(motion, len(drive), lost=place in losing.lost)
+            for place, (motion, drive) in enumerate(zip(motions, drives, strict=True))
+        )
 
-        Takes `start` (size,) or (n, size); `friction` (k,) or (n, k). Trials end where the object
-        is `lost`, farther from its planned place in the hand, or turned by more [m, rad].
-        """
-        trials = self._begun(drives, start, friction)
-        return self._stepped(trials, drives, lost or [(self.lost_m, math.inf)] * len(drives))
-
-    def settled(
-        self, drive: Drive, start: Array | None = None, friction: Array | None = None
-    ) -> tuple[HeldMotion, Array]:
+    def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
-        (motion,) = self.run([drive], start, friction)
+        (motion,) = self.run([drive], start)
         return motion, motion.states[-1]
 
-    def touched(self, reached: Array) -> tuple[Array, Array]:
-        """Find what each fingertip touches before anything moves, as `bench.touched` gives it."""
-        data = mujoco.MjData(self.model)
-        data.qpos[PALM + 1 :] = self.scene.layout.joints(reached)
-        return touched(self.model, data, self.tips)
+    def placed(self, reached: Array | None) -> Array:
+        """Return the positions of all joints where fingertips are displaced along their springs."""
+        joints = self.home.copy()
+        if reached is not None:
+            joints[PALM + 1 :] = self.scene.layout.joints(reached)
+        return joints
 
-    def _begun(
-        self, drives: Sequence[Drive], start: Array | None, friction: Array | None
-    ) -> batch.Batch:
-        trials = batch.Batch(self.model, len(drives), self.threads)
-        trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        if start is not None:
-            trials.state[:] = start
-        joints, speeds = trials.bind("qpos"), trials.bind("qvel")
-        for place, drive in enumerate(drives):
-            if drive.pose is not None and start is None:
-                joints[place, :7] = [*drive.pose.moved, *drive.pose.quaternion]
-            if drive.reached is not None and start is None:
-                joints[place, PALM + 1 :] = self.scene.layout.joints(drive.reached)
-            speeds[place, :3] += drive.velocity
-            speeds[place, FREE : FREE + 3] += drive.velocity
-            if drive.table is not None:  # where it touches: objects would fall, sink and rise
-                into = LAID * self.scene.layout.radius_m
-                trials.bind("mocap_pos")[place, 0] = drive.table.point + into * drive.table.normal
-                trials.bind("mocap_quat")[place, 0] = quaternion(facing(drive.table))
-        if friction is not None:
-            trials.expand("geom_friction")[:, self.tips, 0] = friction
-        return trials
-
-    def _stepped(
-        self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence[tuple[float, float]]
-    ) -> tuple[HeldMotion, ...]:
-        lengths = [len(drive) for drive in drives]
-        loads, motors, commands = self._applied(drives, max(lengths))
-        joints, lost = trials.bind("qpos"), np.zeros(len(drives), dtype=bool)
-        most_m, most_rad = np.transpose(limits)
-        least_cosine = np.cos(np.minimum(most_rad, math.pi))
-        turns_count = bool((least_cosine > -1.0).any())
-
-        def following(going: Indices, samples: Indices) -> Indices:
-            with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
-                away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
-                gone = away > most_m[going]
-                if turns_count:
-                    palm = hinged(joints[going, 10 : PALM + 1]).transpose(0, 2, 1)
-                    gone |= cosines(palm @ rotations(joints[going, 3:7])) < least_cosine[going]
-            lost[going] = gone
-            return np.where(gone, max(lengths), samples + 1)
-
-        told = [
-            (trials.bind("xfrc_applied")[:, self.body], loads),
-            (trials.bind("qfrc_applied")[:, FREE:PALM], motors), (trials.bind("ctrl"), commands),
-        ]  # fmt: skip
-        kept = [joints, trials.bind("qvel"), trials.bind("qfrc_constraint"), trials.state]
-        done = stepped(self.model, trials, self.chunk, told, kept, lengths, following)
-        moved, speeds, forces, states = done.series
-        for trial in np.flatnonzero(lost):  # it stays where it was lost
-            last = done.counts[trial] - 1
-            moved[trial, last:], forces[trial, last:] = moved[trial, last], 0.0
-        return tuple(
-            self._motion(
-                moved[trial, :length], speeds[trial, :length], forces[trial, :length],
-                states[trial, :length], done.health[trial],
-            )
-            for trial, length in enumerate(lengths)
+    def _told_by(self, drive: Drive, *, fresh: bool) -> Told:
+        """Return what a drive tells the scene; where its trial is fresh, it begins in its pose."""
+        layout, n, joints, table, friction = self.scene.layout, len(drive), None, None, None
+        loads = drive.wrenches.copy()
+        loads[:, :3] += layout.object_kg * (drive.gravity - layout.gravity)
+        if fresh:
+            joints = self.placed(drive.reached)
+            if drive.pose is not None:
+                joints[:7] = [*drive.pose.moved, *drive.pose.quaternion]
+        if drive.table is not None:  # where it touches: objects would fall, sink and rise
+            point = drive.table.point + LAID * layout.radius_m * drive.table.normal
+            table = np.tile([*point, *quaternion(facing(drive.table))], (n, 1))
+        if drive.friction is not None:
+            friction = np.tile(self.roughness[self.rubbing], (n, 1))
+            friction[:, np.array(self.tips) - self.rubbing.start] = drive.friction
+        return Told(
+            loads, layout.commands(drive.grasping.reshape(n, -1), drive.reached),
+            drive.accelerations * palm_armature(layout), friction, table, joints, drive.velocity,
         )  # fmt: skip
 
-    def _applied(self, drives: Sequence[Drive], most: int) -> tuple[Array, Array, Array]:
-        """Return loads, forces of the palm and commands, (trials, n, ...); zero after an end."""
-        layout = self.scene.layout
-        loads = np.zeros((len(drives), most, 6))
-        motors = np.zeros((len(drives), most, PALM - FREE))
-        commands = np.zeros((len(drives), most, self.model.nu))
-        for place, drive in enumerate(drives):
-            n = len(drive)
-            loads[place, :n] = drive.wrenches
-            loads[place, :n, :3] += layout.object_kg * (drive.gravity - layout.gravity)
-            motors[place, :n] = drive.accelerations * palm_armature(layout)
-            commands[place, :n] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
-        return loads, motors, commands
-
-    def _motion(
-        self, joints: Array, speeds: Array, forces: Array, states: Array, health: Health
-    ) -> HeldMotion:
+    def _motion(self, motion: Motion, length: int, *, lost: bool) -> HeldMotion:
+        """See a motion as that of a held object, which stays where it was lost."""
+        last = len(motion.joints) - 1
+        rest = ((0, length - 1 - last), (0, 0))
+        joints = np.pad(motion.joints, rest, mode="edge")
+        speeds, forces, states = (np.pad(each, rest) for each in motion.kept)
+        if lost:
+            forces[last:] = 0.0
         # where the simulator diverges: what is beyond all bounds has no cosine and no square
         joints, speeds, forces = (
             np.where(np.abs(each) < BOUNDLESS, each, np.nan) for each in (joints, speeds, forces)
@@ -254,8 +195,28 @@ class HeldBench:
         finger_forces = np.einsum("kij,nkj->ni", layout.axes, contact)
         return HeldMotion(
             joints[:, :3], joints[:, 3:7], palm, fingers, tips, contact, pressed,
-            forces[:, :3] - finger_forces, states, health, turns,
+            forces[:, :3] - finger_forces, states, motion.health, turns,
         )  # fmt: skip
+
+
+class _Losing:
+    """Ends trials where their object is farther from its place, or turned by more, than it may."""
+
+    def __init__(self, limits: Sequence[tuple[float, float]]) -> None:
+        self.most_m, most_rad = np.transpose(limits)
+        self.least_cosine = np.cos(np.minimum(most_rad, math.pi))
+        self.lost = set[int]()
+
+    def following(self, going: Indices, samples: Indices, joints: Array, _speeds: Array) -> Indices:
+        """Give the sample after one for each trial that goes on (see `Bench.simulated`)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
+            now = joints[going]
+            gone = np.linalg.norm(now[:, :3] - now[:, 7:10], axis=1) > self.most_m[going]
+            if (self.least_cosine > -1.0).any():
+                palm = hinged(now[:, 10 : PALM + 1]).transpose(0, 2, 1)
+                gone |= cosines(palm @ rotations(now[:, 3:7])) < self.least_cosine[going]
+        self.lost |= set(going[gone].tolist())
+        return np.where(gone, np.iinfo(np.intp).max, samples + 1)
 
 
 def cosines(turned: Array) -> Array:

@@ -24,7 +24,6 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
 from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
@@ -97,14 +96,12 @@ def run_again(
 ) -> Iterator[HeldMotion]:  # fmt: skip
     """Yield motions in which trials are simulated with short steps from before their trouble on."""
     begins = [_begin(trial, motion, bench) for trial, motion in zip(trials, motions, strict=True)]
-    again = bench.run(
-        [_rest(trial, begin) for trial, begin in zip(trials, begins, strict=True)],
-        np.stack([motion.states[begin] for motion, begin in zip(motions, begins, strict=True)]),
-        lost=[
-            _lost(motion, trial.begun, settings)
-            for trial, motion in zip(trials, motions, strict=True)
-        ],
-    )  # fmt: skip
+    drives = [
+        replace(_rest(trial, begin), lost=_lost(motion, trial.begun, settings))
+        for trial, motion, begin in zip(trials, motions, begins, strict=True)
+    ]
+    starts = [motion.states[begin] for motion, begin in zip(motions, begins, strict=True)]
+    again = bench.run(drives, np.stack(starts))
     for motion, begin, rest in zip(motions, begins, again, strict=True):
         yield motions_joined(begun_motion(motion, begin + 1), rest)
 
@@ -313,13 +310,8 @@ def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> 
     return moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
 
 
-def run_trials(
-    bench: HeldBench, trials: Sequence[Trial], friction: Array | None = None
-) -> tuple[HeldMotion, ...]:
-    """Simulate trials: some with open fingers, others from a squeezed object or its weight.
-
-    Contacts may have another friction, (k,), once the object is squeezed.
-    """
+def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:
+    """Simulate trials: some with open fingers, others from a squeezed object or its weight."""
     _, squeezed = bench.settled(paths.closing())
     found = dict[Trial, HeldMotion]()
     if weighing := [trial for trial in trials if trial.weighing]:
@@ -327,15 +319,15 @@ def run_trials(
         # has come: uniform motion changes nothing.
         parts = [parted(trial.drive, trial.weighing) for trial in weighing]
         still = replace(parts[0][0], velocity=np.zeros(3))
-        weight, state = bench.settled(still, squeezed, friction)
-        motions = bench.run([after for _, after in parts], state, friction)
+        weight, state = bench.settled(still, squeezed)
+        motions = bench.run([after for _, after in parts], state)
         for trial, motion in zip(weighing, motions, strict=True):
             found[trial] = motions_joined(weight, motion)
     apart = [trial for trial in trials if trial.apart]
     others = [trial for trial in trials if not (trial.weighing or trial.apart)]
     for own, start in ((apart, None), (others, squeezed)):
         if own:
-            motions = bench.run([trial.drive for trial in own], start, friction)
+            motions = bench.run([trial.drive for trial in own], start)
             found |= dict(zip(own, motions, strict=True))
     return tuple(found[trial] for trial in trials)
 
@@ -365,10 +357,13 @@ def _with_first_slips(
     ]  # fmt: skip
     if sudden:
         friction = bench.scene.layout.friction
-        stuck = run_trials(bench, [trials[place] for place in sudden], STICKING * friction)
-        for place, motion in zip(sudden, stuck, strict=True):
-            multiple = sticking_multiple(motion, bench.scene.layout, trials[place].drive,
-                                         friction, trials[place].begun)  # fmt: skip
+        rough = [
+            replace(trial, drive=replace(trial.drive, friction=STICKING * friction))
+            for trial in (trials[place] for place in sudden)
+        ]
+        for place, trial, motion in zip(sudden, rough, run_trials(bench, rough), strict=True):
+            multiple = sticking_multiple(motion, bench.scene.layout, trial.drive, friction,
+                                         trial.begun)  # fmt: skip
             known[place] = replace(known[place], simulated_first_slip=min(multiple, 1.0))
     return known
 

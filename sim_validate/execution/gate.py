@@ -520,7 +520,7 @@ def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
     bench = HeldBench(scene)
     into = DEPTH * case.radius_m * normals
     reached = np.einsum("kij,ki->kj", scene.layout.axes, into)
-    found, depths = bench.touched(reached)
+    found, depths = bench.touched(scene.layout.tip_names, bench.placed(reached))
     off = np.abs(depths / ((DEPTH + TOUCH) * case.radius_m) - 1.0)
     motion, _ = bench.settled(paths.closing(SETTLE_S))
     forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])

@@ -66,6 +66,10 @@ class Drive:
     """Displacements of the fingertips along their springs at the start, (k, 3) [m], from where
     their commands then count; None for none."""
     table: Table | None = None
+    friction: Array | None = None
+    """Frictions of the fingertips, (k,); None for those of the scene."""
+    lost: tuple[float, float] | None = None
+    """How far from its planned place in the hand, or turned, the object ends the trial [m, rad]."""
 
     def __len__(self) -> int:
         return len(self.shares)

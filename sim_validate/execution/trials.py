@@ -313,8 +313,9 @@ def run_controls(
     weaker, drives = tuple(weaker_grips(best, layout)), list[Drive]()
     for each in weaker:
         drive = joined(closing, replace(loading, wrenches=share[:, None] * each.load))
-        drives.append(replace(drive, grasping=np.outer(drive.grasping, each.pushing)))
-    motions = bench.run(drives, friction=np.array([each.friction for each in weaker]))
+        grasping = np.outer(drive.grasping, each.pushing)
+        drives.append(replace(drive, grasping=grasping, friction=each.friction))
+    motions = bench.run(drives)
     return tuple(
         _judged(each, motion, layout, drive, len(closing) - 1)
         for each, motion, drive in zip(weaker, motions, drives, strict=True)

@@ -14,15 +14,15 @@ constant speed does to an object whose centre is not on its axis.
 # MuJoCo ships no types for its core; plain arrays and numbers leave this module.
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.declared import Declared
 from grasp_core.kinds import Measured, Number
 from scenes.mujoco.tested import TestedScene
-from sim_validate.engine.bench import batch, compiled, mujoco, samples, stepped
+from sim_validate.engine.bench import Bench, Motion, Told, mujoco, samples
 from sim_validate.engine.traces import rotation_angles
 from sim_validate.protocols.published import Passing, PublishedProtocol, Run
 
@@ -35,24 +35,20 @@ AT_REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Timeline:
+class Timeline(Told):
     """What is told to the servos and acts on the object in each of the n samples of a run."""
 
-    commands: Array
-    """Commands of the servos, (n, u) [m or rad], as in `TestedScene`."""
-    wrenches: Array
-    """Force and torque on the object, along the world's axes, (n, 6) [N, N m]."""
-    looks: tuple[int, ...]
+    looks: tuple[int, ...] = ()
+    """Samples after which the object is looked at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """The object in each of the n samples of a run, and which fingers touch it at each look."""
+class Look:
+    """The object at a look, and how many fingers touch it."""
 
-    poses: Array
-    """Position of the object's centre of mass and its orientation (w, x, y, z), (n, 7)."""
-    touching: tuple[frozenset[int], ...]
-    fault: str
+    pose: Array
+    """Position of the object's centre of mass and its orientation (w, x, y, z), (7,)."""
+    fingers: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +70,36 @@ def their_verdict(
     protocol: PublishedProtocol, scene: TestedScene, threads: int = 1
 ) -> tuple[RunVerdict, ...]:
     """Simulate all runs of a test and judge each."""
-    runs = [timeline(protocol, scene, run) for run in protocol.runs]
-    began = scene.opened if protocol.close_s else scene.shut
-    motions = TestBench(scene, threads).run(runs, began)
+    bench = Bench(scene, threads=threads, chunk=CHUNK, kept=("state",))
+    begun = np.concatenate([AT_REST, scene.opened if protocol.close_s else scene.shut])
+    root = FREE * bench.model.nmocap  # where one moves as told, its pose comes first
+    runs = [
+        replace(run, mocap=run.commands[:, :root] if root else None,
+                commands=run.commands[:, root:], joints=begun)
+        for run in (timeline(protocol, scene, steps) for steps in protocol.runs)
+    ]  # fmt: skip
     return tuple(
-        judged_run(number, motion, run, protocol.passing)
-        for number, (motion, run) in enumerate(zip(motions, runs, strict=True))
+        judged_run(number, looked(bench, motion, run.looks), motion.health.fault, protocol.passing)
+        for number, (motion, run) in enumerate(zip(bench.simulated(runs), runs, strict=True))
     )
+
+
+def looked(bench: Bench[TestedScene], motion: Motion, looks: Sequence[int]) -> list[Look]:
+    """Look at the object after some samples of a motion."""
+    model, (states,) = bench.model, motion.kept
+    data, fingers = mujoco.MjData(model), bench.scene.fingers
+    of = {model.body(name).id: own for own, names in enumerate(fingers) for name in names}
+    found = list[Look]()
+    for sample in looks:
+        met = list[int]()
+        if np.isfinite(states[sample]).all():
+            mujoco.mj_setState(model, data, states[sample], mujoco.mjtState.mjSTATE_INTEGRATION)
+            mujoco.mj_forward(model, data)
+            bodies = model.geom_bodyid[data.contact.geom]
+            met = bodies[(bodies == bench.body).any(axis=1)].ravel().tolist()
+        touching = {of[body] for body in met if body in of}
+        found.append(Look(motion.joints[sample, :FREE], len(touching)))
+    return found
 
 
 def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timeline:
@@ -98,7 +117,7 @@ def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timel
     wrenches[len(closing) :] = _wrenches(run, counts, scene, sample_s)
     wrenches = (wrenches.reshape(n, 2, 3) @ scene.axes.T).reshape(n, 6)
     held = np.broadcast_to(scene.squeezing, (sum(counts), len(scene.squeezing)))
-    return Timeline(np.vstack([closing, held]), wrenches, tuple(looks))
+    return Timeline(wrenches, np.vstack([closing, held]), looks=tuple(looks))
 
 
 def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -> Array:
@@ -137,90 +156,21 @@ def _acceleration(path: Array, sample_s: float) -> Array:
     return (speeds - before) / sample_s
 
 
-class TestBench:
-    """A compiled scene on which the runs of a test are simulated together."""
-
-    __test__ = False  # no class of tests, whatever its name begins with
-
-    def __init__(self, scene: TestedScene, threads: int = 1) -> None:
-        self.scene, self.threads = scene, threads
-        self.model = compiled(scene.xml)
-        self.data = mujoco.MjData(self.model)
-        self.body = self.model.body("object").id
-        self.fingers = {
-            self.model.body(name).id: finger
-            for finger, names in enumerate(scene.fingers)
-            for name in names
-        }
-
-    def run(self, runs: Sequence[Timeline], began: Array) -> tuple[Motion, ...]:
-        """Simulate runs, all from the same fingers, `began` (u,)."""
-        lengths = [len(each.commands) for each in runs]
-        trials = batch.Batch(self.model, max(len(runs), 2), self.threads)
-        trials.reset(np.arange(len(runs)), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        joints = trials.bind("qpos")
-        joints[: len(runs), :FREE], joints[: len(runs), FREE:] = AT_REST, began
-        touching: list[list[frozenset[int]]] = [[] for _ in runs]
-
-        def following(going: Indices, samples: Indices) -> Indices:
-            for place, sample in zip(going.tolist(), samples.tolist(), strict=True):
-                if sample in runs[place].looks:
-                    touching[place].append(self._touching(trials.state[place]))
-            return samples + 1
-
-        told = self._told(trials, runs, max(lengths))
-        done = stepped(self.model, trials, CHUNK, told, [joints[:, :FREE]], lengths, following)
-        return tuple(
-            Motion(done.series[0][place, :length], tuple(touching[place]), done.health[place].fault)
-            for place, length in enumerate(lengths)
-        )
-
-    def _told(
-        self, trials: "batch.Batch", runs: Sequence[Timeline], most: int
-    ) -> list[tuple[Array, Array]]:
-        """Return what is told in each sample: wrenches, commands and, if it moves, a palm's pose.
-
-        After the end of a run it is zero.
-        """
-        commands = np.zeros((len(runs), most, len(runs[0].commands[0])))
-        wrenches = np.zeros((len(runs), most, 6))
-        for place, each in enumerate(runs):
-            commands[place, : len(each.commands)] = each.commands
-            wrenches[place, : len(each.wrenches)] = each.wrenches
-        told = [(trials.bind("xfrc_applied")[:, self.body], wrenches)]
-        if self.model.nmocap:
-            told.append((trials.bind("mocap_pos")[:, 0], commands[..., :3]))
-            told.append((trials.bind("mocap_quat")[:, 0], commands[..., 3:FREE]))
-            commands = commands[..., FREE:]
-        return [*told, (trials.bind("ctrl"), commands)]
-
-    def _touching(self, state: Array) -> frozenset[int]:
-        if not np.isfinite(state).all():
-            return frozenset()
-        signature = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-        mujoco.mj_setState(self.model, self.data, state, signature)
-        mujoco.mj_forward(self.model, self.data)
-        bodies = self.model.geom_bodyid[self.data.contact.geom]
-        met = bodies[(bodies == self.body).any(axis=1)].ravel().tolist()
-        return frozenset(self.fingers[body] for body in met if body in self.fingers)
-
-
-def judged_run(number: int, motion: Motion, run: Timeline, passing: Passing) -> RunVerdict:
+def judged_run(number: int, looks: Sequence[Look], fault: str, passing: Passing) -> RunVerdict:
     """Judge one run at its looks, up to the first that does not pass."""
-    moved, turned, seen, reason = 0.0, 0.0, list[int](), motion.fault
-    for sample, fingers in zip(run.looks, map(len, motion.touching), strict=True):
+    moved, turned, seen, reason = 0.0, 0.0, list[int](), fault
+    for look in looks:
         if reason:
             break
-        pose = motion.poses[sample]
-        shift = float(np.linalg.norm(pose[:3] - AT_REST[:3]))
-        turn = float(np.degrees(rotation_angles(pose[None, 3:], AT_REST[None, 3:])[0]))
+        shift = float(np.linalg.norm(look.pose[:3] - AT_REST[:3]))
+        turn = float(np.degrees(rotation_angles(look.pose[None, 3:], AT_REST[None, 3:])[0]))
         moved, turned = max(moved, shift), max(turned, turn)
-        seen.append(fingers)
+        seen.append(look.fingers)
         if not shift < passing.most_m:
             reason = f"the object moved by {1e3 * shift:.3g} mm, and {1e3 * passing.most_m:g}"
             reason += " is enough"
         elif not turn < passing.most_deg:
             reason = f"the object turned by {turn:.3g} deg, and {passing.most_deg:g} is enough"
-        elif fingers < passing.fingers:
-            reason = f"{fingers} fingers touched the object, and {passing.fingers} must"
+        elif look.fingers < passing.fingers:
+            reason = f"{look.fingers} fingers touched the object, and {passing.fingers} must"
     return RunVerdict(number, not reason, reason, moved, turned, min(seen, default=0))

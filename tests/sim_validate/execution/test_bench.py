@@ -169,7 +169,7 @@ def test_friction_is_that_of_each_contact():
     friction = np.array([0.5, 0.0, 0.0, 0.5])
     drive = paths.held_weight(DOWN, 0.4)
     bench = box_bench(mass=light)
-    (motion,) = bench.run([joined(paths.closing(), drive)], friction=friction)
+    (motion,) = bench.run([replace(joined(paths.closing(), drive), friction=friction)])
     assert not motion.health.fault
     across = np.linalg.norm(motion.forces[..., 1:], axis=2)
     assert across[:, 1:3].max() < 1.1e-5 * 5.0  # the simulator's least friction is 1e-5
