@@ -36,7 +36,6 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held import hinged, rotations
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, build_held_scene, held_physics
 from scenes.mujoco.mjcf_text import quaternion
 from scenes.settings import PhysicsSettings
@@ -48,16 +47,14 @@ from sim_validate.execution.bench import (
     HeldBench,
     HeldMotion,
     Outcome,
-    begun_motion,
     cosines,
     facing,
     first_trouble,
-    motions_joined,
     outcome,
     sticking_multiple,
 )
 from sim_validate.execution.gate import require_faithful_execution
-from sim_validate.execution.paths import Drive, parted
+from sim_validate.execution.paths import Drive
 from sim_validate.execution.predictions import (
     Holder,
     NoSqueezeError,
@@ -95,7 +92,7 @@ def run_again(
     settings: ExecutionSettings,
 ) -> Iterator[HeldMotion]:  # fmt: skip
     """Yield motions in which trials are simulated with short steps from before their trouble on."""
-    begins = [_begin(trial, motion, bench) for trial, motion in zip(trials, motions, strict=True)]
+    begins = [_begin(trial, motion) for trial, motion in zip(trials, motions, strict=True)]
     drives = [
         replace(_rest(trial, begin), lost=_lost(motion, trial.begun, settings))
         for trial, motion, begin in zip(trials, motions, begins, strict=True)
@@ -103,20 +100,21 @@ def run_again(
     starts = [motion.states[begin] for motion, begin in zip(motions, begins, strict=True)]
     again = bench.run(drives, np.stack(starts))
     for motion, begin, rest in zip(motions, begins, again, strict=True):
-        yield motions_joined(begun_motion(motion, begin + 1), rest)
+        first = replace(motion.rows(slice(begin + 1)), health=rest.health)  # faults came later
+        yield first.then(rest)
 
 
-def _begin(trial: Trial, motion: HeldMotion, bench: HeldBench) -> int:
+def _begin(trial: Trial, motion: HeldMotion) -> int:
     """Return the sample after which a trial is run again.
 
     It is the first where fingers that close do not come to hold the object, and where contacts slip
     within samples only, so that nothing says when.
     """
-    layout = bench.scene.layout
+    layout = motion.layout
     pushing = np.linalg.norm(layout.pushes, axis=1) > IDLE * float(np.abs(layout.pushes).max())
     if (motion.forces[trial.begun, pushing] == 0.0).all(axis=1).any():
         return 0
-    trouble = first_trouble(motion, layout, layout.friction, trial.begun)
+    trouble = first_trouble(motion, layout.friction, trial.begun)
     return max(0, trouble - BEFORE) if trouble < len(motion.moved) else 0
 
 
@@ -126,7 +124,7 @@ def _rest(trial: Trial, begin: int) -> Drive:
     A trial that starts to move when its weight has come has its speed in later states; one that
     goes on from before gets it at once, as uniform motion changes nothing.
     """
-    rest = parted(trial.drive, begin + 1)[1]
+    rest = trial.drive.rows(slice(begin + 1, None))
     return rest if begin < trial.weighing else replace(rest, velocity=np.zeros(3))
 
 
@@ -135,10 +133,9 @@ def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[
 
     Gives a distance [m] and an angle [rad].
     """
-    palm = hinged(motion.palm[begun : begun + 1, 3:]).transpose(0, 2, 1)
-    (cosine,) = cosines(palm @ rotations(motion.turned[begun : begun + 1]))
+    (cosine,) = cosines(motion.turns[begun : begun + 1])
     angle = math.acos(min(max(float(cosine), -1.0), 1.0))
-    away = float(np.linalg.norm(motion.moved[begun] - motion.palm[begun, :3]))
+    away = float(np.linalg.norm(motion.shifts[begun]))
     return settings.most_m + away, settings.most_rad + angle
 
 
@@ -317,12 +314,12 @@ def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, .
     if weighing := [trial for trial in trials if trial.weighing]:
         # The weight comes once for all. Hand and object get the speed that they start with when it
         # has come: uniform motion changes nothing.
-        parts = [parted(trial.drive, trial.weighing) for trial in weighing]
-        still = replace(parts[0][0], velocity=np.zeros(3))
-        weight, state = bench.settled(still, squeezed)
-        motions = bench.run([after for _, after in parts], state)
-        for trial, motion in zip(weighing, motions, strict=True):
-            found[trial] = motions_joined(weight, motion)
+        first = weighing[0].drive.rows(slice(weighing[0].weighing))
+        weight, state = bench.settled(replace(first, velocity=np.zeros(3)), squeezed)
+        rests = [trial.drive.rows(slice(trial.weighing, None)) for trial in weighing]
+        for trial, motion in zip(weighing, bench.run(rests, state), strict=True):
+            health = motion.health.after(weight.health)
+            found[trial] = replace(weight.then(motion), health=health)
     apart = [trial for trial in trials if trial.apart]
     others = [trial for trial in trials if not (trial.weighing or trial.apart)]
     for own, start in ((apart, None), (others, squeezed)):
@@ -362,8 +359,7 @@ def _with_first_slips(
             for trial in (trials[place] for place in sudden)
         ]
         for place, trial, motion in zip(sudden, rough, run_trials(bench, rough), strict=True):
-            multiple = sticking_multiple(motion, bench.scene.layout, trial.drive, friction,
-                                         trial.begun)  # fmt: skip
+            multiple = sticking_multiple(motion, trial.drive, friction, trial.begun)
             known[place] = replace(known[place], simulated_first_slip=min(multiple, 1.0))
     return known
 
@@ -402,8 +398,7 @@ def _judged(
     if motion.health.fault:
         found = DIVERGED
     else:
-        layout = bench.scene.layout
-        found = outcome(motion, layout, trial.drive, layout.friction, trial.begun)
+        found = outcome(motion, trial.drive, motion.layout.friction, trial.begun)
     kept = found.displacement_m <= settings.most_m and found.turn_rad <= settings.most_rad
     held = "slipped" if found.slipped else "stuck"
     lost = "diverged" if motion.health.fault else "dropped"
@@ -502,7 +497,7 @@ def film(job: ExecutionJob, name: str, path: Path) -> Path:
     named = {trial.name: trial for trial in trials}
     one_of(name, tuple(named), "name")
     (motion,) = run_trials(HeldBench(scene), [named[name]])
-    stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.moved) // FRAMES))
+    stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.joints) // FRAMES))
     slowed = 1.0 / (RATE * SAMPLE_S * stride)
     caption = name if slowed <= 1.0 else f"{name}, {slowed:.1f} times slower"
     table, gravity = named[name].drive.table, scene.layout.gravity

@@ -17,6 +17,7 @@ share the sphere evenly. u is chosen so that the speed on the sphere is the same
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -26,6 +27,22 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.held_mjcf import SAMPLE_S
 from sim_validate.engine import bench
 from sim_validate.engine.bench import smooth
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A value with a row for each sample in the fields that `ROWS` names."""
+
+    ROWS: ClassVar[tuple[str, ...]]
+
+    def rows(self, which: slice) -> Self:
+        """Return the value in some of its samples."""
+        return replace(self, **{name: getattr(self, name)[which] for name in self.ROWS})
+
+    def then(self, later: Self) -> Self:
+        """Return this value with the samples of a later one after its own."""
+        pairs = ((name, (getattr(self, name), getattr(later, name))) for name in self.ROWS)
+        return replace(self, **{name: np.concatenate(pair) for name, pair in pairs})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,9 +62,11 @@ class Table:
     normal: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+@dataclass(frozen=True, eq=False)
+class Drive(Rows):
     """What is applied in each of the n samples of a trial."""
+
+    ROWS = ("accelerations", "gravity", "wrenches", "grasping", "shares")
 
     accelerations: Array
     """Acceleration of the palm (linear, angular about its middle), (n, 6) [m/s^2, rad/s^2]."""
@@ -82,23 +101,6 @@ def idle(count: int) -> Drive:
         accelerations=nothing, gravity=nothing[:, :3], wrenches=nothing, grasping=np.ones(count),
         shares=np.zeros(count), velocity=np.zeros(3),
     )  # fmt: skip
-
-
-SERIES = ("accelerations", "gravity", "wrenches", "grasping", "shares")
-"""Fields that have a row for each sample."""
-
-
-def joined(first: Drive, second: Drive) -> Drive:
-    """Return one drive after another; start and table are those of the first."""
-    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in SERIES}
-    return replace(first, **both)
-
-
-def parted(drive: Drive, count: int) -> tuple[Drive, Drive]:
-    """Return the first samples of a drive, and the others; both have its start and table."""
-    first = {name: getattr(drive, name)[:count] for name in SERIES}
-    second = {name: getattr(drive, name)[count:] for name in SERIES}
-    return replace(drive, **first), replace(drive, **second)
 
 
 CLOSE_S = 0.15

@@ -84,8 +84,7 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
         trials, motions, run_again(bench, trials, motions, settings), strict=True
     ):
         first, second = (
-            outcome(each, scene.layout, trial.drive, best.grip.friction, trial.begun)
-            for each in (motion, again)
+            outcome(each, trial.drive, best.grip.friction, trial.begun) for each in (motion, again)
         )
         slipped += first.slipped
         assert len(again.moved) == len(motion.moved)
