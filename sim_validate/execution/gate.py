@@ -57,7 +57,6 @@ from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
 from sim_validate.engine.gate import (
     DEPTH,
     Check,
-    angles,
     measured,
     near,
     sized,
@@ -519,12 +518,12 @@ def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
     into = DEPTH * case.radius_m * normals
     reached = np.einsum("kij,ki->kj", scene.layout.axes, into)
     found, depths = bench.touched(scene.layout.tip_names, bench.placed(reached))
-    off = np.abs(depths / ((DEPTH + TOUCH) * case.radius_m) - 1.0)
+    depths /= (DEPTH + TOUCH) * case.radius_m
     motion, _ = bench.settled(paths.closing(SETTLE_S))
     forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])
     missed = np.linalg.norm(forces - pushes[:, None] * normals, axis=1) / pushes
     return (
-        *touch_checks(angles(found, normals), off, f", on a {name}"),
+        *touch_checks(found, normals, depths, f", on a {name}"),
         little(f"error of a contact's force under even pressure, on a {name}", motion,
                float(np.max(missed))),  # NaN if one is
     )  # fmt: skip
