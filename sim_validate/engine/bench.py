@@ -9,19 +9,6 @@ that moves as told.
 Trials of closure are schedules: the forces planned for the fingers, the external wrench and the
 friction in each sample. Loads change smoothly, because long objects spring loose under a sudden
 start.
-
-Wrench hold. The fingers squeeze with planned forces while friction is raised, so that the
-transients of loading cannot slip a contact that would hold at rest. Then the wrench and the forces
-planned for it are applied together, the object settles, friction is lowered to the value under
-test, and the object must stay where it is.
-
-Largest wrench. The object is either held at several shares of the predicted limit (bisection), or
-loaded in one slow rise through it (ramp). It lets go where it has moved by a threshold. The mass
-must first be accelerated, so a ramp finds the limit late, never early.
-
-Critical friction. Fingers squeeze the unloaded object with the forces that balance at the predicted
-critical friction, friction is lowered to a trial value, and the object must stay; the trial value
-is bisected.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -39,7 +26,6 @@ from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.errors import InputError
 from scenes.mujoco.layout import Layout
 from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
-from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 
 STATE = (
     "time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat",
@@ -399,70 +385,12 @@ class Schedule:
         return Told(wrenches, layout.commands(self.forces), friction=friction)
 
     @staticmethod
-    def squeeze(
-        forces: Array, friction: float, sample_s: float, protocol: HoldProtocol
-    ) -> "Schedule":
-        """Schedule the fingers to close on the unloaded object."""
-        shares, still = smooth(samples(protocol.squeeze_s, sample_s)), np.zeros(6)
-        count, opened = len(shares), Load(still, np.zeros_like(forces))
-        return _between(opened, Load(still, forces), shares, (friction, friction), count, count)
-
-    @staticmethod
-    def hold(
-        idle: Load, load: Load, frictions: tuple[float, float], sample_s: float,
-        protocol: HoldProtocol,
+    def between(
+        start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
+        resting: int,
     ) -> "Schedule":  # fmt: skip
-        """Schedule a hold: load the squeezed object at high friction, settle, lower it, watch."""
-        rise, rest = samples(protocol.load_s, sample_s), samples(protocol.settle_s, sample_s)
-        shares = np.concatenate([smooth(rise), np.ones(rest + samples(protocol.hold_s, sample_s))])
-        return _between(idle, load, shares, frictions, rise + rest, rise)
-
-    @staticmethod
-    def ramp(
-        idle: Load, limit: Load, shares: tuple[float, float], friction: float, sample_s: float,
-        protocols: tuple[HoldProtocol, LimitProtocol],
-    ) -> tuple["Schedule", Array]:  # fmt: skip
-        """Schedule a load that rises slowly through the largest one that is resisted.
-
-        The load rises to the first share of the limit as in `hold`, then slowly to the second. The
-        forces balance the load all the way, whether the fingers can apply them or not.
-
-        Gives the schedule, and the share of the limit that is applied in each watched sample.
-        """
-        holding, limiting = protocols
-        rise, rest = samples(holding.load_s, sample_s), samples(holding.settle_s, sample_s)
-        lower, upper = shares
-        count = samples(limiting.ramp_s, sample_s)
-        climb = lower + (upper - lower) * np.arange(1, count + 1) / count
-        applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
-        high = holding.settling_friction * friction
-        return _between(idle, limit, applied, (high, friction), rise + rest, len(applied)), climb
-
-    @staticmethod
-    def release(
-        still: Load, frictions: tuple[float, float], sample_s: float, protocol: FrictionProtocol, *,
-        settled: bool = False,
-    ) -> "Schedule":  # fmt: skip
-        """Schedule a release: lower the friction of a squeezed object without load, and watch."""
-        rest = 0 if settled else samples(protocol.settle_s, sample_s)
-        shares = np.ones(rest + samples(protocol.hold_s, sample_s))
-        return _between(still, still, shares, frictions, rest, 0)
-
-    @staticmethod
-    def settle(
-        still: Load, friction: float, sample_s: float, protocol: FrictionProtocol
-    ) -> "Schedule":
-        """Schedule what comes before a release: a squeezed object without load settles."""
-        count = samples(protocol.settle_s, sample_s)
-        return _between(still, still, np.ones(count), (friction, friction), count, 0)
-
-
-def _between(
-    start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
-    resting: int,
-) -> Schedule:  # fmt: skip
-    friction = np.full(len(shares), frictions[0])
-    friction[watched:] = frictions[1]
-    wrenches = start.wrench + shares[:, None] * (end.wrench - start.wrench)
-    forces = start.forces + shares[:, None, None] * (end.forces - start.forces)
-    return Schedule(wrenches, forces, friction, watched, resting)
+        """Schedule shares of the way between loads; friction falls where watching begins."""
+        friction = np.where(np.arange(len(shares)) < watched, *frictions)
+        wrenches = start.wrench + shares[:, None] * (end.wrench - start.wrench)
+        forces = start.forces + shares[:, None, None] * (end.forces - start.forces)
+        return Schedule(wrenches, forces, friction, watched, resting)

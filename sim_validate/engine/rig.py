@@ -1,11 +1,17 @@
 """Holds an object between squeezing fingers, and finds the largest wrenches and least friction.
 
-Wrench holds, ramps and releases start from the squeezed object. Largest wrenches are found by a
-ramp or by bisection. Both load the object with a share of the predicted limit and the forces
-planned for it, which lie that share of the way from the gentle squeeze to the forces at the limit.
-They balance the load, because both ends do. Below the limit they are inside the cones and the
-limits on the push, again because both ends are. Above it, up to twice the limit, the forces still
-balance on paper, but friction gives way, or a finger cannot push harder.
+Wrench holds, ramps and releases start from the squeezed object. The fingers squeeze while friction
+is raised, so that the transients of loading cannot slip a contact that would hold at rest. In a
+hold, the wrench and the forces planned for it are then applied together, the object settles,
+friction is lowered to the value under test, and the object must stay where it is.
+
+Largest wrenches are found by a ramp or by bisection, where the object moves by a threshold. The
+mass must first be accelerated, so a ramp finds the limit late, never early. Both load the object
+with a share of the predicted limit and the forces planned for it, which lie that share of the way
+from the gentle squeeze to the forces at the limit. They balance the load, because both ends do.
+Below the limit they are inside the cones and the limits on the push, again because both ends are.
+Above it, up to twice the limit, the forces still balance on paper, but friction gives way, or a
+finger cannot push harder.
 
 A ramp passes the limit slowly. The load left over grows in proportion to the time since, so the
 displacement grows with its third power and the ramp ends late. A displacement eight times as large
@@ -51,7 +57,7 @@ from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.layout import SQUEEZE, Layout
 from scenes.settings import HARD, Softness
-from sim_validate.engine.bench import Bench, Load, Motion, Schedule
+from sim_validate.engine.bench import Bench, Load, Motion, Schedule, samples, smooth
 from sim_validate.engine.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import EarlyEnds, Thresholds, Trace, holds, traces
 from sim_validate.settings import FrictionProtocol
@@ -117,10 +123,12 @@ class Rig:
     ) -> list[Schedule]:
         """Schedule a hold under each load."""
         protocol = self.setup.hold
+        rise, rest, hold = self._counts(protocol.load_s, protocol.settle_s, protocol.hold_s)
+        shares = np.concatenate([smooth(rise), np.ones(rest + hold)])
         usual = protocol.settling_friction * self.friction
         settling = settling_frictions or [usual] * len(loads)
         return [
-            Schedule.hold(self.idle, load, (high, self.friction), self.bench.sample_s, protocol)
+            Schedule.between(self.idle, load, shares, (high, self.friction), rise + rest, rise)
             for load, high in zip(loads, settling, strict=True)
         ]
 
@@ -128,20 +136,38 @@ class Rig:
         self, limits: Sequence[Load], shares: tuple[float, float]
     ) -> tuple[tuple[Trace, ...], Array]:
         """Raise each load between two shares of itself; return the motions and the shares (n,)."""
-        sample_s, protocols = self.bench.sample_s, (self.setup.hold, self.setup.limit)
-        rises = [
-            Schedule.ramp(self.idle, load, shares, self.friction, sample_s, protocols)
-            for load in limits
-        ]
-        return self._traces([schedule for schedule, _ in rises]), rises[0][1]
+        rises, climb = self.ramps(limits, shares)
+        return self._traces(rises), climb
+
+    def ramps(
+        self, limits: Sequence[Load], shares: tuple[float, float]
+    ) -> tuple[list[Schedule], Array]:
+        """Schedule a slow rise of each load from one share to another, loaded to it as in a hold.
+
+        The forces balance the load all the way, whether the fingers can apply them or not. Gives
+        also the share that is applied in each watched sample.
+        """
+        hold, (lower, upper) = self.setup.hold, shares
+        rise, rest, count = self._counts(hold.load_s, hold.settle_s, self.setup.limit.ramp_s)
+        climb = lower + (upper - lower) * np.arange(1, count + 1) / count
+        applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
+        frictions, every = (hold.settling_friction * self.friction, self.friction), len(applied)
+        return [
+            Schedule.between(self.idle, limit, applied, frictions, rise + rest, every)
+            for limit in limits
+        ], climb
 
     def at_rest(self, settling_friction: float) -> "Rig":
         """Let the unloaded object settle, so that it need not before each release."""
         assert self.closed is not None  # noqa: S101 - rigid fingers have not closed
-        protocol = self.setup.friction
-        trial = Schedule.settle(self.idle, settling_friction, self.bench.sample_s, protocol)
-        (motion,) = self._simulated([trial])
+        (motion,) = self._simulated([self.settling(settling_friction)])
         return replace(self, closed=motion.after(self.closed), settled=True)
+
+    def settling(self, friction: float) -> Schedule:
+        """Schedule what comes before a release: the unloaded object settles."""
+        (count,) = self._counts(self.setup.friction.settle_s)
+        frictions = friction, friction
+        return Schedule.between(self.idle, self.idle, np.ones(count), frictions, count, 0)
 
     def release(
         self, settling_friction: float, frictions: Sequence[float], threshold_m: float | None = None
@@ -152,16 +178,21 @@ class Rig:
 
     def releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
         """Schedule a release to each friction."""
-        sample_s, protocol = self.bench.sample_s, self.setup.friction
+        rest, hold = self._counts(self.setup.friction.settle_s, self.setup.friction.hold_s)
+        rest *= not self.settled
         return [
-            Schedule.release(self.idle, (settling_friction, friction), sample_s, protocol,
-                              settled=self.settled)
+            Schedule.between(
+                self.idle, self.idle, np.ones(rest + hold), (settling_friction, friction), rest, 0
+            )
             for friction in frictions
-        ]  # fmt: skip
+        ]
 
     def joints(self, trials: Sequence[Schedule]) -> Array:
         """Return joint positions in trials, from closed fingers on, (trials, n, 7 + 3k)."""
         return np.array([motion.joints for motion in self._simulated(trials)])
+
+    def _counts(self, *durations_s: float) -> list[int]:
+        return [samples(duration_s, self.bench.sample_s) for duration_s in durations_s]
 
     def _simulated(
         self, trials: Sequence[Schedule], ends: EarlyEnds | None = None
@@ -205,9 +236,11 @@ def squeezed(
 ) -> Rig:  # fmt: skip
     """Close the fingers of a compiled scene on the unloaded object."""
     high = settling_friction or setup.hold.settling_friction * friction
-    closing = Schedule.squeeze(forces, high, bench.sample_s, setup.hold)
+    opened, idle = Load(np.zeros(6), np.zeros_like(forces)), Load(np.zeros(6), forces)
+    shares = smooth(samples(setup.hold.squeeze_s, bench.sample_s))
+    closing = Schedule.between(opened, idle, shares, (high, high), len(shares), len(shares))
     (closed,) = bench.simulated([closing.told(bench.scene.layout)])
-    return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed)
+    return Rig(bench, setup, friction, idle, closed)
 
 
 def closed_on(

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.arrays import to_digits
-from sim_validate.engine.bench import CHUNK, Bench, Load, Schedule
+from sim_validate.engine.bench import CHUNK, Bench, Load
 from sim_validate.engine.rig import part, squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
@@ -28,11 +29,9 @@ def trials_of(held, count=5):
     body, grasp, rig = held
     limits = limiting_loads(body, grasp, 0.5, count)
     shares = np.linspace(0.8, 1.2, count)
-    protocol, sample_s = HoldProtocol(), rig.bench.sample_s
-    return [
-        Schedule.hold(rig.idle, part(rig.idle, limit, share), (1.5, 0.5), sample_s, protocol)
-        for limit, share in zip(limits, shares, strict=True)
-    ]
+    return rig.holds(
+        [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
+    )
 
 
 def plain_loop(scene, schedule, start):
@@ -75,7 +74,7 @@ def test_friction_is_that_of_the_schedule_and_not_of_the_scene(held):
     load = part(rig.idle, limit, 0.97)
     outcomes = []
     for friction in (0.5, 0.4):
-        trial = Schedule.hold(rig.idle, load, (1.5, friction), rig.bench.sample_s, HoldProtocol())
+        (trial,) = replace(rig, friction=friction).holds([load], [1.5])
         (motion,) = rig.bench.simulated([trial.told(rig.bench.scene.layout)], rig.closed.state)
         outcomes.append(np.abs(motion.joints[-1, :3] - motion.joints[trial.watched - 1, :3]).max())
     assert outcomes[0] < 1e-7
