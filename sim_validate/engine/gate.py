@@ -39,7 +39,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -175,7 +175,8 @@ CREEP_LIMIT = 1e-4
 it."""
 CREEP_SHARE = 0.2
 """Largest share of a hold's displacement threshold that creep may use up."""
-CREEP_LOAD = 0.8
+SHARE = 0.8
+"""Load on the tetrahedron, relative to the largest load that it resists."""
 HIDDEN_LIMIT = 0.01
 """Largest force that may act without a threshold noticing it, relative to the largest normal force.
 It is ten times what the usual thresholds let pass."""
@@ -302,7 +303,7 @@ def _offset_fingers(case: Case) -> list[Check]:
 def _creep(rig: Rig, limits: Sequence[Load]) -> Check:
     """Check how fast a held object creeps under a part of the loads that it resists."""
     traces, protocol = (
-        rig.hold([part(rig.idle, each, CREEP_LOAD) for each in limits]),
+        rig.hold([part(rig.idle, each, SHARE) for each in limits]),
         rig.setup.hold,
     )
     speeds = list[float]()
@@ -351,8 +352,6 @@ LOW, LOW_GAP_LIMIT = 0.05, 1e-7
 difference between the two solvers there, in grasp sizes: a hundredth of the finest threshold. Usual
 solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes of that size were seen to
 let go far above their critical friction, implicit integrators among them, differ by 4e-5."""
-SHARE = 0.8
-"""Load on the tetrahedron, relative to the largest load that it resists."""
 LIGHT = 1e-3
 """Normal force of the two fingers that hardly push, relative to that of the others."""
 ABOVE = (1.01, 1.05, 2.0)
@@ -504,7 +503,7 @@ class Gate(Declared):
         """Whether all checks passed."""
         return all(check.passed for check in self.checks)
 
-    def require(self, so: str) -> None:
+    def require(self, so: str) -> Self:
         """Refuse settings under which a check failed, and say what is `so` not done with them."""
         if not self.passed:
             failed = "; ".join(str(check) for check in self.checks if not check.passed)
@@ -512,6 +511,7 @@ class Gate(Declared):
                 f"the simulator is not faithful with these settings, so {so}; these checks failed: "
                 f"{failed}"
             )
+        return self
 
 
 class Cases(Protocol):
@@ -537,9 +537,7 @@ def require_faithful(
     setup: Setup, friction: float = USUAL_FRICTION, radius_m: float = USUAL_RADIUS_M
 ) -> Gate:
     """Check the simulator on known cases, and refuse settings under which a check fails."""
-    gate = measured_gate(setup, friction, radius_m)
-    gate.require("no grasp is certified")
-    return gate
+    return measured_gate(setup, friction, radius_m).require("no grasp is certified")
 
 
 def measured_gate(
