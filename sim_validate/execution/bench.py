@@ -40,9 +40,8 @@ from grasp_core.errors import InputError
 from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held import HeldLayout, hinged, rotations
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, palm_armature
-from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine.bench import FREE, PALM, Bench, Health, Motion, Told
-from sim_validate.execution.paths import WHOLE, Drive, Rows, Table
+from sim_validate.execution.paths import WHOLE, Drive, Rows
 
 KEPT = ("qvel", "qfrc_constraint", "state")
 """What is read beside the positions of joints."""
@@ -199,7 +198,7 @@ class HeldBench(Bench[HeldScene]):
                 joints[:7] = [*drive.pose.moved, *drive.pose.quaternion]
         if drive.table is not None:  # where it touches: objects would fall, sink and rise
             point = drive.table.point + LAID * layout.radius_m * drive.table.normal
-            table = np.tile([*point, *quaternion(facing(drive.table))], (n, 1))
+            table = np.tile([*point, *drive.table.quaternion], (n, 1))
         if drive.friction is not None:
             friction = np.tile(self.roughness[self.rubbing], (n, 1))
             friction[:, np.array(self.tips) - self.rubbing.start] = drive.friction
@@ -263,15 +262,6 @@ class _Losing:
 def cosines(turned: Array) -> Array:
     """Return the cosines of the angles of rotations, (n,)."""
     return 0.5 * (np.einsum("nii->n", turned) - 1.0)
-
-
-def facing(table: Table) -> Array:
-    """Return a rotation whose third column is the table's normal, (3, 3)."""
-    normal = table.normal
-    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    first = np.cross(aside, normal)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(normal, first), normal])
 
 
 ON_CONE = 0.9995

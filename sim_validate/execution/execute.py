@@ -37,7 +37,6 @@ from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene, build_held_scene, held_physics
-from scenes.mujoco.mjcf_text import quaternion
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
@@ -48,7 +47,6 @@ from sim_validate.execution.bench import (
     HeldMotion,
     Outcome,
     cosines,
-    facing,
     first_trouble,
     outcome,
     sticking_multiple,
@@ -270,11 +268,12 @@ def simulated(
     lost_m = max(LOST * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
     predicted = predicted_losses(dynamics, trials, settings)
+    judged = _confirmed_trials(bench, trials, predicted, settings)
     return Execution(
         mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
-        trials=tuple(_judged_trials(bench, trials, predicted, settings)),
+        trials=tuple(_with_first_slips(bench, trials, judged)),
         controls=run_controls(bench, best, dynamics.lowest_frequency),
         skipped=skipped,
         physics=scene.physics,
@@ -327,14 +326,6 @@ def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, .
             motions = bench.run([trial.drive for trial in own], start)
             found |= dict(zip(own, motions, strict=True))
     return tuple(found[trial] for trial in trials)
-
-
-def _judged_trials(
-    bench: HeldBench, trials: Sequence[Trial], predicted: Sequence[tuple[float, float]],
-    settings: ExecutionSettings,
-) -> list[ExecutionTrial]:  # fmt: skip
-    """Simulate trials and judge them, those that are lost where a contact slips a second time."""
-    return _with_first_slips(bench, trials, _confirmed_trials(bench, trials, predicted, settings))
 
 
 def _with_first_slips(
@@ -504,5 +495,5 @@ def film(job: ExecutionJob, name: str, path: Path) -> Path:
     up = -gravity / np.linalg.norm(gravity) if table is None else table.normal
     return write_held_clip(
         scene, motion.joints[::stride], path, caption, up=up,
-        table=None if table is None else (table.point, quaternion(facing(table))),
+        table=None if table is None else (table.point, table.quaternion),
     )  # fmt: skip

@@ -22,9 +22,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contacts import WRENCH
+from grasp_core.closure.contacts import WRENCH, contact_frames
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.held_mjcf import SAMPLE_S
+from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine import bench
 from sim_validate.engine.bench import smooth
 
@@ -60,6 +61,11 @@ class Table:
 
     point: Array
     normal: Array
+
+    @property
+    def quaternion(self) -> Array:
+        """Orientation of the plane, whose third axis is its normal, (4,)."""
+        return quaternion(np.roll(contact_frames(self.normal), -1, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +174,8 @@ def turned_weight(slowest_rad_per_s: float) -> Drive:
     count = samples(float(along[-1]) / speed)
     evenly = along[-1] * np.arange(count) / (count - 1.0)
     path = _spiral(np.asarray(np.interp(evenly, along, fine), dtype=np.float64), turns)
-    rise = smooth(samples(RISE_S))
-    share = np.concatenate([rise, np.ones(count)])
-    way = np.concatenate([np.broadcast_to(path[0], (len(rise), 3)), path])
-    return loaded(share, GRAVITY_M_PER_S2 * way)
+    way = np.concatenate([np.broadcast_to(path[0], (WEIGHING, 3)), path])
+    return _weighed(GRAVITY_M_PER_S2 * way, count)
 
 
 def _spiral(u: Array, turns: float) -> Array:
@@ -182,8 +186,12 @@ def _spiral(u: Array, turns: float) -> Array:
 
 def held_weight(gravity: Array, rest_s: float = RISE_S) -> Drive:
     """Return the drive in which the weight comes in one direction, and stays."""
-    share = np.concatenate([smooth(samples(RISE_S)), np.ones(samples(rest_s))])
-    return loaded(share, gravity)
+    return _weighed(gravity, samples(rest_s))
+
+
+def _weighed(gravity: Array, count: int) -> Drive:
+    """Return the drive in which the weight comes, and stays for so many samples."""
+    return loaded(np.concatenate([smooth(WEIGHING), np.ones(count)]), gravity)
 
 
 def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
@@ -198,8 +206,7 @@ def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
     speeds = -size * np.cos(rate * times) / rate
     accelerations = np.zeros((WEIGHING + wave, 6))
     accelerations[WEIGHING:] = np.diff(speeds)[:, None] / SAMPLE_S * axis
-    share = np.concatenate([smooth(WEIGHING), np.ones(wave)])
-    return replace(loaded(share, gravity), accelerations=accelerations)
+    return replace(_weighed(gravity, wave), accelerations=accelerations)
 
 
 def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive:
@@ -215,8 +222,7 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
     accelerations = np.zeros((WEIGHING + len(shape) + rest, 6))
     size = speed / (SAMPLE_S * float(shape.sum()))  # the deceleration, but for the shortest stops
     accelerations[WEIGHING : WEIGHING + len(shape), :3] = -size * shape[:, None] * way
-    share = np.concatenate([smooth(WEIGHING), np.ones(len(shape) + rest)])
-    under = loaded(share, gravity)
+    under = _weighed(gravity, len(shape) + rest)
     return replace(under, accelerations=accelerations, velocity=speed * way)
 
 
@@ -228,8 +234,7 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
     force = impulse / (SAMPLE_S * shape.sum())
     whole = np.concatenate([force, np.cross(point, force)])
     wrenches[WEIGHING : WEIGHING + strike] = shape[:, None] * whole
-    share = np.concatenate([smooth(WEIGHING), np.ones(strike + rest)])
-    return replace(loaded(share, gravity), wrenches=wrenches)
+    return replace(_weighed(gravity, strike + rest), wrenches=wrenches)
 
 
 def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tuple[Drive, int]:
@@ -243,7 +248,7 @@ def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tu
     total = len(accelerations)
     close = smooth(samples(CLOSE_S))
     grasping = np.concatenate([np.zeros(laid), close, np.ones(total - laid - len(close))])
-    risen = height * u[1:] ** 3 * (10.0 - 15.0 * u[1:] + 6.0 * u[1:] ** 2)
+    risen = height * smoother(count)
     share = np.ones(total)
     share[:before] = 0.0
     share[before : before + count] = np.minimum(risen / max(min(give_m, height), TINY_M), 1.0)

@@ -58,7 +58,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
-from scenes.mujoco.held import HeldLayout, gravity_of
+from scenes.mujoco.held import HeldLayout, gravity_of, rotations
 from scenes.mujoco.held_mjcf import SAMPLE_S, HeldScene
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive
@@ -193,11 +193,9 @@ def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
 
 def _turned_back(vectors: Array, angles: Array) -> Array:
     """Turn vectors (n, 3) back by the palm's angles (n, 3), which are about one axis at a time."""
-    size = np.linalg.norm(angles, axis=1, keepdims=True)
-    axis = angles / np.where(size > 0.0, size, 1.0)
-    along = np.einsum("ni,ni->n", axis, vectors)[:, None] * axis
-    turned = np.cos(size) * (vectors - along) - np.sin(size) * cross(axis, vectors) + along
-    return np.where(size > 0.0, turned, vectors)
+    half = 0.5 * np.linalg.norm(angles, axis=1, keepdims=True)
+    turns = rotations(np.hstack([np.cos(half), 0.5 * np.sinc(half / math.pi) * angles]))
+    return np.einsum("nji,nj->ni", turns, vectors)
 
 
 def _responses(dynamics: HeldDynamics, loads: Array, bases: Array) -> tuple[Array, Array]:

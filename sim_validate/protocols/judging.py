@@ -19,7 +19,6 @@ from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.kinds import Friction, instance, one_of, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.quality.motors import Motors
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scene import build_hand_scene
@@ -78,7 +77,7 @@ def judge_by(
         body, given, found.friction, found.mass_of(body), found.physics, setup.fingers
     )
     ours = our_verdict(
-        body, contacts, friction, found.forces(scene.mass_kg), setup,
+        Analysis(body, contacts, friction, setup, None), found.forces(scene.mass_kg),
         partial(setup.scene, body, given, friction),
     )  # fmt: skip
     return _judged(
@@ -158,10 +157,9 @@ def _ours(
     require_faithful(setup, friction, body.radius)
     require_faithful_hands(setup, friction)
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
-    return our_verdict(
-        body, stance_of(hand, reach).contacts, friction, forces, setup, lambda: held,
-        held.layout.motors,
-    )  # fmt: skip
+    contacts = stance_of(hand, reach).contacts
+    analysis = Analysis(body, contacts, friction, setup, held.layout.motors)
+    return our_verdict(analysis, forces, lambda: held)
 
 
 def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
@@ -172,16 +170,11 @@ def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
 
 
 def our_verdict(
-    body: Polyhedron,
-    contacts: Sequence[Contact],
-    friction: float,
-    forces: Sequence[Array],
-    setup: Setup,
-    scene: Callable[[], Scene],
-    motors: Motors | None = None,
+    analysis: Analysis, forces: Sequence[Array], scene: Callable[[], Scene]
 ) -> OurVerdict:
     """Predict the least multiple of forces [N] that contacts resist, and hold the forces."""
-    if not setup.closure(contacts, friction).closed:
+    setup, friction = analysis.setup, analysis.friction
+    if not setup.closure(analysis.contacts, friction).closed:
         told = f"the contacts are proved not to be in force closure at friction {friction:g}"
         return OurVerdict(False, False, 0.0, told)
     rig = closed_on(scene(), setup, friction)
@@ -190,7 +183,7 @@ def our_verdict(
          np.concatenate([force, np.zeros(3)]))
         for force in forces
     ]  # fmt: skip
-    loads = Analysis(body, contacts, friction, setup, motors).as_they_are(rig.idle, named)
+    loads = analysis.as_they_are(rig.idle, named)
     margin = min((load.predicted_limit for load in loads), default=math.inf)
     held = [load.load for load in loads] or [rig.idle]
     names = [load.name for load in loads] or ["no load"]
