@@ -194,6 +194,7 @@ class Bench(Generic[AnyScene]):
         self.sample_s = chunk * self.step_s
         self.body = self.model.body("object").id
         self.home: Array = self.model.qpos0
+        self.moves_as_told: bool = self.model.nmocap > 0
         self.roughness: Array = self.model.geom_friction[:, 0]
         self.parts = state_parts(self.model)
         touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
@@ -288,6 +289,19 @@ class Bench(Generic[AnyScene]):
                 normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
                 depths[finger] = -contact.dist
         return normals, depths
+
+    def touching(self, states: Sequence[Array]) -> list[set[str]]:
+        """Return the names of the bodies that touch the object in states; none if one diverged."""
+        data, found = mujoco.MjData(self.model), list[set[str]]()
+        for state in states:
+            met = []
+            if np.isfinite(state).all():
+                mujoco.mj_setState(self.model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+                mujoco.mj_forward(self.model, data)
+                bodies = self.model.geom_bodyid[data.contact.geom]
+                met = bodies[(bodies == self.body).any(axis=1)].ravel().tolist()
+            found.append({self.model.body(place).name for place in set(met) - {self.body}})
+        return found
 
     def _begun(self, trials: Sequence[Told], start: Array | None) -> batch.Batch:
         """Return the simulations of trials at their starts; they are made only once."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from sim_validate.protocols.judging import Look, judged_run
 from sim_validate.protocols.published import Passing
-from sim_validate.protocols.runs import Look, judged_run
 
 START = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
