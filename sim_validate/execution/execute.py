@@ -58,7 +58,6 @@ from sim_validate.execution.predictions import (
     NoSqueezeError,
     found_enough,
     planned,
-    predicted_losses,
 )
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
@@ -267,7 +266,7 @@ def simulated(
     require_faithful_execution(scene.layout, scene.physics, settings, settings.push_n)
     lost_m = max(LOST * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
-    predicted = predicted_losses(dynamics, trials, settings)
+    predicted = dynamics.losses(trials, settings)
     judged = _confirmed_trials(bench, trials, predicted, settings)
     return Execution(
         mass_kg=settings.object_kg,
