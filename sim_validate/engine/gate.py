@@ -302,12 +302,9 @@ def _offset_fingers(case: Case) -> list[Check]:
 
 def _creep(rig: Rig, limits: Sequence[Load]) -> Check:
     """Check how fast a held object creeps under a part of the loads that it resists."""
-    traces, protocol = (
-        rig.hold([part(rig.idle, each, SHARE) for each in limits]),
-        rig.setup.hold,
-    )
-    speeds = list[float]()
-    for trace in traces:  # the mean speed in the second half; NaN if the trial is not valid
+    speeds, protocol = list[float](), rig.setup.hold
+    # the mean speed in the second half; NaN if the trial is not valid
+    for trace in rig.hold([part(rig.idle, limit, SHARE) for limit in limits]):
         half = len(trace.times_s) // 2
         if trace.health.fault or not half:
             speeds.append(math.nan)
@@ -316,8 +313,8 @@ def _creep(rig: Rig, limits: Sequence[Load]) -> Check:
             speeds.append(float(moved / (trace.times_s[-1] - trace.times_s[half - 1])))
     # the maximum is NaN if one speed is
     speed = float(np.abs(speeds).max()) / rig.bench.scene.layout.grasp_size_m
-    limit = min(CREEP_LIMIT, CREEP_SHARE * protocol.hold_threshold / protocol.hold_s)
-    return Check("creep under load, in grasp sizes per second", speed, 0.0, limit)
+    most = min(CREEP_LIMIT, CREEP_SHARE * protocol.hold_threshold / protocol.hold_s)
+    return Check("creep under load, in grasp sizes per second", speed, 0.0, most)
 
 
 def _hidden(rig: Rig) -> Check:

@@ -24,6 +24,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
 from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.best_squeeze import best_squeeze
@@ -53,12 +54,7 @@ from sim_validate.execution.bench import (
 )
 from sim_validate.execution.gate import require_faithful_execution
 from sim_validate.execution.paths import Drive
-from sim_validate.execution.predictions import (
-    Holder,
-    NoSqueezeError,
-    found_enough,
-    planned,
-)
+from sim_validate.execution.predictions import Holder, NoSqueezeError, found_enough, planned
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
@@ -85,20 +81,20 @@ def confirming_bench(bench: HeldBench) -> HeldBench | None:
 
 
 def run_again(
-    bench: HeldBench, trials: Sequence[Trial], motions: Sequence[HeldMotion],
-    settings: ExecutionSettings,
-) -> Iterator[HeldMotion]:  # fmt: skip
-    """Yield motions in which trials are simulated with short steps from before their trouble on."""
-    begins = [_begin(trial, motion) for trial, motion in zip(trials, motions, strict=True)]
-    drives = [
-        replace(_rest(trial, begin), lost=_lost(motion, trial.begun, settings))
-        for trial, motion, begin in zip(trials, motions, begins, strict=True)
-    ]
-    starts = [motion.states[begin] for motion, begin in zip(motions, begins, strict=True)]
-    again = bench.run(drives, np.stack(starts))
-    for motion, begin, rest in zip(motions, begins, again, strict=True):
+    bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
+) -> dict[Trial, HeldMotion]:
+    """Simulate trials with short steps from before their trouble on."""
+    begins = [_begin(trial, motion) for trial, motion in motions.items()]
+    drives, starts = list[Drive](), list[Array]()
+    for (trial, motion), begin in zip(motions.items(), begins, strict=True):
+        drives.append(replace(_rest(trial, begin), lost=_lost(motion, trial.begun, settings)))
+        starts.append(motion.states[begin])
+    found = dict[Trial, HeldMotion]()
+    rests = bench.run(drives, np.stack(starts))
+    for (trial, motion), begin, rest in zip(motions.items(), begins, rests, strict=True):
         first = replace(motion.rows(slice(begin + 1)), health=rest.health)  # faults came later
-        yield first.then(rest)
+        found[trial] = first.then(rest)
+    return found
 
 
 def _begin(trial: Trial, motion: HeldMotion) -> int:
@@ -266,13 +262,12 @@ def simulated(
     require_faithful_execution(scene.layout, scene.physics, settings, settings.push_n)
     lost_m = max(LOST * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
-    predicted = dynamics.losses(trials, settings)
-    judged = _confirmed_trials(bench, trials, predicted, settings)
+    predicted = dict(zip(trials, dynamics.losses(trials, settings), strict=True))
     return Execution(
         mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
-        trials=tuple(_with_first_slips(bench, trials, judged)),
+        trials=_with_first_slips(bench, _confirmed_trials(bench, predicted, settings)),
         controls=run_controls(bench, best, dynamics.lowest_frequency),
         skipped=skipped,
         physics=scene.physics,
@@ -305,7 +300,7 @@ def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> 
     return moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
 
 
-def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, ...]:
+def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> dict[Trial, HeldMotion]:
     """Simulate trials: some with open fingers, others from a squeezed object or its weight."""
     _, squeezed = bench.settled(paths.closing())
     found = dict[Trial, HeldMotion]()
@@ -324,60 +319,51 @@ def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> tuple[HeldMotion, .
         if own:
             motions = bench.run([trial.drive for trial in own], start)
             found |= dict(zip(own, motions, strict=True))
-    return tuple(found[trial] for trial in trials)
+    return {trial: found[trial] for trial in trials}
 
 
 def _with_first_slips(
-    bench: HeldBench, trials: Sequence[Trial], judged: Sequence[ExecutionTrial]
-) -> list[ExecutionTrial]:
+    bench: HeldBench, judged: Mapping[Trial, ExecutionTrial]
+) -> tuple[ExecutionTrial, ...]:
     """Measure at which multiple of its load a contact first slips where all of it comes at once.
 
     Its share of the load is one when a contact slips, however little of the load's peak that takes.
     So the trial is followed again with contacts that stick: their forces, beside the cones of the
     true friction, tell the multiple.
     """
-    known = list(judged)
-    sudden = [
-        place for place, each in enumerate(judged)
+    known, friction = dict(judged), bench.scene.layout.friction
+    rough = {
+        replace(trial, drive=replace(trial.drive, friction=STICKING * friction)): trial
+        for trial, each in judged.items()
         if each.fate in {"slipped", "dropped"}
-        and (trials[place].weighing or each.kind == "lift" or each.simulated_first_slip >= FULL)
-    ]  # fmt: skip
-    if sudden:
-        friction = bench.scene.layout.friction
-        rough = [
-            replace(trial, drive=replace(trial.drive, friction=STICKING * friction))
-            for trial in (trials[place] for place in sudden)
-        ]
-        for place, trial, motion in zip(sudden, rough, run_trials(bench, rough), strict=True):
-            multiple = sticking_multiple(motion, trial.drive, friction, trial.begun)
-            known[place] = replace(known[place], simulated_first_slip=min(multiple, 1.0))
-    return known
+        and (trial.weighing or each.kind == "lift" or each.simulated_first_slip >= FULL)
+    }
+    for trial, motion in (run_trials(bench, tuple(rough)) if rough else {}).items():
+        multiple = sticking_multiple(motion, trial.drive, friction, trial.begun)
+        sudden = rough[trial]
+        known[sudden] = replace(known[sudden], simulated_first_slip=min(multiple, 1.0))
+    return tuple(known.values())
 
 
 def _confirmed_trials(
-    bench: HeldBench, trials: Sequence[Trial], predicted: Sequence[tuple[float, float]],
-    settings: ExecutionSettings,
-) -> list[ExecutionTrial]:  # fmt: skip
+    bench: HeldBench, predicted: Mapping[Trial, tuple[float, float]], settings: ExecutionSettings
+) -> dict[Trial, ExecutionTrial]:
     """Simulate trials and judge them, and those that are lost after a slip by shorter steps too."""
-    motions = run_trials(bench, trials)
-    judged = [
-        _judged(trial, motion, each, bench, settings)
-        for trial, motion, each in zip(trials, motions, predicted, strict=True)
-    ]
-    again = [
-        place for place, each in enumerate(judged) if not each.survived and each.fate != "stuck"
-    ]
+    motions = run_trials(bench, tuple(predicted))
+    judged = {
+        trial: _judged(trial, motion, predicted[trial], bench, settings)
+        for trial, motion in motions.items()
+    }
+    again = {
+        trial: motions[trial] for trial, each in judged.items()
+        if not each.survived and each.fate != "stuck"
+    }  # fmt: skip
     short = confirming_bench(bench) if again else None
-    if short is None:
-        return judged
-    second = run_again(
-        short, [trials[place] for place in again], [motions[place] for place in again],
-        settings,
-    )  # fmt: skip
-    for place, motion in zip(again, second, strict=True):
-        found = _judged(trials[place], motion, predicted[place], short, settings)
-        confirmed = not found.survived and judged[place].fate != "diverged"
-        judged[place] = replace(judged[place], step_s=short.step_s) if confirmed else found
+    if short is not None:
+        for trial, motion in run_again(short, again, settings).items():
+            first, found = judged[trial], _judged(trial, motion, predicted[trial], short, settings)
+            confirmed = not found.survived and first.fate != "diverged"
+            judged[trial] = replace(first, step_s=short.step_s) if confirmed else found
     return judged
 
 
@@ -486,7 +472,7 @@ def film(job: ExecutionJob, name: str, path: Path) -> Path:
     scene, _, trials, _ = planned(job.holder, job.settings, best)
     named = {trial.name: trial for trial in trials}
     one_of(name, tuple(named), "name")
-    (motion,) = run_trials(HeldBench(scene), [named[name]])
+    motion = run_trials(HeldBench(scene), [named[name]])[named[name]]
     stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.joints) // FRAMES))
     slowed = 1.0 / (RATE * SAMPLE_S * stride)
     caption = name if slowed <= 1.0 else f"{name}, {slowed:.1f} times slower"

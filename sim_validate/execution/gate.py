@@ -54,15 +54,7 @@ from scenes.mujoco.held import HeldLayout
 from scenes.mujoco.held_mjcf import AWAY, SAMPLE_S, HeldScene, build_held_scene, held_physics
 from scenes.mujoco.scene_parts import TOUCH
 from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
-from sim_validate.engine.gate import (
-    DEPTH,
-    Check,
-    measured,
-    near,
-    sized,
-    touch_checks,
-    two_digits,
-)
+from sim_validate.engine.gate import DEPTH, Check, measured, near, sized, touch_checks, two_digits
 from sim_validate.execution import paths
 from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.paths import Drive, Table, idle, samples, smoother

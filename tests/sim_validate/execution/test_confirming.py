@@ -80,9 +80,8 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
     trials, _ = trials_of(body, scene.layout, settings, lowest)
     motions = run_trials(bench, trials)
     slipped = 0
-    for trial, motion, again in zip(
-        trials, motions, run_again(bench, trials, motions, settings), strict=True
-    ):
+    for trial, again in run_again(bench, motions, settings).items():
+        motion = motions[trial]
         first, second = (
             outcome(each, trial.drive, best.grip.friction, trial.begun) for each in (motion, again)
         )
@@ -150,7 +149,8 @@ def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
     lowest = HeldDynamics(best.grip, scene.layout).lowest_frequency
     trials, _ = trials_of(body, scene.layout, settings, lowest)
     motions = run_trials(bench, trials)
-    (again,) = run_again(confirming_bench(bench), trials, motions, settings)
-    assert len(again.moved) == len(motions[0].moved)
-    assert np.array_equal(again.moved[0], motions[0].moved[0])
-    assert (again.moved[1:] != motions[0].moved[1:]).any(axis=1).all()
+    (motion,) = motions.values()
+    (again,) = run_again(confirming_bench(bench), motions, settings).values()
+    assert len(again.moved) == len(motion.moved)
+    assert np.array_equal(again.moved[0], motion.moved[0])
+    assert (again.moved[1:] != motion.moved[1:]).any(axis=1).all()
