@@ -258,8 +258,9 @@ class Bench(Generic[AnyScene]):
                 samples[going] = then = now + 1
                 if following is not None:
                     samples[going] = then = following(going, now, joints, speeds)
-                    skipped[going] += (then < every[going]) * (then - now - 1)
                 left = then < every[going]
+                if (then > now + 1).any():
+                    skipped[going] += left * (then - now - 1)
                 going = going if left.all() else going[left]
         return counts, skipped, errors, going
 

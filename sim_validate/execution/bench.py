@@ -245,16 +245,20 @@ class _Losing:
     def __init__(self, limits: Sequence[tuple[float, float]]) -> None:
         self.most_m, most_rad = np.transpose(limits)
         self.least_cosine = np.cos(np.minimum(most_rad, math.pi))
+        self.turns_count = bool((self.least_cosine > -1.0).any())
         self.lost = set[int]()
 
     def following(self, going: Indices, samples: Indices, joints: Array, _speeds: Array) -> Indices:
         """Give the sample after one for each trial that goes on (see `Bench.simulated`)."""
         with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
-            now = joints[going]
-            gone = np.linalg.norm(now[:, :3] - now[:, 7:10], axis=1) > self.most_m[going]
-            if (self.least_cosine > -1.0).any():
+            away = joints[going, :3] - joints[going, 7:10]
+            gone = np.linalg.norm(away, axis=1) > self.most_m[going]
+            if self.turns_count:
+                now = joints[going]
                 palm = hinged(now[:, 10 : PALM + 1]).transpose(0, 2, 1)
                 gone |= cosines(palm @ rotations(now[:, 3:7])) < self.least_cosine[going]
+        if not gone.any():
+            return samples + 1
         self.lost |= set(going[gone].tolist())
         return np.where(gone, np.iinfo(np.intp).max, samples + 1)
 
