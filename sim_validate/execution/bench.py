@@ -210,10 +210,11 @@ class HeldBench(Bench[HeldScene]):
     def _motion(self, motion: Motion, length: int, *, lost: bool) -> HeldMotion:
         """See a motion as that of a held object, which stays where it was lost."""
         last = len(motion.joints) - 1
-        rest = ((0, length - 1 - last), (0, 0))
-        joints = np.pad(motion.joints, rest, mode="edge")
-        speeds, forces, states = (np.pad(each, rest) for each in motion.kept)
+        joints, (speeds, forces, states) = motion.joints, motion.kept
         if lost:
+            rest = ((0, length - 1 - last), (0, 0))
+            joints = np.pad(joints, rest, mode="edge")
+            speeds, forces, states = (np.pad(each, rest) for each in motion.kept)
             forces[last:] = 0.0
         # where the simulator diverges: what is beyond all bounds has no cosine and no square
         joints, speeds, forces = (
