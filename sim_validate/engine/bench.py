@@ -1,24 +1,14 @@
-"""Simulates the scenes of closure tests under schedules, on MuJoCo's own threads.
+"""Simulates trials of a scene, on MuJoCo's own threads, and lays out those of closure tests.
 
 The text of a scene is always what is compiled, so that the text is the whole experiment. All trials
 of a scene run together; each is bit for bit what a plain loop over `mj_step` gives, whatever the
-number of threads.
+number of threads. A trial is what the scene is told in each sample: the wrench on the object, the
+servos' commands and, where a trial has them, forces on the palm, frictions, and the pose of a body
+that moves as told.
 
-Every trial is a schedule: the forces planned for the fingers, the external wrench and the friction
-in each sample. Loads change smoothly, because long objects spring loose under a sudden start.
-
-Wrench hold. The fingers squeeze with planned forces while friction is raised, so that the
-transients of loading cannot slip a contact that would hold at rest. Then the wrench and the forces
-planned for it are applied together, the object settles, friction is lowered to the value under
-test, and the object must stay where it is.
-
-Largest wrench. The object is either held at several shares of the predicted limit (bisection), or
-loaded in one slow rise through it (ramp). It lets go where it has moved by a threshold. The mass
-must first be accelerated, so a ramp finds the limit late, never early.
-
-Critical friction. Fingers squeeze the unloaded object with the forces that balance at the predicted
-critical friction, friction is lowered to a trial value, and the object must stay; the trial value
-is bisected.
+Trials of closure are schedules: the forces planned for the fingers, the external wrench and the
+friction in each sample. Loads change smoothly, because long objects spring loose under a sudden
+start.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -28,21 +18,30 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeAlias
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.errors import InputError
-from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.closure_scene import Layout
 from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
-from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
 
-STATE = ("time", "qpos", "qvel", "ctrl", "xfrc_applied")
+STATE = (
+    "time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat",
+)  # fmt: skip
 """Parts of a state, which lie in the order of their bits."""
 CLOCK = 0
 """Place of the time in a state."""
+FREE, PALM = 6, 12
+"""Joint velocities up to the end of the object's, and up to the end of the palm's."""
+FEWEST = 2
+"""Fewest trials that room is made for: one to close the fingers, and most controls have two."""
+CHUNK = 5
+"""Simulation steps per sample of a closure trial."""
+CLOCK_SLACK_S = 1e-9
+"""Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
+reset would change it by milliseconds."""
 
 
 def compiled(xml: str) -> mujoco.MjModel:
@@ -78,36 +77,6 @@ def step(
         trials.step(running, nstep=steps)
     except batch.SimulationError as failure:
         errors.update({int(trial): trials.error(int(trial)) for trial in failure.ids})
-
-
-def touched(
-    model: mujoco.MjModel, data: mujoco.MjData, tips: Sequence[int], *, one: bool = True
-) -> tuple[Array, Array]:
-    """Find where each fingertip is deepest in what it touches in a state of a scene.
-
-    Gives normals out of the fingertips, (k, 3), world axes, and depths, (k,) [m]; NaN for a
-    fingertip that touches nothing, or has several contacts where only one is right.
-    """
-    with unlogged():
-        mujoco.mj_forward(model, data)
-    normals, depths = np.full((len(tips), 3), np.nan), np.full(len(tips), np.nan)
-    for finger, tip in enumerate(tips):
-        own = [contact for contact in data.contact if tip in contact.geom]
-        if own and not (one and len(own) > 1):
-            contact = min(own, key=lambda each: each.dist)
-            normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
-            depths[finger] = -contact.dist
-    return normals, depths
-
-
-Mask: TypeAlias = NDArray[np.bool_]
-FEWEST = 2
-"""Fewest trials that room is made for: one to close the fingers, and most controls have two."""
-CHUNK = 5
-"""Simulation steps per sample; loads change, and motion is recorded, once per sample."""
-CLOCK_SLACK_S = 1e-9
-"""Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
-reset would change it by milliseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,64 +117,245 @@ class Health:
         )
 
 
-Following: TypeAlias = Callable[[Indices, Indices], Indices]
-"""Function that is told which trials are at which samples, and gives the sample after it for each;
-one beyond its last sample ends a trial."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """What a scene is told in each of the n samples of a trial; what is None stays as it is."""
+
+    wrenches: Array
+    """Force and torque on the object about its middle, world axes, (n, 6) [N, N m]."""
+    commands: Array
+    """Commands of the servos, (n, u)."""
+    palm: Array | None = None
+    """Forces on the palm's slides and hinges, (n, 6) [N, N m]."""
+    friction: Array | None = None
+    """Frictions of the shapes that rub (see `Bench`), (n, shapes), or (n, 1) for all of them."""
+    mocap: Array | None = None
+    """Pose of the body that moves as told, position and quaternion, (n, 7)."""
+    joints: Array | None = None
+    """Positions of all joints at the start, (q,)."""
+    velocity: Array | None = None
+    """What is added to the velocities of object and palm at the start, (3,) [m/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stepped:
-    """What was read of m trials, and how the simulator did in each."""
+class Motion:
+    """What was read after each of the n samples of a trial, in the world frame."""
 
-    series: tuple[Array, ...]
-    """Each view that was to be kept, after each sample, (m, n, ...); zero after a trial's end."""
-    counts: Indices
-    """Numbers of samples that were simulated, (m,)."""
-    health: tuple[Health, ...]
+    times_s: Array
+    joints: Array
+    """Joint positions, (n, q) [m]: position (3) and quaternion (4) of the object's frame, then
+    those of what holds it: the slides (3) of each fingertip along its contact's axes."""
+    state: Array
+    """Complete state of the simulator at the end, from which a further trial can start."""
+    health: Health
+    skipped: int = 0
+    """How many samples were left out, because the object had settled."""
+    kept: tuple[Array, ...] = ()
+    """What else its bench keeps, (n, ...) each."""
+
+    def after(self, earlier: "Motion") -> "Motion":
+        """Add the faults of the earlier motion whose end state this motion started from."""
+        return replace(self, health=self.health.after(earlier.health))
 
 
-def stepped(
-    model: mujoco.MjModel, trials: batch.Batch, steps: int, told: Sequence[tuple[Array, Array]],
-    kept: Sequence[Array], lengths: Sequence[int], following: Following | None = None,
-    deadline: float = math.inf,
-) -> Stepped:  # fmt: skip
-    """Step m trials through their samples, of so many steps each.
+Following: TypeAlias = Callable[[Indices, Indices, Array, Array], Indices]
+"""Function that is told which trials are at which samples, with positions and speeds of the joints
+of all trials, and gives the sample after it for each; one beyond its last sample ends a trial."""
 
-    Before a sample each view of the simulator in `told` gets its values, (m, n, ...); after it the
-    views to be kept are read.
+
+class HasText(Protocol):
+    """A scene of any kind."""
+
+    @property
+    def xml(self) -> str:
+        """Return the text of the model."""
+        ...
+
+
+AnyScene = TypeVar("AnyScene", bound=HasText)
+
+
+class Bench(Generic[AnyScene]):
+    """A compiled scene on which many trials run at once.
+
+    What changes is told, and what moves is read, once per sample of `chunk` steps. Beside the
+    positions of the joints, what is named in `kept` is read.
     """
-    count, every = len(lengths), np.array(lengths)
-    clock = trials.state[:count, CLOCK]
-    begun = clock.copy()
-    series = [np.zeros((count, every.max(), *view.shape[1:])) for view in kept]
-    samples, counts = np.zeros(count, dtype=np.intp), np.zeros(count, dtype=np.intp)
-    going, errors = np.arange(count), dict[int, str]()
-    with unlogged():
-        while going.size and time.monotonic() <= deadline:
-            now = samples[going]
-            rows, at, to = going, now, counts[going]
-            if going.size == count and (now == now[0]).all():  # slices are quicker than indices
-                rows, at, to = slice(count), now[0], to[0]
-            for view, values in told:
-                view[rows] = values[rows, at]
-            step(trials, errors, steps, going)
-            for found, view in zip(series, kept, strict=True):
-                found[rows, to] = view[rows]
-            counts[going] += 1
-            samples[going] = then = now + 1 if following is None else following(going, now)
-            left = then < every[going]
-            going = going if left.all() else going[left]
-    late = np.isin(np.arange(count), going)
-    off = clock - (begun + steps * counts * float(model.opt.timestep))
-    warned = trials.warning[:count, :, 1].sum(axis=1)
-    health = tuple(
-        Health(
-            all(np.isfinite(each[trial]).all() for each in (trials.state, series[0])),
-            int(warned[trial]), float(off[trial]), errors.get(trial, ""), bool(late[trial]),
-        )
-        for trial in range(count)
-    )  # fmt: skip
-    return Stepped(tuple(series), counts, health)
+
+    def __init__(
+        self, scene: AnyScene, *, threads: int = 1, timeout_s: float = math.inf,
+        chunk: int = CHUNK, step_s: float | None = None, kept: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        self.scene, self.threads, self.chunk, self.kept = scene, threads, chunk, kept
+        self.deadline = time.monotonic() + timeout_s
+        self.model = compiled(scene.xml)
+        self.step_s = float(self.model.opt.timestep) if step_s is None else step_s
+        self.model.opt.timestep = self.step_s
+        self.sample_s = chunk * self.step_s
+        self.body = self.model.body("object").id
+        self.home: Array = self.model.qpos0
+        self.moves_as_told: bool = self.model.nmocap > 0
+        self.roughness: Array = self.model.geom_friction[:, 0]
+        self.parts = state_parts(self.model)
+        touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+        # what lies between the first and the last may get their friction, too: it touches nothing
+        self.rubbing = slice(touching[0], touching[-1] + 1)
+        self.batch: batch.Batch | None = None
+
+    def simulated(
+        self, trials: Sequence[Told], start: Array | None = None,
+        following: Following | None = None,
+    ) -> tuple[Motion, ...]:  # fmt: skip
+        """Simulate trials, all from the same state, (size,), or from one each, (trials, size)."""
+        sims, lengths = self._begun(trials, start), [len(each.wrenches) for each in trials]
+        count, most = len(trials), max(lengths)
+        told, begun = self._told(sims, trials, most), sims.state[:count, CLOCK].copy()
+        views = [self._field(sims, name) for name in ("qpos", *self.kept)]
+        read = [(view, np.zeros((count, most, *view.shape[1:]))) for view in views]
+        counts, skipped, errors, late = self._stepped(sims, told, read, lengths, following)
+        off = sims.state[:count, CLOCK] - (begun + self.chunk * counts * self.step_s)
+        times = np.arange(1.0, most + 1.0) * self.chunk * self.step_s
+        motions = list[Motion]()
+        for trial, own in enumerate(counts.tolist()):
+            joints, *kept = (series[trial, :own] for _, series in read)
+            state = sims.state[trial].copy()
+            health = Health(
+                bool(np.isfinite(state).all() and np.isfinite(joints).all()),
+                int(sims.warning[trial, :, 1].sum()), float(off[trial]), errors.get(trial, ""),
+                trial in late,
+            )  # fmt: skip
+            motions.append(
+                Motion(times[:own], joints, state, health, int(skipped[trial]), tuple(kept))
+            )
+        return tuple(motions)
+
+    def _stepped(
+        self, sims: batch.Batch, told: Sequence[tuple[Array, Array]],
+        read: Sequence[tuple[Array, Array]], lengths: Sequence[int], following: Following | None,
+    ) -> tuple[Indices, Indices, dict[int, str], Indices]:  # fmt: skip
+        """Step trials through their samples.
+
+        Before a sample each view of the simulator gets the values that are told, after it each view
+        that is read is copied. Gives the numbers of samples that were simulated and left out,
+        errors, and the trials that were stopped before their ends.
+        """
+        every, count = np.array(lengths), len(lengths)
+        joints, speeds = self._field(sims, "qpos"), self._field(sims, "qvel")
+        samples, counts, skipped = np.zeros((3, count), dtype=np.intp)
+        going, errors = np.arange(count), dict[int, str]()
+        with unlogged():
+            while going.size and time.monotonic() <= self.deadline:
+                now = samples[going]
+                rows, at, to = going, now, counts[going]
+                if going.size == count and (now == now[0]).all():  # slices are quicker than indices
+                    rows, at, to = slice(count), now[0], to[0]
+                for view, values in told:
+                    view[rows] = values[rows, at]
+                step(sims, errors, self.chunk, going)
+                for view, found in read:
+                    found[rows, to] = view[rows]
+                counts[going] += 1
+                samples[going] = then = now + 1
+                if following is not None:
+                    samples[going] = then = following(going, now, joints, speeds)
+                left = then < every[going]
+                if (then > now + 1).any():
+                    skipped[going] += left * (then - now - 1)
+                going = going if left.all() else going[left]
+        return counts, skipped, errors, going
+
+    def shapes(self, names: Sequence[str]) -> list[int]:
+        """Return the places of shapes that have names."""
+        return [self.model.geom(name).id for name in names]
+
+    def touched(
+        self, tips: Sequence[str], joints: Array | None = None, *, one: bool = True
+    ) -> tuple[Array, Array]:
+        """Find where each fingertip is deepest in what it touches before anything moves.
+
+        Takes where the joints are; None for their home. Gives normals out of the fingertips,
+        (k, 3), world axes, and depths, (k,) [m]; NaN for a fingertip that touches nothing, or has
+        several contacts where only one is right.
+        """
+        data = mujoco.MjData(self.model)
+        if joints is not None:
+            data.qpos[:] = joints
+        with unlogged():
+            mujoco.mj_forward(self.model, data)
+        normals, depths = np.full((len(tips), 3), np.nan), np.full(len(tips), np.nan)
+        for finger, tip in enumerate(self.shapes(tips)):
+            own = [contact for contact in data.contact if tip in contact.geom]
+            if own and not (one and len(own) > 1):
+                contact = min(own, key=lambda each: each.dist)
+                normals[finger] = contact.frame[:3] * (1.0 if contact.geom[0] == tip else -1.0)
+                depths[finger] = -contact.dist
+        return normals, depths
+
+    def touching(self, states: Sequence[Array]) -> list[set[str]]:
+        """Return the names of the bodies that touch the object in states; none if one diverged."""
+        data, found = mujoco.MjData(self.model), list[set[str]]()
+        for state in states:
+            met = []
+            if np.isfinite(state).all():
+                mujoco.mj_setState(self.model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+                mujoco.mj_forward(self.model, data)
+                bodies = self.model.geom_bodyid[data.contact.geom]
+                met = bodies[(bodies == self.body).any(axis=1)].ravel().tolist()
+            found.append({self.model.body(place).name for place in set(met) - {self.body}})
+        return found
+
+    def _begun(self, trials: Sequence[Told], start: Array | None) -> batch.Batch:
+        """Return the simulations of trials at their starts; they are made only once."""
+        count = len(trials)
+        if self.batch is None or self.batch.nsim < count:
+            self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
+        self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        if self.batch.expanded("geom_friction") is not None:
+            self.batch.expand("geom_friction")[:] = self.model.geom_friction
+        if start is not None:
+            self.batch.state[:count] = start
+        joints, speeds = self._field(self.batch, "qpos"), self._field(self.batch, "qvel")
+        for trial, each in enumerate(trials):
+            if each.joints is not None:
+                joints[trial] = each.joints
+            if each.velocity is not None:
+                speeds[trial, :3] += each.velocity
+                speeds[trial, FREE : FREE + 3] += each.velocity
+        return self.batch
+
+    def _field(self, sims: batch.Batch, name: str) -> Array:
+        """Return a part of all states, or another field, which changes with the simulations."""
+        if name == "state":
+            return sims.state
+        return sims.state[:, self.parts[name]] if name in self.parts else sims.bind(name)
+
+    def _told(
+        self, sims: batch.Batch, trials: Sequence[Told], most: int
+    ) -> list[tuple[Array, Array]]:
+        """Return the views that are told something, and what, (trials, most, ...).
+
+        A trial that is told nothing where others are keeps what is there.
+        """
+        moved = slice(self.parts["mocap_pos"].start, self.parts["mocap_quat"].stop)
+        views = {
+            "wrenches": self._field(sims, "xfrc_applied").reshape(sims.nsim, -1, 6)[:, self.body],
+            "commands": self._field(sims, "ctrl"),
+            "palm": self._field(sims, "qfrc_applied")[:, FREE:PALM],
+            "mocap": sims.state[:, moved],
+        }
+        if any(each.friction is not None for each in trials):
+            views["friction"] = sims.expand("geom_friction")[:, self.rubbing, 0]
+        told = list[tuple[Array, Array]]()
+        for name, view in views.items():
+            rows = [getattr(each, name) for each in trials]
+            given = [row for row in rows if row is not None]
+            if not given:
+                continue
+            values = np.zeros((len(trials), most, given[0].shape[1]))
+            for own, row, there in zip(values, rows, view, strict=False):
+                own[: most if row is None else len(row)] = there if row is None else row
+            told.append((view, values))
+        return told
 
 
 def samples(duration_s: float, sample_s: float) -> int:
@@ -241,195 +391,21 @@ class Schedule:
     resting: int
     """Index of the first sample from which load and finger forces no longer change."""
 
-    @staticmethod
-    def squeeze(
-        forces: Array, friction: float, sample_s: float, protocol: HoldProtocol
-    ) -> "Schedule":
-        """Schedule the fingers to close on the unloaded object."""
-        shares, still = smooth(samples(protocol.squeeze_s, sample_s)), np.zeros(6)
-        count, opened = len(shares), Load(still, np.zeros_like(forces))
-        return _between(opened, Load(still, forces), shares, (friction, friction), count, count)
+    def told(self, layout: Layout) -> Told:
+        """Return what the scene of a layout is told, rounded like its numbers (see `arrange`)."""
+        wrenches = self.wrenches.copy()
+        wrenches[:, 3:] -= cross(layout.center, wrenches[:, :3])
+        wrenches = np.hstack([to_digits(wrenches[:, :3]), to_digits(wrenches[:, 3:])])
+        friction = to_digits(self.friction)[:, None]
+        return Told(wrenches, layout.commands(self.forces), friction=friction)
 
     @staticmethod
-    def hold(
-        idle: Load, load: Load, frictions: tuple[float, float], sample_s: float,
-        protocol: HoldProtocol,
+    def between(
+        start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
+        resting: int,
     ) -> "Schedule":  # fmt: skip
-        """Schedule a hold: load the squeezed object at high friction, settle, lower it, watch."""
-        rise, rest = samples(protocol.load_s, sample_s), samples(protocol.settle_s, sample_s)
-        shares = np.concatenate([smooth(rise), np.ones(rest + samples(protocol.hold_s, sample_s))])
-        return _between(idle, load, shares, frictions, rise + rest, rise)
-
-    @staticmethod
-    def ramp(
-        idle: Load, limit: Load, shares: tuple[float, float], friction: float, sample_s: float,
-        protocols: tuple[HoldProtocol, LimitProtocol],
-    ) -> tuple["Schedule", Array]:  # fmt: skip
-        """Schedule a load that rises slowly through the largest one that is resisted.
-
-        The load rises to the first share of the limit as in `hold`, then slowly to the second. The
-        forces balance the load all the way, whether the fingers can apply them or not.
-
-        Gives the schedule, and the share of the limit that is applied in each watched sample.
-        """
-        holding, limiting = protocols
-        rise, rest = samples(holding.load_s, sample_s), samples(holding.settle_s, sample_s)
-        lower, upper = shares
-        count = samples(limiting.ramp_s, sample_s)
-        climb = lower + (upper - lower) * np.arange(1, count + 1) / count
-        applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
-        high = holding.settling_friction * friction
-        return _between(idle, limit, applied, (high, friction), rise + rest, len(applied)), climb
-
-    @staticmethod
-    def release(
-        still: Load, frictions: tuple[float, float], sample_s: float, protocol: FrictionProtocol, *,
-        settled: bool = False,
-    ) -> "Schedule":  # fmt: skip
-        """Schedule a release: lower the friction of a squeezed object without load, and watch."""
-        rest = 0 if settled else samples(protocol.settle_s, sample_s)
-        shares = np.ones(rest + samples(protocol.hold_s, sample_s))
-        return _between(still, still, shares, frictions, rest, 0)
-
-    @staticmethod
-    def settle(
-        still: Load, friction: float, sample_s: float, protocol: FrictionProtocol
-    ) -> "Schedule":
-        """Schedule what comes before a release: a squeezed object without load settles."""
-        count = samples(protocol.settle_s, sample_s)
-        return _between(still, still, np.ones(count), (friction, friction), count, 0)
-
-
-def _between(
-    start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
-    resting: int,
-) -> Schedule:  # fmt: skip
-    friction = np.full(len(shares), frictions[0])
-    friction[watched:] = frictions[1]
-    wrenches = start.wrench + shares[:, None] * (end.wrench - start.wrench)
-    forces = start.forces + shares[:, None, None] * (end.forces - start.forces)
-    return Schedule(wrenches, forces, friction, watched, resting)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """Where object and fingertips were in each of the n samples of a trial, in the world frame."""
-
-    times_s: Array
-    joints: Array
-    """Joint positions, (n, 7 + 3k), or (n, 7) for rigid fingertips [m]: position (3) and quaternion
-    (4) of the object's frame, then the slides (3) of each fingertip along its contact's axes."""
-    state: Array
-    """Complete state of the simulator at the end, from which a further trial can start."""
-    health: Health
-    skipped: int = 0
-    """How many samples of its schedule were left out before friction was lowered, because the
-    object had settled."""
-
-    def after(self, earlier: "Motion") -> "Motion":
-        """Add the faults of the earlier motion whose end state this motion started from."""
-        return replace(self, health=self.health.after(earlier.health))
-
-
-class Ends(Protocol):
-    """What tells which trials may end before their schedules do: `EarlyEnds`."""
-
-    earliest: int
-    """The first sample after which it wants to look."""
-
-    def look(
-        self, places: Indices, samples: Indices, joints: Array, speeds: Array
-    ) -> tuple[Mask, Mask]:
-        """Tell which trials need not settle any longer, and which are answered, (n,) each."""
-        ...
-
-
-class Bench:
-    """A compiled scene on which many trials run at once."""
-
-    def __init__(self, scene: Scene, *, threads: int = 1, timeout_s: float = math.inf) -> None:
-        self.scene, self.threads = scene, threads
-        self.deadline = time.monotonic() + timeout_s
-        self.model = compiled(scene.xml)
-        self.sample_s = CHUNK * float(self.model.opt.timestep)
-        self.body = self.model.body("object").id
-        self.parts = state_parts(self.model)
-        touching = np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
-        # what lies between the first and the last may get their friction, too: it touches nothing
-        self.touching = slice(touching[0], touching[-1] + 1)
-        self.batch: batch.Batch | None = None
-
-    def first_normals(self) -> Array:
-        """Return the normals of the fingertips' deepest contacts before anything moves, (k, 3)."""
-        count = range(len(self.scene.layout.contacts))
-        tips = [self.model.geom(f"finger{finger}").id for finger in count]
-        return touched(self.model, mujoco.MjData(self.model), tips, one=False)[0]
-
-    def _trials(self, count: int) -> batch.Batch:
-        """Return at least `count` trials at rest at their contacts; they are made only once."""
-        if self.batch is None or self.batch.nsim < count:
-            self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
-        self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        return self.batch
-
-    def run(
-        self, schedules: Sequence[Schedule], start: Array | None = None, ends: Ends | None = None
-    ) -> tuple[Motion, ...]:
-        """Simulate trials of equal length, all from the same state."""
-        count, trials = len(schedules), self._trials(len(schedules))
-        if start is not None:
-            trials.state[:count] = start
-        applied, servos, joints, speeds = (
-            trials.state[:, self.parts[name]] for name in ("xfrc_applied", "ctrl", "qpos", "qvel")
-        )
-        applied = applied.reshape(len(applied), -1, 6)[:, self.body]
-        friction = trials.expand("geom_friction")[:, self.touching, 0]
-        wrenches, controls, frictions = self._applied(schedules)
-        length = frictions.shape[1]
-        watched = np.array([schedule.watched for schedule in schedules])
-        skipped = np.zeros(count, dtype=np.intp)
-
-        def following(going: Indices, samples: Indices) -> Indices:
-            after = samples + 1
-            if ends is not None and samples.min() >= ends.earliest:
-                settled, answered = ends.look(going, samples, joints[going], speeds[going])
-                skipped[going[settled]] += (watched[going] - after)[settled]
-                after = np.where(settled, watched[going], after)
-                after[answered] = length
-            return after
-
-        told = [(applied, wrenches), (servos, controls), (friction, frictions[..., None])]
-        done = stepped(
-            self.model, trials, CHUNK, told, [joints], [length] * count, following, self.deadline
-        )
-        times = self.model.opt.timestep * (CHUNK * np.arange(1, length + 1))
-        return tuple(
-            Motion(
-                times[:samples], done.series[0][trial, :samples], trials.state[trial].copy(),
-                done.health[trial], int(skipped[trial]),
-            )
-            for trial, samples in enumerate(done.counts.tolist())
-        )  # fmt: skip
-
-    def _applied(self, schedules: Sequence[Schedule]) -> tuple[Array, Array, Array]:
-        """Return what is applied in each of n samples of m trials, as the simulator takes it.
-
-        Gives external wrenches, (m, n, 6), commands of the servos, (m, n, q), frictions, (m, n).
-        """
-        layout = self.scene.layout
-        wrenches = np.array([schedule.wrenches for schedule in schedules])
-        wrenches[..., 3:] -= cross(layout.center, wrenches[..., :3])
-        # rounded like the scene's numbers (see `closure_scene.arrange`)
-        for trial in range(len(schedules)):
-            for part in (wrenches[trial, :, :3], wrenches[trial, :, 3:]):
-                part[...] = to_digits(part)
-        controls = np.array([layout.commands(schedule.forces) for schedule in schedules])
-        frictions = np.array([to_digits(schedule.friction) for schedule in schedules])
-        return wrenches, controls, frictions
-
-
-def first_touch(scene: Scene) -> tuple[Array, Array]:
-    """Find what each fingertip touches before anything moves, as `touched` gives it."""
-    model = compiled(scene.xml)
-    tips = [model.geom(f"finger{finger}").id for finger in range(len(scene.layout.contacts))]
-    return touched(model, mujoco.MjData(model), tips)
+        """Schedule shares of the way between loads; friction falls where watching begins."""
+        friction = np.where(np.arange(len(shares)) < watched, *frictions)
+        wrenches = start.wrench + shares[:, None] * (end.wrench - start.wrench)
+        forces = start.forces + shares[:, None, None] * (end.forces - start.forces)
+        return Schedule(wrenches, forces, friction, watched, resting)

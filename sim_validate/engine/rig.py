@@ -1,11 +1,17 @@
 """Holds an object between squeezing fingers, and finds the largest wrenches and least friction.
 
-Wrench holds, ramps and releases start from the squeezed object. Largest wrenches are found by a
-ramp or by bisection. Both load the object with a share of the predicted limit and the forces
-planned for it, which lie that share of the way from the gentle squeeze to the forces at the limit.
-They balance the load, because both ends do. Below the limit they are inside the cones and the
-limits on the push, again because both ends are. Above it, up to twice the limit, the forces still
-balance on paper, but friction gives way, or a finger cannot push harder.
+Wrench holds, ramps and releases start from the squeezed object. The fingers squeeze while friction
+is raised, so that the transients of loading cannot slip a contact that would hold at rest. In a
+hold, the wrench and the forces planned for it are then applied together, the object settles,
+friction is lowered to the value under test, and the object must stay where it is.
+
+Largest wrenches are found by a ramp or by bisection, where the object moves by a threshold. The
+mass must first be accelerated, so a ramp finds the limit late, never early. Both load the object
+with a share of the predicted limit and the forces planned for it, which lie that share of the way
+from the gentle squeeze to the forces at the limit. They balance the load, because both ends do.
+Below the limit they are inside the cones and the limits on the push, again because both ends are.
+Above it, up to twice the limit, the forces still balance on paper, but friction gives way, or a
+finger cannot push harder.
 
 A ramp passes the limit slowly. The load left over grows in proportion to the time since, so the
 displacement grows with its third power and the ramp ends late. A displacement eight times as large
@@ -50,7 +56,7 @@ from grasp_core.quality.wrench_limits import (
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import SQUEEZE, Layout, Scene
 from scenes.settings import HARD, Softness
-from sim_validate.engine.bench import Bench, Load, Motion, Schedule
+from sim_validate.engine.bench import Bench, Load, Motion, Schedule, samples, smooth
 from sim_validate.engine.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import EarlyEnds, Thresholds, Trace, holds, traces
 from sim_validate.settings import FrictionProtocol
@@ -73,7 +79,7 @@ class Watched:
 class Rig:
     """An object without load, squeezed by its fingers."""
 
-    bench: Bench
+    bench: Bench[Scene]
     setup: Setup
     friction: float
     """The friction at which the object is to be held."""
@@ -98,7 +104,7 @@ class Rig:
     def watch(self, load: Load, settling_frictions: Sequence[float] | None = None) -> Watched:
         """Simulate one whole hold, and keep all motion since the fingers closed."""
         (schedule,) = self.holds([load], settling_frictions)
-        (motion,) = self.bench.run([schedule], self.closed and self.closed.state)
+        (motion,) = self._simulated([schedule])
         (found,) = self._traced([schedule], [motion])
         before = [] if self.closed is None else [self.closed.joints[-1:]]
         count = len(motion.joints)
@@ -116,10 +122,12 @@ class Rig:
     ) -> list[Schedule]:
         """Schedule a hold under each load."""
         protocol = self.setup.hold
+        rise, rest, hold = self._counts(protocol.load_s, protocol.settle_s, protocol.hold_s)
+        shares = np.concatenate([smooth(rise), np.ones(rest + hold)])
         usual = protocol.settling_friction * self.friction
         settling = settling_frictions or [usual] * len(loads)
         return [
-            Schedule.hold(self.idle, load, (high, self.friction), self.bench.sample_s, protocol)
+            Schedule.between(self.idle, load, shares, (high, self.friction), rise + rest, rise)
             for load, high in zip(loads, settling, strict=True)
         ]
 
@@ -127,20 +135,38 @@ class Rig:
         self, limits: Sequence[Load], shares: tuple[float, float]
     ) -> tuple[tuple[Trace, ...], Array]:
         """Raise each load between two shares of itself; return the motions and the shares (n,)."""
-        sample_s, protocols = self.bench.sample_s, (self.setup.hold, self.setup.limit)
-        rises = [
-            Schedule.ramp(self.idle, load, shares, self.friction, sample_s, protocols)
-            for load in limits
-        ]
-        return self._traces([schedule for schedule, _ in rises]), rises[0][1]
+        rises, climb = self.ramps(limits, shares)
+        return self._traces(rises), climb
+
+    def ramps(
+        self, limits: Sequence[Load], shares: tuple[float, float]
+    ) -> tuple[list[Schedule], Array]:
+        """Schedule a slow rise of each load from one share to another, loaded to it as in a hold.
+
+        The forces balance the load all the way, whether the fingers can apply them or not. Gives
+        also the share that is applied in each watched sample.
+        """
+        hold, (lower, upper) = self.setup.hold, shares
+        rise, rest, count = self._counts(hold.load_s, hold.settle_s, self.setup.limit.ramp_s)
+        climb = lower + (upper - lower) * np.arange(1, count + 1) / count
+        applied = np.concatenate([lower * smooth(rise), np.full(rest, lower), climb])
+        frictions, every = (hold.settling_friction * self.friction, self.friction), len(applied)
+        return [
+            Schedule.between(self.idle, limit, applied, frictions, rise + rest, every)
+            for limit in limits
+        ], climb
 
     def at_rest(self, settling_friction: float) -> "Rig":
         """Let the unloaded object settle, so that it need not before each release."""
         assert self.closed is not None  # noqa: S101 - rigid fingers have not closed
-        protocol = self.setup.friction
-        trial = Schedule.settle(self.idle, settling_friction, self.bench.sample_s, protocol)
-        (motion,) = self.bench.run([trial], self.closed.state)
+        (motion,) = self._simulated([self.settling(settling_friction)])
         return replace(self, closed=motion.after(self.closed), settled=True)
+
+    def settling(self, friction: float) -> Schedule:
+        """Schedule what comes before a release: the unloaded object settles."""
+        (count,) = self._counts(self.setup.friction.settle_s)
+        frictions = friction, friction
+        return Schedule.between(self.idle, self.idle, np.ones(count), frictions, count, 0)
 
     def release(
         self, settling_friction: float, frictions: Sequence[float], threshold_m: float | None = None
@@ -151,17 +177,28 @@ class Rig:
 
     def releases(self, settling_friction: float, frictions: Sequence[float]) -> list[Schedule]:
         """Schedule a release to each friction."""
-        sample_s, protocol = self.bench.sample_s, self.setup.friction
+        rest, hold = self._counts(self.setup.friction.settle_s, self.setup.friction.hold_s)
+        rest *= not self.settled
         return [
-            Schedule.release(self.idle, (settling_friction, friction), sample_s, protocol,
-                              settled=self.settled)
+            Schedule.between(
+                self.idle, self.idle, np.ones(rest + hold), (settling_friction, friction), rest, 0
+            )
             for friction in frictions
-        ]  # fmt: skip
+        ]
 
     def joints(self, trials: Sequence[Schedule]) -> Array:
         """Return joint positions in trials, from closed fingers on, (trials, n, 7 + 3k)."""
-        motions = self.bench.run(trials, self.closed and self.closed.state)
-        return np.array([motion.joints for motion in motions])
+        return np.array([motion.joints for motion in self._simulated(trials)])
+
+    def _counts(self, *durations_s: float) -> list[int]:
+        return [samples(duration_s, self.bench.sample_s) for duration_s in durations_s]
+
+    def _simulated(
+        self, trials: Sequence[Schedule], ends: EarlyEnds | None = None
+    ) -> tuple[Motion, ...]:
+        told = [trial.told(self.bench.scene.layout) for trial in trials]
+        start = self.closed and self.closed.state
+        return self.bench.simulated(told, start, ends and ends.following)
 
     def _traces(
         self, trials: Sequence[Schedule], limits: Thresholds | None = None
@@ -170,7 +207,7 @@ class Rig:
         if limits is not None and not self.whole:
             at = None if closed is None or not len(closed.joints) else closed.joints[-1]
             ends = EarlyEnds(bench.scene.layout, trials, bench.sample_s, limits, at)
-        return self._traced(trials, bench.run(trials, closed and closed.state, ends))
+        return self._traced(trials, self._simulated(trials, ends))
 
     def _traced(self, trials: Sequence[Schedule], motions: Sequence[Motion]) -> tuple[Trace, ...]:
         closed = self.closed
@@ -193,13 +230,16 @@ def pushes(planned: Array, joints: Array, layout: Layout) -> Array:
 
 
 def squeezed(
-    bench: Bench, setup: Setup, forces: Array, friction: float,
+    bench: Bench[Scene], setup: Setup, forces: Array, friction: float,
     settling_friction: float | None = None,
 ) -> Rig:  # fmt: skip
     """Close the fingers of a compiled scene on the unloaded object."""
     high = settling_friction or setup.hold.settling_friction * friction
-    (closed,) = bench.run([Schedule.squeeze(forces, high, bench.sample_s, setup.hold)])
-    return Rig(bench, setup, friction, Load(np.zeros(6), forces), closed)
+    opened, idle = Load(np.zeros(6), np.zeros_like(forces)), Load(np.zeros(6), forces)
+    shares = smooth(samples(setup.hold.squeeze_s, bench.sample_s))
+    closing = Schedule.between(opened, idle, shares, (high, high), len(shares), len(shares))
+    (closed,) = bench.simulated([closing.told(bench.scene.layout)])
+    return Rig(bench, setup, friction, idle, closed)
 
 
 def closed_on(
@@ -337,7 +377,7 @@ class CriticalFriction(Declared):
 
 
 def released_friction(
-    bench: Bench, positions: Array, normals: Array, predicted: float, setup: Setup, *,
+    bench: Bench[Scene], positions: Array, normals: Array, predicted: float, setup: Setup, *,
     whole: bool = False,
 ) -> CriticalFriction:  # fmt: skip
     """Measure the critical friction of a grasp whose scene is compiled with any friction."""

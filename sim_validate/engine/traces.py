@@ -57,9 +57,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Shape, cross
 from grasp_core.closure.contacts import cross_matrix, normal_and_tangential
@@ -68,9 +69,10 @@ from grasp_core.figures import Shown
 from grasp_core.kinds import Measured
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.closure_scene import Layout, grasp_size
-from sim_validate.engine.bench import Health, Mask, Motion, Schedule
+from sim_validate.engine.bench import Health, Motion, Schedule
 from sim_validate.settings import HoldProtocol
 
+Mask: TypeAlias = NDArray[np.bool_]
 MICRO = 1e6
 PLANNED = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 """Planned pose of the object's frame: its position and its quaternion."""
@@ -349,10 +351,22 @@ class EarlyEnds:
         # a turn is at most 2.25 times the length of the difference of two quaternions
         self.lever = 2.25 * (float(np.linalg.norm(layout.center)) + layout.grasp_size_m)
 
+    def following(self, places: Indices, samples: Indices, joints: Array, speeds: Array) -> Indices:
+        """Give the sample after one for each trial that goes on (see `Bench.simulated`)."""
+        after = samples + 1
+        if samples.min() >= self.earliest:
+            settled, answered = self.look(places, samples, joints[places], speeds[places])
+            after = np.where(settled, self.watched[places], after)
+            after[answered] = self.frictions.shape[1]
+        return after
+
     def look(
         self, places: Indices, samples: Indices, joints: Array, speeds: Array
     ) -> tuple[Mask, Mask]:
-        """Look at joints (n, 7 + 3k) and speeds (n, 6 + 3k) of trials (see `Ends`)."""
+        """Tell from joints (n, 7 + 3k) and speeds (n, 6 + 3k) which trials go on.
+
+        Gives those that need not settle any longer, and those that are answered, (n,) each.
+        """
         settled = answered = np.zeros(len(places), dtype=np.bool_)
         with np.errstate(all="ignore"):  # what diverges is neither settled nor answered
             reach = self._reach(places, speeds)

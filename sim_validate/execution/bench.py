@@ -27,13 +27,10 @@ the cone counts only if the contact slides by more than `TOUCHED` in it, or if t
 full load.
 """
 
-# pyright: basic, reportAttributeAccessIssue=false
-# MuJoCo ships no types for its core; plain arrays and numbers leave this module.
-
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,12 +39,12 @@ from grasp_core.arrays import Array, Indices, cross
 from grasp_core.errors import InputError
 from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, hinged, palm_armature
-from scenes.mujoco.mjcf_text import quaternion, rotations
-from sim_validate.engine.bench import Health, batch, compiled, mujoco, stepped, touched
-from sim_validate.execution.paths import WHOLE, Drive, Table
+from scenes.mujoco.mjcf_text import rotations
+from sim_validate.engine.bench import FREE, PALM, Bench, Health, Motion, Told
+from sim_validate.execution.paths import WHOLE, Drive, Rows
 
-FREE, PALM = 6, 12
-"""Joint velocities up to the end of the object's, and up to the end of the palm's."""
+KEPT = ("qvel", "qfrc_constraint", "state")
+"""What is read beside the positions of joints."""
 BOUNDLESS = 1e100
 """Size from which on a number of the simulator says nothing."""
 LAID = 1e-7
@@ -55,20 +52,26 @@ LAID = 1e-7
 single precision, and about as deep as objects rest."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HeldMotion:
-    """Where object, palm and fingertips were in each of the n samples, in the world frame."""
+@dataclass(frozen=True, eq=False)
+class HeldMotion(Rows):
+    """Where object, palm and fingertips were in each of the n samples of a trial.
 
-    moved: Array
-    """Displacement of the object's centre of mass, (n, 3) [m]."""
-    turned: Array
-    """Orientation of the object (w, x, y, z), (n, 4)."""
-    palm: Array
-    """Positions of the palm's slides and hinges, (n, 6) [m, rad]."""
-    fingers: Array
-    """Positions of the fingers' joints, (n, joints) [m, rad]."""
+    What is in the world's frame is kept, and what the palm or the object sees is made from it.
+    """
+
+    ROWS = ("joints", "states", "tips", "tip_turns", "forces", "pressed", "table")
+
+    layout: HeldLayout
+    health: Health
+    joints: Array
+    """Positions of the scene's joints, (n, 13 + joints) [m, rad]: those of the object and its
+    orientation (w, x, y, z), those of the palm's slides and hinges, and those of the fingers."""
+    states: Array
+    """Complete state of the simulator, from which a trial can go on, (n, size)."""
     tips: Array
     """Displacements of the fingertips along their springs, (n, k, 3) [m]."""
+    tip_turns: Array
+    """Orientations of the fingertips in the palm, (n, k, 3, 3), or (n, 1, 3, 3) if alike."""
     forces: Array
     """Contact forces on the object along the axes of the springs, (n, k, 3) [N]."""
     pressed: Array
@@ -76,164 +79,143 @@ class HeldMotion:
     last step of a sample."""
     table: Array
     """Force of the table on the object, (n, 3) [N]; other loads are taken away."""
-    states: Array
-    """Complete state of the simulator, from which a trial can go on, (n, size)."""
-    health: Health
-    tip_turns: Array | None
-    """Orientations of the fingertips as the palm sees them, (n, k, 3, 3); None where they do not
-    turn."""
 
     @property
-    def joints(self) -> Array:
-        """Return the positions of all joints as the scene has them, (n, 13 + joints)."""
-        return np.concatenate([self.moved, self.turned, self.palm, self.fingers], axis=1)
+    def moved(self) -> Array:
+        """Displacement of the object's centre of mass in the world, (n, 3) [m]."""
+        return self.joints[:, :3]
+
+    @property
+    def turned(self) -> Array:
+        """Orientation of the object in the world (w, x, y, z), (n, 4)."""
+        return self.joints[:, 3:7]
+
+    @property
+    def palm(self) -> Array:
+        """Positions of the palm's slides and hinges, (n, 6) [m, rad]."""
+        return self.joints[:, 7 : PALM + 1]
+
+    @cached_property
+    def shifts(self) -> Array:
+        """Displacement of the object's centre of mass in the palm, (n, 3) [m]."""
+        return np.einsum("nji,nj->ni", hinged(self.palm[:, 3:]), self.moved - self.palm[:, :3])
+
+    @cached_property
+    def turns(self) -> Array:
+        """Orientation of the object in the palm, (n, 3, 3)."""
+        return hinged(self.palm[:, 3:]).transpose(0, 2, 1) @ rotations(self.turned)
+
+    @cached_property
+    def spun(self) -> Array:
+        """Orientations of the fingertips in the object, as `tip_turns`."""
+        back: Array = self.turns.transpose(0, 2, 1)[:, None]
+        return back @ self.tip_turns
+
+    @cached_property
+    def centers(self) -> Array:
+        """Centres of the fingertips in the object's frame, (n, k, 3) [m]."""
+        layout = self.layout
+        centers = layout.tip_centers + np.einsum("kij,nkj->nki", layout.axes, self.tips)
+        return np.einsum("nji,nkj->nki", self.turns, centers - self.shifts[:, None])
+
+    @cached_property
+    def pushes(self) -> Array:
+        """Contact forces on the object, (n, k, 3) [N], in the frames of the contacts.
+
+        They turn with the object: normal, tangent, tangent.
+        """
+        along = np.einsum("kij,nkj->nki", self.layout.axes, self.forces)
+        own = np.einsum("nji,nkj->nki", self.pressed, along)
+        return np.einsum("kij,nki->nkj", self.layout.frames, own)
+
+    def slid(self, begun: int = 0) -> Array:
+        """Return the displacement of each point of contact by (1) since a sample, (n, k, 3) [m]."""
+        normals, spun = self.layout.frames[:, :, 0], self.spun[begun:]
+        change: Array = spun[:-1] @ spun[1:].transpose(0, 1, 3, 2)  # its axis is that of minus dt
+        turns = 0.5 * np.stack(
+            [change[..., 2, 1] - change[..., 1, 2], change[..., 0, 2] - change[..., 2, 0],
+             change[..., 1, 0] - change[..., 0, 1]], axis=-1,
+        )  # fmt: skip
+        rolled = self.layout.tip_radius_m[:, None] * cross(turns, normals)
+        slid = np.diff(self.centers[begun:], axis=0) - rolled
+        slid -= np.einsum("nki,ki->nk", slid, normals)[..., None] * normals
+        return np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
+
+    def slides(self, begun: int = 0) -> Array:
+        """Return how far each point of contact has slid by (1) since a sample, (n, k) [m]."""
+        return np.linalg.norm(self.slid(begun), axis=2)
 
 
-SERIES = tuple(each.name for each in fields(HeldMotion) if each.name != "health")
-"""Fields of a motion that have a row for each sample, where they are known."""
-
-
-def motions_joined(first: HeldMotion, second: HeldMotion) -> HeldMotion:
-    """Return one motion after another, with the faults of both."""
-    both: dict[str, Any] = {}
-    for name in SERIES:
-        parts = getattr(first, name), getattr(second, name)
-        both[name] = None if parts[0] is None else np.concatenate(parts)
-    return HeldMotion(**both, health=second.health.after(first.health))
-
-
-def begun_motion(motion: HeldMotion, count: int) -> HeldMotion:
-    """Return the first samples of a motion, as if nothing had gone wrong after them."""
-    rows = ((name, getattr(motion, name)) for name in SERIES)
-    first: dict[str, Any] = {name: None if own is None else own[:count] for name, own in rows}
-    return HeldMotion(**first, health=Health())
-
-
-class HeldBench:
+class HeldBench(Bench[HeldScene]):
     """A compiled scene of execution on which many trials run at once."""
 
     def __init__(
         self, scene: HeldScene, *, threads: int = 1, sample_s: float = SAMPLE_S,
         lost_m: float = math.inf, step_s: float | None = None,
     ) -> None:  # fmt: skip
-        self.scene, self.threads, self.lost_m = scene, threads, lost_m
-        self.model = compiled(scene.xml)
-        if step_s is None:
-            step_s = float(self.model.opt.timestep)
-        self.model.opt.timestep = self.step_s = step_s
-        self.chunk = max(1, round(sample_s / step_s))
-        self.sample_s = self.chunk * step_s
-        if sample_s == SAMPLE_S and abs(self.sample_s - SAMPLE_S) > WHOLE * SAMPLE_S:
+        step_s = scene.physics.timestep if step_s is None else step_s
+        chunk = max(1, round(sample_s / step_s))
+        if sample_s == SAMPLE_S and abs(chunk * step_s - SAMPLE_S) > WHOLE * SAMPLE_S:
             raise InputError(
                 f"physics.timestep must divide the sample of {SAMPLE_S:g} s, got {step_s:g} s; "
                 "take 0.00125 s"
             )
-        self.body = self.model.body("object").id
-        self.tips = [self.model.geom(name).id for name in scene.layout.tip_names]
+        super().__init__(scene, threads=threads, chunk=chunk, step_s=step_s, kept=KEPT)
+        self.lost_m = lost_m
+        self.tips = self.shapes(scene.layout.tip_names)
+        self.rubbing = slice(min(self.tips), max(self.tips) + 1)
 
-    def run(
-        self, drives: Sequence[Drive], start: Array | None = None, friction: Array | None = None,
-        lost: Sequence[tuple[float, float]] | None = None,
-    ) -> tuple[HeldMotion, ...]:  # fmt: skip
-        """Simulate trials, all from the same state or from their own start.
+    def run(self, drives: Sequence[Drive], start: Array | None = None) -> tuple[HeldMotion, ...]:
+        """Simulate trials, all from the same state, (size,), or from one each, (n, size)."""
+        losing = _Losing([drive.lost or (self.lost_m, math.inf) for drive in drives])
+        told = [self._told_by(drive, fresh=start is None) for drive in drives]
+        motions = self.simulated(told, start, losing.following)
+        return tuple(
+            self._motion(motion, len(drive), lost=place in losing.lost)
+            for place, (motion, drive) in enumerate(zip(motions, drives, strict=True))
+        )
 
-        Takes `start` (size,) or (n, size); `friction` (k,) or (n, k). Trials end where the object
-        is `lost`, farther from its planned place in the hand, or turned by more [m, rad].
-        """
-        trials = self._begun(drives, start, friction)
-        return self._stepped(trials, drives, lost or [(self.lost_m, math.inf)] * len(drives))
-
-    def settled(
-        self, drive: Drive, start: Array | None = None, friction: Array | None = None
-    ) -> tuple[HeldMotion, Array]:
+    def settled(self, drive: Drive, start: Array | None = None) -> tuple[HeldMotion, Array]:
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
-        (motion,) = self.run([drive], start, friction)
+        (motion,) = self.run([drive], start)
         return motion, motion.states[-1]
 
-    def touched(self, reached: Array) -> tuple[Array, Array]:
-        """Find what each fingertip touches before anything moves, as `bench.touched` gives it."""
-        data = mujoco.MjData(self.model)
-        data.qpos[PALM + 1 :] = self.scene.layout.joints(reached)
-        return touched(self.model, data, self.tips)
+    def placed(self, reached: Array | None) -> Array:
+        """Return the positions of all joints where fingertips are displaced along their springs."""
+        joints = self.home.copy()
+        if reached is not None:
+            joints[PALM + 1 :] = self.scene.layout.joints(reached)
+        return joints
 
-    def _begun(
-        self, drives: Sequence[Drive], start: Array | None, friction: Array | None
-    ) -> batch.Batch:
-        trials = batch.Batch(self.model, len(drives), self.threads)
-        trials.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        if start is not None:
-            trials.state[:] = start
-        joints, speeds = trials.bind("qpos"), trials.bind("qvel")
-        for place, drive in enumerate(drives):
-            if drive.pose is not None and start is None:
-                joints[place, :7] = [*drive.pose.moved, *drive.pose.quaternion]
-            if drive.reached is not None and start is None:
-                joints[place, PALM + 1 :] = self.scene.layout.joints(drive.reached)
-            speeds[place, :3] += drive.velocity
-            speeds[place, FREE : FREE + 3] += drive.velocity
-            if drive.table is not None:  # where it touches: objects would fall, sink and rise
-                into = LAID * self.scene.layout.radius_m
-                trials.bind("mocap_pos")[place, 0] = drive.table.point + into * drive.table.normal
-                trials.bind("mocap_quat")[place, 0] = quaternion(facing(drive.table))
-        if friction is not None:
-            trials.expand("geom_friction")[:, self.tips, 0] = friction
-        return trials
-
-    def _stepped(
-        self, trials: batch.Batch, drives: Sequence[Drive], limits: Sequence[tuple[float, float]]
-    ) -> tuple[HeldMotion, ...]:
-        lengths = [len(drive) for drive in drives]
-        loads, motors, commands = self._applied(drives, max(lengths))
-        joints, lost = trials.bind("qpos"), np.zeros(len(drives), dtype=bool)
-        most_m, most_rad = np.transpose(limits)
-        least_cosine = np.cos(np.minimum(most_rad, math.pi))
-        turns_count = bool((least_cosine > -1.0).any())
-
-        def following(going: Indices, samples: Indices) -> Indices:
-            with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
-                away = np.linalg.norm(joints[going, :3] - joints[going, 7:10], axis=1)
-                gone = away > most_m[going]
-                if turns_count:
-                    palm = hinged(joints[going, 10 : PALM + 1]).transpose(0, 2, 1)
-                    gone |= cosines(palm @ rotations(joints[going, 3:7])) < least_cosine[going]
-            lost[going] = gone
-            return np.where(gone, max(lengths), samples + 1)
-
-        told = [
-            (trials.bind("xfrc_applied")[:, self.body], loads),
-            (trials.bind("qfrc_applied")[:, FREE:PALM], motors), (trials.bind("ctrl"), commands),
-        ]  # fmt: skip
-        kept = [joints, trials.bind("qvel"), trials.bind("qfrc_constraint"), trials.state]
-        done = stepped(self.model, trials, self.chunk, told, kept, lengths, following)
-        moved, speeds, forces, states = done.series
-        for trial in np.flatnonzero(lost):  # it stays where it was lost
-            last = done.counts[trial] - 1
-            moved[trial, last:], forces[trial, last:] = moved[trial, last], 0.0
-        return tuple(
-            self._motion(
-                moved[trial, :length], speeds[trial, :length], forces[trial, :length],
-                states[trial, :length], done.health[trial],
-            )
-            for trial, length in enumerate(lengths)
+    def _told_by(self, drive: Drive, *, fresh: bool) -> Told:
+        """Return what a drive tells the scene; where its trial is fresh, it begins in its pose."""
+        layout, n, joints, table, friction = self.scene.layout, len(drive), None, None, None
+        loads = drive.wrenches.copy()
+        loads[:, :3] += layout.object_kg * (drive.gravity - layout.gravity)
+        if fresh:
+            joints = self.placed(drive.reached)
+            if drive.pose is not None:
+                joints[:7] = [*drive.pose.moved, *drive.pose.quaternion]
+        if drive.table is not None:  # where it touches: objects would fall, sink and rise
+            point = drive.table.point + LAID * layout.radius_m * drive.table.normal
+            table = np.tile([*point, *drive.table.quaternion], (n, 1))
+        if drive.friction is not None:
+            friction = np.tile(self.roughness[self.rubbing], (n, 1))
+            friction[:, np.array(self.tips) - self.rubbing.start] = drive.friction
+        return Told(
+            loads, layout.commands(drive.grasping.reshape(n, -1), drive.reached),
+            drive.accelerations * palm_armature(layout), friction, table, joints, drive.velocity,
         )  # fmt: skip
 
-    def _applied(self, drives: Sequence[Drive], most: int) -> tuple[Array, Array, Array]:
-        """Return loads, forces of the palm and commands, (trials, n, ...); zero after an end."""
-        layout = self.scene.layout
-        loads = np.zeros((len(drives), most, 6))
-        motors = np.zeros((len(drives), most, PALM - FREE))
-        commands = np.zeros((len(drives), most, self.model.nu))
-        for place, drive in enumerate(drives):
-            n = len(drive)
-            loads[place, :n] = drive.wrenches
-            loads[place, :n, :3] += layout.object_kg * (drive.gravity - layout.gravity)
-            motors[place, :n] = drive.accelerations * palm_armature(layout)
-            commands[place, :n] = layout.commands(drive.grasping.reshape(n, -1), drive.reached)
-        return loads, motors, commands
-
-    def _motion(
-        self, joints: Array, speeds: Array, forces: Array, states: Array, health: Health
-    ) -> HeldMotion:
+    def _motion(self, motion: Motion, length: int, *, lost: bool) -> HeldMotion:
+        """See a motion as that of a held object, which stays where it was lost."""
+        last = len(motion.joints) - 1
+        joints, (speeds, forces, states) = motion.joints, motion.kept
+        if lost:
+            rest = ((0, length - 1 - last), (0, 0))
+            joints = np.pad(joints, rest, mode="edge")
+            speeds, forces, states = (np.pad(each, rest) for each in motion.kept)
+            forces[last:] = 0.0
         # where the simulator diverges: what is beyond all bounds has no cosine and no square
         joints, speeds, forces = (
             np.where(np.abs(each) < BOUNDLESS, each, np.nan) for each in (joints, speeds, forces)
@@ -250,25 +232,41 @@ class HeldBench:
         tips, _, turns = layout.fingers_seen(fingers, forces[:, PALM:], turned)
         before = fingers + back[:, PALM:]
         _, contact, _ = layout.fingers_seen(before, forces[:, PALM:], pressed)
-        finger_forces = np.einsum("kij,nkj->ni", layout.axes, contact)
+        if turns is None:
+            turns = np.broadcast_to(np.eye(3), (length, 1, 3, 3))
+        table = forces[:, :3] - np.einsum("kij,nkj->ni", layout.axes, contact)
         return HeldMotion(
-            joints[:, :3], joints[:, 3:7], palm, fingers, tips, contact, pressed,
-            forces[:, :3] - finger_forces, states, health, turns,
-        )  # fmt: skip
+            layout, motion.health, joints, states, tips, turns, contact, pressed, table
+        )
+
+
+class _Losing:
+    """Ends trials where their object is farther from its place, or turned by more, than it may."""
+
+    def __init__(self, limits: Sequence[tuple[float, float]]) -> None:
+        self.most_m, most_rad = np.transpose(limits)
+        self.least_cosine = np.cos(np.minimum(most_rad, math.pi))
+        self.turns_count = bool((self.least_cosine > -1.0).any())
+        self.lost = set[int]()
+
+    def following(self, going: Indices, samples: Indices, joints: Array, _speeds: Array) -> Indices:
+        """Give the sample after one for each trial that goes on (see `Bench.simulated`)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # where the simulator diverges
+            away = joints[going, :3] - joints[going, 7:10]
+            gone = np.linalg.norm(away, axis=1) > self.most_m[going]
+            if self.turns_count:
+                now = joints[going]
+                palm = hinged(now[:, 10 : PALM + 1]).transpose(0, 2, 1)
+                gone |= cosines(palm @ rotations(now[:, 3:7])) < self.least_cosine[going]
+        if not gone.any():
+            return samples + 1
+        self.lost |= set(going[gone].tolist())
+        return np.where(gone, np.iinfo(np.intp).max, samples + 1)
 
 
 def cosines(turned: Array) -> Array:
     """Return the cosines of the angles of rotations, (n,)."""
     return 0.5 * (np.einsum("nii->n", turned) - 1.0)
-
-
-def facing(table: Table) -> Array:
-    """Return a rotation whose third column is the table's normal, (3, 3)."""
-    normal = table.normal
-    aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    first = np.cross(aside, normal)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(normal, first), normal])
 
 
 ON_CONE = 0.9995
@@ -284,23 +282,6 @@ IDLE = 1e-3
 """Normal force at rest, relative to the largest, below which a fingertip does not push."""
 FULL = 0.999
 """Share of the load above which it is all there."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Seen:
-    """A motion as the palm sees it, in each of n samples."""
-
-    moved: Array
-    """Displacement of the object's centre of mass, (n, 3) [m]."""
-    turned: Array
-    spun: Array
-    """Orientations of the fingertips in the object's frame, (n, k, 3, 3), or (n, 1, 3, 3) where
-    they turn alike."""
-    tips: Array
-    """Centres of the fingertips in the object's frame, (n, k, 3) [m]."""
-    forces: Array
-    """Contact forces on the object in the frames of the contacts, which turn with it, (n, k, 3)
-    [N]: normal, tangent, tangent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,91 +301,44 @@ class Outcome:
     """Multiple of the trial's load at which the first contact slips; at most one if one did."""
 
 
-def seen(motion: HeldMotion, layout: HeldLayout) -> Seen:
-    """Look at a motion from the palm and from the object."""
-    palm = hinged(motion.palm[:, 3:])
-    turned = palm.transpose(0, 2, 1) @ rotations(motion.turned)
-    moved = np.einsum("nji,nj->ni", palm, motion.moved - motion.palm[:, :3])
-    centers = layout.tip_centers + np.einsum("kij,nkj->nki", layout.axes, motion.tips)
-    tips = np.einsum("nji,nkj->nki", turned, centers - moved[:, None])
-    along = np.einsum("kij,nkj->nki", layout.axes, motion.forces)
-    own = np.einsum("nji,nkj->nki", motion.pressed, along)
-    back: Array = turned.transpose(0, 2, 1)[:, None]
-    spun = back if motion.tip_turns is None else back @ motion.tip_turns
-    return Seen(moved, turned, spun, tips, np.einsum("kij,nki->nkj", layout.frames, own))
-
-
-def outcome(
-    motion: HeldMotion, layout: HeldLayout, drive: Drive, friction: Array, begun: int = 0
-) -> Outcome:
+def outcome(motion: HeldMotion, drive: Drive, friction: Array, begun: int = 0) -> Outcome:
     """Say what became of the object since a sample of a trial."""
-    found = seen(motion, layout)
-    turned = cosines(found.turned[begun:] @ found.turned[begun].T)
-    touching = found.forces[-1, :, 0] > 0.0
-    slid = float(slides(found, layout, begun).max(initial=0.0))
-    leaving = None if drive.table is None else _slid(found, layout, begun) / layout.radius_m
-    multiple = _first_slip(found, drive.shares, friction, begun, leaving)
-    slipped = multiple <= 1.0 or slid > SLID * layout.radius_m
+    moved, turned, radius_m = motion.shifts[begun:], motion.turns[begun:], motion.layout.radius_m
+    turns = np.arccos(np.clip(cosines(turned @ turned[0].T), -1.0, 1.0))
+    slid = float(motion.slides(begun).max(initial=0.0))
+    leaving = None if drive.table is None else motion.slid(begun) / radius_m
+    multiple = _first_slip(motion.pushes, drive.shares, friction, begun, leaving)
+    slipped = multiple <= 1.0 or slid > SLID * radius_m
     return Outcome(
         slip_m=slid,
-        displacement_m=float(
-            np.linalg.norm(found.moved[begun:] - found.moved[begun], axis=1).max()
-        ),
-        turn_rad=float(np.arccos(np.clip(turned, -1.0, 1.0)).max()),
-        dropped=not touching.any(),
+        displacement_m=float(np.linalg.norm(moved - moved[0], axis=1).max()),
+        turn_rad=float(turns.max()),
+        dropped=not (motion.pushes[-1, :, 0] > 0.0).any(),
         slipped=slipped,
         first_slip=min(multiple, 1.0) if slipped else multiple,
     )
 
 
-def sticking_multiple(
-    motion: HeldMotion, layout: HeldLayout, drive: Drive, friction: Array, begun: int
-) -> float:
+def sticking_multiple(motion: HeldMotion, drive: Drive, friction: Array, begun: int) -> float:
     """Return the multiple of the load at which contacts that stick would reach their cones."""
-    found = seen(motion, layout)
-    pushing, _ = _on_cone(found, friction, begun)
-    found = replace(found, forces=found.forces[:, pushing])
-    loaded = begun + np.flatnonzero(drive.shares[begun:] >= FULL)
-    multiples = _extrapolated(found, drive.shares, friction[pushing], begun, loaded)
-    return float(multiples.min(initial=np.inf))
+    pushing, _ = _on_cone(motion.pushes, friction, begun)
+    return _under_full_load(motion.pushes[:, pushing], drive.shares, friction[pushing], begun)
 
 
-def slides(found: Seen, layout: HeldLayout, begun: int = 0) -> Array:
-    """Return how far each point of contact has slid by (1) since a sample, (n, k) [m]."""
-    return np.linalg.norm(_slid(found, layout, begun), axis=2)
-
-
-def _slid(found: Seen, layout: HeldLayout, begun: int) -> Array:
-    """Return the displacement of each point of contact by (1) since a sample, (n, k, 3) [m]."""
-    normals = layout.frames[:, :, 0]
-    steps = np.diff(found.tips[begun:], axis=0)
-    spun = found.spun[begun:]
-    change: Array = spun[:-1] @ spun[1:].transpose(0, 1, 3, 2)  # its axis is that of minus dt
-    turns = 0.5 * np.stack(
-        [change[..., 2, 1] - change[..., 1, 2], change[..., 0, 2] - change[..., 2, 0],
-         change[..., 1, 0] - change[..., 0, 1]], axis=-1,
-    )  # fmt: skip
-    rolled = layout.tip_radius_m[:, None] * cross(turns, normals)
-    slid = steps - rolled
-    slid -= np.einsum("nki,ki->nk", slid, normals)[..., None] * normals
-    return np.concatenate([np.zeros((1, *slid.shape[1:])), np.cumsum(slid, axis=0)])
-
-
-def first_trouble(motion: HeldMotion, layout: HeldLayout, friction: Array, begun: int) -> int:
+def first_trouble(motion: HeldMotion, friction: Array, begun: int) -> int:
     """Return the first sample in which a contact slips or opens, or the simulator fails; else n."""
-    found = seen(motion, layout)
-    on_cone = _on_cone(found, friction, begun)[1].any(axis=1)
+    on_cone = _on_cone(motion.pushes, friction, begun)[1].any(axis=1)
     troubled = np.flatnonzero(on_cone | ~np.isfinite(motion.joints).all(axis=1))
-    return int(troubled[0]) if len(troubled) else len(motion.moved)
+    return int(troubled[0]) if len(troubled) else len(motion.joints)
 
 
 def _on_cone(
-    found: Seen, friction: Array, begun: int
+    pushes: Array, friction: Array, begun: int
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which contacts push at rest, (k,), and when those slip or are open, (n, pushing)."""
-    rest_n = found.forces[begun, :, 0]
+    rest_n = pushes[begun, :, 0]
     pushing = rest_n > IDLE * rest_n.max()  # a fingertip that pushes at nothing cannot slip
-    forces = found.forces[:, pushing]
+    forces = pushes[:, pushing]
     across = np.linalg.norm(forces[..., 1:], axis=2)
     on_cone = across >= ON_CONE * friction[pushing] * forces[..., 0]
     on_cone[: begun + 1] = False
@@ -412,21 +346,20 @@ def _on_cone(
 
 
 def _first_slip(
-    found: Seen, shares: Array, friction: Array, begun: int, leaving: Array | None = None
+    pushes: Array, shares: Array, friction: Array, begun: int, leaving: Array | None = None
 ) -> float:
-    pushing, on_cone = _on_cone(found, friction, begun)
+    pushing, on_cone = _on_cone(pushes, friction, begun)
     if not pushing.any():
         return 0.0
-    found, friction = replace(found, forces=found.forces[:, pushing]), friction[pushing]
+    forces, friction = pushes[:, pushing], friction[pushing]
     if leaving is not None:
         on_cone[begun:] &= ~_touches(on_cone[begun:], shares[begun:], leaving[:, pushing])
     slipping = on_cone.any(axis=1)
     if not slipping.any():
-        loaded = np.flatnonzero(shares >= FULL)
-        return float(_extrapolated(found, shares, friction, begun, loaded).min(initial=np.inf))
+        return _under_full_load(forces, shares, friction, begun)
     at = int(np.argmax(slipping))
     before, after = sorted((float(shares[at - 1]), float(shares[at])))
-    (multiple,) = _extrapolated(found, shares, friction, begun, np.array([at - 1]))
+    (multiple,) = _extrapolated(forces, shares, friction, begun, np.array([at - 1]))
     return min(max(float(multiple), before), after)
 
 
@@ -443,10 +376,16 @@ def _touches(on_cone: NDArray[np.bool_], shares: Array, slid: Array) -> NDArray[
     return found
 
 
-def _extrapolated(found: Seen, shares: Array, friction: Array, begun: int, at: Indices) -> Array:
+def _under_full_load(forces: Array, shares: Array, friction: Array, begun: int) -> float:
+    """Return the least multiple of the load at first slip that is seen while all of it is there."""
+    loaded = np.flatnonzero(shares[begun:] >= FULL) + begun
+    return float(_extrapolated(forces, shares, friction, begun, loaded).min(initial=np.inf))
+
+
+def _extrapolated(forces: Array, shares: Array, friction: Array, begun: int, at: Indices) -> Array:
     """Return the multiple of the load at first slip as it is seen in samples `at`, (m,)."""
-    rest = found.forces[begun]
-    changes = (found.forces[at] - rest).reshape(-1, 3)
-    steps = slip_steps(np.tile(rest, (len(at), 1)), changes, np.tile(friction, len(at)))
-    least = steps.reshape(len(at), -1).min(axis=1)
-    return np.multiply(shares[at], least, out=np.full(len(at), np.inf), where=np.isfinite(least))
+    rest, count = forces[begun], len(at)
+    changes = (forces[at] - rest).reshape(-1, 3)
+    steps = slip_steps(np.tile(rest, (count, 1)), changes, np.tile(friction, count))
+    least = steps.reshape(count, -1).min(axis=1)
+    return np.multiply(shares[at], least, out=np.full(count, np.inf), where=np.isfinite(least))

@@ -37,8 +37,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.held_scene import SAMPLE_S, HeldScene, build_held_scene, held_physics, hinged
-from scenes.mujoco.mjcf_text import quaternion, rotations
+from scenes.mujoco.held_scene import SAMPLE_S, HeldScene, build_held_scene, held_physics
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution import paths
@@ -48,23 +47,14 @@ from sim_validate.execution.bench import (
     HeldBench,
     HeldMotion,
     Outcome,
-    begun_motion,
     cosines,
-    facing,
     first_trouble,
-    motions_joined,
     outcome,
     sticking_multiple,
 )
 from sim_validate.execution.gate import require_faithful_execution
-from sim_validate.execution.paths import Drive, parted
-from sim_validate.execution.predictions import (
-    Holder,
-    NoSqueezeError,
-    found_enough,
-    planned,
-    predicted_losses,
-)
+from sim_validate.execution.paths import Drive
+from sim_validate.execution.predictions import Holder, NoSqueezeError, found_enough, planned
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
@@ -91,34 +81,33 @@ def confirming_bench(bench: HeldBench) -> HeldBench | None:
 
 
 def run_again(
-    bench: HeldBench, trials: Sequence[Trial], motions: Sequence[HeldMotion],
-    settings: ExecutionSettings,
-) -> Iterator[HeldMotion]:  # fmt: skip
-    """Yield motions in which trials are simulated with short steps from before their trouble on."""
-    begins = [_begin(trial, motion, bench) for trial, motion in zip(trials, motions, strict=True)]
-    again = bench.run(
-        [_rest(trial, begin) for trial, begin in zip(trials, begins, strict=True)],
-        np.stack([motion.states[begin] for motion, begin in zip(motions, begins, strict=True)]),
-        lost=[
-            _lost(motion, trial.begun, settings)
-            for trial, motion in zip(trials, motions, strict=True)
-        ],
-    )  # fmt: skip
-    for motion, begin, rest in zip(motions, begins, again, strict=True):
-        yield motions_joined(begun_motion(motion, begin + 1), rest)
+    bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
+) -> dict[Trial, HeldMotion]:
+    """Simulate trials with short steps from before their trouble on."""
+    begins = [_begin(trial, motion) for trial, motion in motions.items()]
+    drives, starts = list[Drive](), list[Array]()
+    for (trial, motion), begin in zip(motions.items(), begins, strict=True):
+        drives.append(replace(_rest(trial, begin), lost=_lost(motion, trial.begun, settings)))
+        starts.append(motion.states[begin])
+    found = dict[Trial, HeldMotion]()
+    rests = bench.run(drives, np.stack(starts))
+    for (trial, motion), begin, rest in zip(motions.items(), begins, rests, strict=True):
+        first = replace(motion.rows(slice(begin + 1)), health=rest.health)  # faults came later
+        found[trial] = first.then(rest)
+    return found
 
 
-def _begin(trial: Trial, motion: HeldMotion, bench: HeldBench) -> int:
+def _begin(trial: Trial, motion: HeldMotion) -> int:
     """Return the sample after which a trial is run again.
 
     It is the first where fingers that close do not come to hold the object, and where contacts slip
     within samples only, so that nothing says when.
     """
-    layout = bench.scene.layout
+    layout = motion.layout
     pushing = np.linalg.norm(layout.pushes, axis=1) > IDLE * float(np.abs(layout.pushes).max())
     if (motion.forces[trial.begun, pushing] == 0.0).all(axis=1).any():
         return 0
-    trouble = first_trouble(motion, layout, layout.friction, trial.begun)
+    trouble = first_trouble(motion, layout.friction, trial.begun)
     return max(0, trouble - BEFORE) if trouble < len(motion.moved) else 0
 
 
@@ -128,7 +117,7 @@ def _rest(trial: Trial, begin: int) -> Drive:
     A trial that starts to move when its weight has come has its speed in later states; one that
     goes on from before gets it at once, as uniform motion changes nothing.
     """
-    rest = parted(trial.drive, begin + 1)[1]
+    rest = trial.drive.rows(slice(begin + 1, None))
     return rest if begin < trial.weighing else replace(rest, velocity=np.zeros(3))
 
 
@@ -137,10 +126,9 @@ def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[
 
     Gives a distance [m] and an angle [rad].
     """
-    palm = hinged(motion.palm[begun : begun + 1, 3:]).transpose(0, 2, 1)
-    (cosine,) = cosines(palm @ rotations(motion.turned[begun : begun + 1]))
+    (cosine,) = cosines(motion.turns[begun : begun + 1])
     angle = math.acos(min(max(float(cosine), -1.0), 1.0))
-    away = float(np.linalg.norm(motion.moved[begun] - motion.palm[begun, :3]))
+    away = float(np.linalg.norm(motion.shifts[begun]))
     return settings.most_m + away, settings.most_rad + angle
 
 
@@ -274,12 +262,12 @@ def simulated(
     require_faithful_execution(scene.layout, scene.physics, settings, settings.push_n)
     lost_m = max(LOST * holder.body.radius, 2.0 * settings.most_m)
     bench = HeldBench(scene, threads=threads, lost_m=lost_m)
-    predicted = predicted_losses(dynamics, trials, settings)
+    predicted = dict(zip(trials, dynamics.losses(trials, settings), strict=True))
     return Execution(
         mass_kg=settings.object_kg,
         squeeze=best.grip.squeeze,
         load_multiple=best.scale,
-        trials=tuple(_judged_trials(bench, trials, predicted, settings)),
+        trials=_with_first_slips(bench, _confirmed_trials(bench, predicted, settings)),
         controls=run_controls(bench, best, dynamics.lowest_frequency),
         skipped=skipped,
         physics=scene.physics,
@@ -312,90 +300,70 @@ def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> 
     return moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
 
 
-def run_trials(
-    bench: HeldBench, trials: Sequence[Trial], friction: Array | None = None
-) -> tuple[HeldMotion, ...]:
-    """Simulate trials: some with open fingers, others from a squeezed object or its weight.
-
-    Contacts may have another friction, (k,), once the object is squeezed.
-    """
+def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> dict[Trial, HeldMotion]:
+    """Simulate trials: some with open fingers, others from a squeezed object or its weight."""
     _, squeezed = bench.settled(paths.closing())
     found = dict[Trial, HeldMotion]()
     if weighing := [trial for trial in trials if trial.weighing]:
         # The weight comes once for all. Hand and object get the speed that they start with when it
         # has come: uniform motion changes nothing.
-        parts = [parted(trial.drive, trial.weighing) for trial in weighing]
-        still = replace(parts[0][0], velocity=np.zeros(3))
-        weight, state = bench.settled(still, squeezed, friction)
-        motions = bench.run([after for _, after in parts], state, friction)
-        for trial, motion in zip(weighing, motions, strict=True):
-            found[trial] = motions_joined(weight, motion)
+        first = weighing[0].drive.rows(slice(weighing[0].weighing))
+        weight, state = bench.settled(replace(first, velocity=np.zeros(3)), squeezed)
+        rests = [trial.drive.rows(slice(trial.weighing, None)) for trial in weighing]
+        for trial, motion in zip(weighing, bench.run(rests, state), strict=True):
+            health = motion.health.after(weight.health)
+            found[trial] = replace(weight.then(motion), health=health)
     apart = [trial for trial in trials if trial.apart]
     others = [trial for trial in trials if not (trial.weighing or trial.apart)]
     for own, start in ((apart, None), (others, squeezed)):
         if own:
-            motions = bench.run([trial.drive for trial in own], start, friction)
+            motions = bench.run([trial.drive for trial in own], start)
             found |= dict(zip(own, motions, strict=True))
-    return tuple(found[trial] for trial in trials)
-
-
-def _judged_trials(
-    bench: HeldBench, trials: Sequence[Trial], predicted: Sequence[tuple[float, float]],
-    settings: ExecutionSettings,
-) -> list[ExecutionTrial]:  # fmt: skip
-    """Simulate trials and judge them, those that are lost where a contact slips a second time."""
-    return _with_first_slips(bench, trials, _confirmed_trials(bench, trials, predicted, settings))
+    return {trial: found[trial] for trial in trials}
 
 
 def _with_first_slips(
-    bench: HeldBench, trials: Sequence[Trial], judged: Sequence[ExecutionTrial]
-) -> list[ExecutionTrial]:
+    bench: HeldBench, judged: Mapping[Trial, ExecutionTrial]
+) -> tuple[ExecutionTrial, ...]:
     """Measure at which multiple of its load a contact first slips where all of it comes at once.
 
     Its share of the load is one when a contact slips, however little of the load's peak that takes.
     So the trial is followed again with contacts that stick: their forces, beside the cones of the
     true friction, tell the multiple.
     """
-    known = list(judged)
-    sudden = [
-        place for place, each in enumerate(judged)
+    known, friction = dict(judged), bench.scene.layout.friction
+    rough = {
+        replace(trial, drive=replace(trial.drive, friction=STICKING * friction)): trial
+        for trial, each in judged.items()
         if each.fate in {"slipped", "dropped"}
-        and (trials[place].weighing or each.kind == "lift" or each.simulated_first_slip >= FULL)
-    ]  # fmt: skip
-    if sudden:
-        friction = bench.scene.layout.friction
-        stuck = run_trials(bench, [trials[place] for place in sudden], STICKING * friction)
-        for place, motion in zip(sudden, stuck, strict=True):
-            multiple = sticking_multiple(motion, bench.scene.layout, trials[place].drive,
-                                         friction, trials[place].begun)  # fmt: skip
-            known[place] = replace(known[place], simulated_first_slip=min(multiple, 1.0))
-    return known
+        and (trial.weighing or each.kind == "lift" or each.simulated_first_slip >= FULL)
+    }
+    for trial, motion in (run_trials(bench, tuple(rough)) if rough else {}).items():
+        multiple = sticking_multiple(motion, trial.drive, friction, trial.begun)
+        sudden = rough[trial]
+        known[sudden] = replace(known[sudden], simulated_first_slip=min(multiple, 1.0))
+    return tuple(known.values())
 
 
 def _confirmed_trials(
-    bench: HeldBench, trials: Sequence[Trial], predicted: Sequence[tuple[float, float]],
-    settings: ExecutionSettings,
-) -> list[ExecutionTrial]:  # fmt: skip
+    bench: HeldBench, predicted: Mapping[Trial, tuple[float, float]], settings: ExecutionSettings
+) -> dict[Trial, ExecutionTrial]:
     """Simulate trials and judge them, and those that are lost after a slip by shorter steps too."""
-    motions = run_trials(bench, trials)
-    judged = [
-        _judged(trial, motion, each, bench, settings)
-        for trial, motion, each in zip(trials, motions, predicted, strict=True)
-    ]
-    again = [
-        place for place, each in enumerate(judged) if not each.survived and each.fate != "stuck"
-    ]
+    motions = run_trials(bench, tuple(predicted))
+    judged = {
+        trial: _judged(trial, motion, predicted[trial], bench, settings)
+        for trial, motion in motions.items()
+    }
+    again = {
+        trial: motions[trial] for trial, each in judged.items()
+        if not each.survived and each.fate != "stuck"
+    }  # fmt: skip
     short = confirming_bench(bench) if again else None
-    if short is None:
-        return judged
-    second = run_again(
-        short, [trials[place] for place in again], [motions[place] for place in again],
-        settings,
-    )  # fmt: skip
-    for place, motion in zip(again, second, strict=True):
-        found = _judged(trials[place], motion, predicted[place], short, settings)
-        confirmed = not found.survived and judged[place].fate != "diverged"
-        judged[place] = replace(judged[place], step_s=short.step_s) if confirmed else found
+    if short is not None:
+        for trial, motion in run_again(short, again, settings).items():
+            first, found = judged[trial], _judged(trial, motion, predicted[trial], short, settings)
+            confirmed = not found.survived and first.fate != "diverged"
+            judged[trial] = replace(first, step_s=short.step_s) if confirmed else found
     return judged
 
 
@@ -406,8 +374,7 @@ def _judged(
     if motion.health.fault:
         found = DIVERGED
     else:
-        layout = bench.scene.layout
-        found = outcome(motion, layout, trial.drive, layout.friction, trial.begun)
+        found = outcome(motion, trial.drive, motion.layout.friction, trial.begun)
     kept = found.displacement_m <= settings.most_m and found.turn_rad <= settings.most_rad
     held = "slipped" if found.slipped else "stuck"
     lost = "diverged" if motion.health.fault else "dropped"
@@ -505,13 +472,13 @@ def film(job: ExecutionJob, name: str, path: Path) -> Path:
     scene, _, trials, _ = planned(job.holder, job.settings, best)
     named = {trial.name: trial for trial in trials}
     one_of(name, tuple(named), "name")
-    (motion,) = run_trials(HeldBench(scene), [named[name]])
-    stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.moved) // FRAMES))
+    motion = run_trials(HeldBench(scene), [named[name]])[named[name]]
+    stride = max(1, min(round(1.0 / (RATE * SAMPLE_S)), len(motion.joints) // FRAMES))
     slowed = 1.0 / (RATE * SAMPLE_S * stride)
     caption = name if slowed <= 1.0 else f"{name}, {slowed:.1f} times slower"
     table, gravity = named[name].drive.table, scene.layout.gravity
     up = -gravity / np.linalg.norm(gravity) if table is None else table.normal
     return write_held_clip(
         scene, motion.joints[::stride], path, caption, up=up,
-        table=None if table is None else (table.point, quaternion(facing(table))),
+        table=None if table is None else (table.point, table.quaternion),
     )  # fmt: skip

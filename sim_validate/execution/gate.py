@@ -53,18 +53,9 @@ from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, build_held_scene, held_physics
 from scenes.mujoco.scene_text import AWAY, TOUCH
 from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
-from sim_validate.engine.gate import (
-    DEPTH,
-    Check,
-    angles,
-    measured,
-    near,
-    sized,
-    touch_checks,
-    two_digits,
-)
+from sim_validate.engine.gate import DEPTH, Check, measured, near, sized, touch_checks, two_digits
 from sim_validate.execution import paths
-from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome, seen, slides
+from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
 
 DOWN = np.array(UPRIGHT)
@@ -256,16 +247,16 @@ def held_box(case: HeldCase) -> tuple[Check, ...]:
     jump[:JUMP, 0] = JUMP_SHARE * case.light_n
     sudden = replace(idle(2 * JUMP), wrenches=jump)
     motions = bench.run([*ramps, still, moving, sudden], start)
-    layout, friction = bench.scene.layout, bench.scene.layout.friction
+    friction = bench.scene.layout.friction
     slips = [
-        (1.0 + WINDOW) * outcome(motion, layout, drive, friction).first_slip
+        (1.0 + WINDOW) * outcome(motion, drive, friction).first_slip
         for motion, drive in zip(motions[:2], ramps, strict=True)
     ]
-    rest, uniform = (seen(motion, layout) for motion in motions[2:4])
+    rest, uniform = motions[2:4]
     spring = case.light_n / (FINGERS * case.stiffness_n_per_m)
-    gone = rest.moved[-_period(case) :].mean(axis=0) / spring
-    apart = float(np.abs(uniform.moved - rest.moved).max()) / spring
-    pulled = float(np.abs(uniform.forces - rest.forces).max()) / case.light_n
+    gone = rest.shifts[-_period(case) :].mean(axis=0) / spring
+    apart = float(np.abs(uniform.shifts - rest.shifts).max()) / spring
+    pulled = float(np.abs(uniform.pushes - rest.pushes).max()) / case.light_n
     return (
         met("weight at which a held box slips, over 4 mu N", motions[0], slips[0]),
         _oblique(case),
@@ -277,8 +268,8 @@ def held_box(case: HeldCase) -> tuple[Check, ...]:
                apart),
         little("contact force that uniform motion of the palm adds, over the load", motions[3],
                pulled),
-        _creep(case, motions[2], layout),
-        _jumps(case, motions[4], layout),
+        _creep(case, motions[2]),
+        _jumps(case, motions[4]),
         *_rings(replace(case, damping_ratio=RING_DAMPING)),
     )  # fmt: skip
 
@@ -289,7 +280,7 @@ def _oblique(case: HeldCase) -> Check:
     _, start = bench.settled(paths.closing(SETTLE_S))
     drive = _ramp(case, 0.0, np.array([0.0, math.sin(OBLIQUE), -math.cos(OBLIQUE)]))
     (motion,) = bench.run([drive], start)
-    found = outcome(motion, bench.scene.layout, drive, bench.scene.layout.friction)
+    found = outcome(motion, drive, bench.scene.layout.friction)
     name = "weight at which a box slips obliquely across its contacts, over 4 mu N"
     return met(name, motion, (1.0 + WINDOW) * found.first_slip)
 
@@ -304,10 +295,9 @@ def _ramp(case: HeldCase, rising: float, way: Array = DOWN) -> Drive:
     return replace(drive, accelerations=accelerations)
 
 
-def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
+def _creep(case: HeldCase, motion: HeldMotion) -> Check:
     """Check how far contacts that stick creep in the time of the longest trial."""
-    last = _period(case)
-    slid = slides(seen(motion, layout), layout)
+    last, slid = _period(case), motion.slides()
     speed = float(np.abs(slid[-1] - slid[-last]).max()) / ((last - 1) * SAMPLE_S)
     longest = len(paths.turned_weight(case.frequency)) * SAMPLE_S
     far = speed * longest / (SLID * case.radius_m)
@@ -315,7 +305,7 @@ def _creep(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
     return little(name, motion, far, CREEP)
 
 
-def _jumps(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
+def _jumps(case: HeldCase, motion: HeldMotion) -> Check:
     """Check the contact forces while a load comes and goes suddenly, sample by sample.
 
     The simulator may be one step of h late: after each jump x'' changes by (1 + 2 zeta) w h of the
@@ -334,9 +324,9 @@ def _jumps(case: HeldCase, motion: HeldMotion, layout: HeldLayout) -> Check:
         accelerations.append(float(state[0]))
     applied = np.repeat([1.0, 0.0], JUMP)
     right = load * (applied - share * np.array(accelerations))
-    carried = -np.einsum("kj,nkj->n", layout.axes[:, 0], motion.forces)
+    carried = -np.einsum("kj,nkj->n", motion.layout.axes[:, 0], motion.forces)
     off = float(np.abs(carried - right).max()) / load
-    late = (1.0 + 2.0 * zeta) * w * held_physics(layout).timestep * share
+    late = (1.0 + 2.0 * zeta) * w * held_physics(motion.layout).timestep * share
     name = "error of contact forces while a load comes and goes suddenly, over the load"
     return little(name, motion, off, late)
 
@@ -360,9 +350,8 @@ def _rings(case: HeldCase) -> list[Check]:
     wrenches = np.zeros((count, 6))
     wrenches[0] = mass * undamped * sizes / bench.sample_s
     (motion,) = bench.run([replace(idle(count), wrenches=wrenches)], start)
-    view = seen(motion, scene.layout)
-    turns = 0.5 * (view.turned - view.turned.transpose(0, 2, 1))
-    rung = np.hstack([view.moved, turns[:, [2, 0, 1], [1, 2, 0]]])[1:]
+    turns = 0.5 * (motion.turns - motion.turns.transpose(0, 2, 1))
+    rung = np.hstack([motion.shifts, turns[:, [2, 0, 1], [1, 2, 0]]])[1:]
     names = [f"{word} {axis}" for word in ("along", "about") for axis in "xyz"]
     rates = np.sqrt(stiff / mass - (0.5 * damper / mass) ** 2)
     return [
@@ -489,7 +478,7 @@ def struck_box(case: HeldCase) -> Check:
     for bench in (HeldBench(scene), HeldBench(scene, step_s=step_s)):
         _, start = bench.settled(paths.closing(SETTLE_S))
         motions += bench.run([blow], start)
-    here, there = (seen(motion, scene.layout).moved for motion in motions)
+    here, there = (motion.shifts for motion in motions)
     changed = float(np.abs(here - there).max()) / max(float(np.abs(there).max()), SMALLEST)
     name = "motion of a box struck off its fingers that short steps change, over the largest"
     faulty = any(motion.health.fault for motion in motions)
@@ -519,13 +508,13 @@ def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
     bench = HeldBench(scene)
     into = DEPTH * case.radius_m * normals
     reached = np.einsum("kij,ki->kj", scene.layout.axes, into)
-    found, depths = bench.touched(reached)
-    off = np.abs(depths / ((DEPTH + TOUCH) * case.radius_m) - 1.0)
+    found, depths = bench.touched(scene.layout.tip_names, bench.placed(reached))
+    depths /= (DEPTH + TOUCH) * case.radius_m
     motion, _ = bench.settled(paths.closing(SETTLE_S))
     forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])
     missed = np.linalg.norm(forces - pushes[:, None] * normals, axis=1) / pushes
     return (
-        *touch_checks(angles(found, normals), off, f", on a {name}"),
+        *touch_checks(found, normals, depths, f", on a {name}"),
         little(f"error of a contact's force under even pressure, on a {name}", motion,
                float(np.max(missed))),  # NaN if one is
     )  # fmt: skip

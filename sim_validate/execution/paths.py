@@ -17,15 +17,33 @@ share the sphere evenly. u is chosen so that the speed on the sphere is the same
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.closure.contacts import WRENCH
+from grasp_core.closure.contacts import WRENCH, contact_frames
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.held_scene import SAMPLE_S
+from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine import bench
 from sim_validate.engine.bench import smooth
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A value with a row for each sample in the fields that `ROWS` names."""
+
+    ROWS: ClassVar[tuple[str, ...]]
+
+    def rows(self, which: slice) -> Self:
+        """Return the value in some of its samples."""
+        return replace(self, **{name: getattr(self, name)[which] for name in self.ROWS})
+
+    def then(self, later: Self) -> Self:
+        """Return this value with the samples of a later one after its own."""
+        pairs = ((name, (getattr(self, name), getattr(later, name))) for name in self.ROWS)
+        return replace(self, **{name: np.concatenate(pair) for name, pair in pairs})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,10 +62,17 @@ class Table:
     point: Array
     normal: Array
 
+    @property
+    def quaternion(self) -> Array:
+        """Orientation of the plane, whose third axis is its normal, (4,)."""
+        return quaternion(np.roll(contact_frames(self.normal), -1, axis=1))
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+
+@dataclass(frozen=True, eq=False)
+class Drive(Rows):
     """What is applied in each of the n samples of a trial."""
+
+    ROWS = ("accelerations", "gravity", "wrenches", "grasping", "shares")
 
     accelerations: Array
     """Acceleration of the palm (linear, angular about its middle), (n, 6) [m/s^2, rad/s^2]."""
@@ -66,6 +91,10 @@ class Drive:
     """Displacements of the fingertips along their springs at the start, (k, 3) [m], from where
     their commands then count; None for none."""
     table: Table | None = None
+    friction: Array | None = None
+    """Frictions of the fingertips, (k,); None for those of the scene."""
+    lost: tuple[float, float] | None = None
+    """How far from its planned place in the hand, or turned, the object ends the trial [m, rad]."""
 
     def __len__(self) -> int:
         return len(self.shares)
@@ -78,23 +107,6 @@ def idle(count: int) -> Drive:
         accelerations=nothing, gravity=nothing[:, :3], wrenches=nothing, grasping=np.ones(count),
         shares=np.zeros(count), velocity=np.zeros(3),
     )  # fmt: skip
-
-
-SERIES = ("accelerations", "gravity", "wrenches", "grasping", "shares")
-"""Fields that have a row for each sample."""
-
-
-def joined(first: Drive, second: Drive) -> Drive:
-    """Return one drive after another; start and table are those of the first."""
-    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in SERIES}
-    return replace(first, **both)
-
-
-def parted(drive: Drive, count: int) -> tuple[Drive, Drive]:
-    """Return the first samples of a drive, and the others; both have its start and table."""
-    first = {name: getattr(drive, name)[:count] for name in SERIES}
-    second = {name: getattr(drive, name)[count:] for name in SERIES}
-    return replace(drive, **first), replace(drive, **second)
 
 
 CLOSE_S = 0.15
@@ -162,10 +174,8 @@ def turned_weight(slowest_rad_per_s: float) -> Drive:
     count = samples(float(along[-1]) / speed)
     evenly = along[-1] * np.arange(count) / (count - 1.0)
     path = _spiral(np.asarray(np.interp(evenly, along, fine), dtype=np.float64), turns)
-    rise = smooth(samples(RISE_S))
-    share = np.concatenate([rise, np.ones(count)])
-    way = np.concatenate([np.broadcast_to(path[0], (len(rise), 3)), path])
-    return loaded(share, GRAVITY_M_PER_S2 * way)
+    way = np.concatenate([np.broadcast_to(path[0], (WEIGHING, 3)), path])
+    return _weighed(GRAVITY_M_PER_S2 * way, count)
 
 
 def _spiral(u: Array, turns: float) -> Array:
@@ -176,8 +186,12 @@ def _spiral(u: Array, turns: float) -> Array:
 
 def held_weight(gravity: Array, rest_s: float = RISE_S) -> Drive:
     """Return the drive in which the weight comes in one direction, and stays."""
-    share = np.concatenate([smooth(samples(RISE_S)), np.ones(samples(rest_s))])
-    return loaded(share, gravity)
+    return _weighed(gravity, samples(rest_s))
+
+
+def _weighed(gravity: Array, count: int) -> Drive:
+    """Return the drive in which the weight comes, and stays for so many samples."""
+    return loaded(np.concatenate([smooth(WEIGHING), np.ones(count)]), gravity)
 
 
 def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
@@ -192,8 +206,7 @@ def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
     speeds = -size * np.cos(rate * times) / rate
     accelerations = np.zeros((WEIGHING + wave, 6))
     accelerations[WEIGHING:] = np.diff(speeds)[:, None] / SAMPLE_S * axis
-    share = np.concatenate([smooth(WEIGHING), np.ones(wave)])
-    return replace(loaded(share, gravity), accelerations=accelerations)
+    return replace(_weighed(gravity, wave), accelerations=accelerations)
 
 
 def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive:
@@ -209,8 +222,7 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
     accelerations = np.zeros((WEIGHING + len(shape) + rest, 6))
     size = speed / (SAMPLE_S * float(shape.sum()))  # the deceleration, but for the shortest stops
     accelerations[WEIGHING : WEIGHING + len(shape), :3] = -size * shape[:, None] * way
-    share = np.concatenate([smooth(WEIGHING), np.ones(len(shape) + rest)])
-    under = loaded(share, gravity)
+    under = _weighed(gravity, len(shape) + rest)
     return replace(under, accelerations=accelerations, velocity=speed * way)
 
 
@@ -222,8 +234,7 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
     force = impulse / (SAMPLE_S * shape.sum())
     whole = np.concatenate([force, np.cross(point, force)])
     wrenches[WEIGHING : WEIGHING + strike] = shape[:, None] * whole
-    share = np.concatenate([smooth(WEIGHING), np.ones(strike + rest)])
-    return replace(loaded(share, gravity), wrenches=wrenches)
+    return replace(_weighed(gravity, strike + rest), wrenches=wrenches)
 
 
 def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tuple[Drive, int]:
@@ -237,7 +248,7 @@ def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tu
     total = len(accelerations)
     close = smooth(samples(CLOSE_S))
     grasping = np.concatenate([np.zeros(laid), close, np.ones(total - laid - len(close))])
-    risen = height * u[1:] ** 3 * (10.0 - 15.0 * u[1:] + 6.0 * u[1:] ** 2)
+    risen = height * smoother(count)
     share = np.ones(total)
     share[:before] = 0.0
     share[before : before + count] = np.minimum(risen / max(min(give_m, height), TINY_M), 1.0)

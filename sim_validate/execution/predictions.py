@@ -59,6 +59,7 @@ from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, gravity_of
+from scenes.mujoco.mjcf_text import rotations
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive
 from sim_validate.execution.trials import Trial, trials_of
@@ -66,48 +67,6 @@ from sim_validate.execution.verdict import Enough, Skipped
 from sim_validate.settings import ExecutionSettings
 
 POSE = 6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class HeldDynamics:
-    """A held object as a mass on springs, by (1)."""
-
-    grip: Grip
-    layout: HeldLayout
-    maps: Array
-    """W_i, (k, 6, 3)."""
-    own: Array
-    """M_o, (6, 6) [kg, kg m^2]."""
-    tips: Array
-    """m_i, (k, 3, 3) [kg]."""
-    carried: Array
-    """Masses on which the acceleration of the fingers' bases acts, (k,) [kg]."""
-    mass: Array
-    """M, (6, 6) [kg, kg m, kg m^2]."""
-    damping: Array
-    """C, (6, 6) [N s/m, N s, N m s]."""
-    dampers: Array
-    """C_i, (k, 3, 3) [N s/m]."""
-
-    @property
-    def lowest_frequency(self) -> float:
-        """Return the lowest natural frequency [rad/s], without damping; 0 if unstable."""
-        inverse = np.linalg.inv(np.linalg.cholesky(self.mass))
-        stiff = inverse @ self.grip.grasp_stiffness @ inverse.T
-        return float(np.sqrt(max(np.linalg.eigvalsh(0.5 * (stiff + stiff.T))[0], 0.0)))
-
-
-def held_dynamics(grip: Grip, layout: HeldLayout) -> HeldDynamics:
-    """Build (1) for a grip and the masses and dampers of its scene."""
-    maps = grasp_map(grip.arms).reshape(POSE, -1, 3).transpose(1, 0, 2)
-    own = np.zeros((POSE, POSE))
-    own[:3, :3] = layout.object_kg * np.eye(3)
-    own[3:, 3:] = layout.inertia_kg_m2
-    dampers = np.einsum("kij,kj,klj->kil", layout.axes, layout.damping, layout.axes)
-    tips = np.einsum("kij,kj,klj->kil", layout.axes, layout.tip_masses, layout.axes)
-    mass = own + np.einsum("kij,kjl,kml->im", maps, tips, maps)
-    damping = np.einsum("kij,kjl,kml->im", maps, dampers, maps)
-    return HeldDynamics(grip, layout, maps, own, tips, layout.tips_carried, mass, damping, dampers)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,115 +81,125 @@ class Expected:
     turn_rad: float
 
 
-def predicted_losses(
-    dynamics: HeldDynamics, trials: Sequence[Trial], settings: ExecutionSettings
-) -> list[tuple[float, float]]:
-    """Return the multiples of each trial's load of the first slip, and of loss.
+class HeldDynamics:
+    """A held object as a mass on springs, by (1)."""
 
-    Both are zero where the grip is unstable at rest.
-    """
-    if not trials or not dynamics.grip.stable:
-        return [(0.0, 0.0)] * len(trials)
-    most_m, most_rad = settings.most_m, settings.most_rad
-    found = expected(dynamics, [trial.expected or trial.drive for trial in trials])
-    slips = np.array([each.first_slip for each in found])
-    loads = np.array([each.slipping for each in found]) @ dynamics.grip.grasp_stiffness.T
-    moved = np.array([max(each.moved_m / most_m, each.turn_rad / most_rad) for each in found])
-    with np.errstate(divide="ignore"):
-        sticking = 1.0 / moved
-    beyond = np.maximum(slips, loss_multiples(dynamics.grip, loads, most_m, most_rad))
-    turning = [trial.turning for trial in trials]
-    losses = np.minimum(sticking, np.where(turning, slips, beyond))
-    return list(zip(slips.tolist(), losses.tolist(), strict=True))
+    def __init__(self, grip: Grip, layout: HeldLayout) -> None:
+        self.grip, self.layout, axes = grip, layout, layout.axes
+        self.maps: Array = grasp_map(grip.arms).reshape(POSE, -1, 3).transpose(1, 0, 2)  # W_i
+        self.dampers: Array = np.einsum("kij,kj,klj->kil", axes, layout.damping, axes)  # C_i
+        self.tips: Array = np.einsum("kij,kj,klj->kil", axes, layout.tip_masses, axes)  # m_i
+        self.own = np.zeros((POSE, POSE))  # M_o
+        self.own[:3, :3] = layout.object_kg * np.eye(3)
+        self.own[3:, 3:] = layout.inertia_kg_m2
+        # M and C
+        self.mass: Array = self.own + np.einsum("kij,kjl,kml->im", self.maps, self.tips, self.maps)
+        self.damping: Array = np.einsum("kij,kjl,kml->im", self.maps, self.dampers, self.maps)
 
+    @property
+    def lowest_frequency(self) -> float:
+        """Return the lowest natural frequency [rad/s], without damping; 0 if unstable."""
+        inverse = np.linalg.inv(np.linalg.cholesky(self.mass))
+        stiff = inverse @ self.grip.grasp_stiffness @ inverse.T
+        return float(np.sqrt(max(np.linalg.eigvalsh(0.5 * (stiff + stiff.T))[0], 0.0)))
 
-def expected(dynamics: HeldDynamics, drives: Sequence[Drive]) -> list[Expected]:
-    """Solve (1) for each drive of a grip that is stable at rest."""
-    if not drives:
-        return []
-    lengths = [len(drive) for drive in drives]
-    loads = np.zeros((len(drives), max(lengths), POSE))
-    bases = np.zeros((len(drives), max(lengths), *dynamics.layout.contacts.shape))
-    for place, drive in enumerate(drives):
-        loads[place, : len(drive)], bases[place, : len(drive)] = _load(dynamics, drive)
-    grip, found = dynamics.grip, list[Expected]()
-    for every, changes, count in zip(*_responses(dynamics, loads, bases), lengths, strict=True):
-        rest, friction = np.tile(grip.local_squeeze, (count, 1)), np.tile(grip.friction, count)
-        steps = slip_steps(rest, changes[:count].reshape(-1, 3), friction)
-        slips, motion = steps.reshape(count, -1).min(axis=1), every[:count]
-        found.append(
-            Expected(
-                first_slip=float(slips.min()),
-                slipping=motion[first_best(-slips)],
-                moved_m=float(np.linalg.norm(motion[:, :3], axis=1).max()),
-                turn_rad=float(np.linalg.norm(motion[:, 3:], axis=1).max()),
+    def losses(
+        self, trials: Sequence[Trial], settings: ExecutionSettings
+    ) -> list[tuple[float, float]]:
+        """Return the multiples of each trial's load of the first slip, and of loss.
+
+        Both are zero where the grip is unstable at rest.
+        """
+        if not trials or not self.grip.stable:
+            return [(0.0, 0.0)] * len(trials)
+        most_m, most_rad = settings.most_m, settings.most_rad
+        found = self.expected([trial.expected or trial.drive for trial in trials])
+        slips = np.array([each.first_slip for each in found])
+        loads = np.array([each.slipping for each in found]) @ self.grip.grasp_stiffness.T
+        moved = np.array([max(each.moved_m / most_m, each.turn_rad / most_rad) for each in found])
+        with np.errstate(divide="ignore"):
+            sticking = 1.0 / moved
+        beyond = np.maximum(slips, loss_multiples(self.grip, loads, most_m, most_rad))
+        turning = [trial.turning for trial in trials]
+        losses = np.minimum(sticking, np.where(turning, slips, beyond))
+        return list(zip(slips.tolist(), losses.tolist(), strict=True))
+
+    def expected(self, drives: Sequence[Drive]) -> list[Expected]:
+        """Solve (1) for each drive of a grip that is stable at rest."""
+        lengths = [len(drive) for drive in drives]
+        loads = np.zeros((len(drives), max(lengths), POSE))
+        bases = np.zeros((len(drives), max(lengths), *self.layout.contacts.shape))
+        for place, drive in enumerate(drives):
+            loads[place, : len(drive)], bases[place, : len(drive)] = self._load(drive)
+        grip, found = self.grip, list[Expected]()
+        for every, changes, count in zip(*self._responses(loads, bases), lengths, strict=True):
+            rest, friction = np.tile(grip.local_squeeze, (count, 1)), np.tile(grip.friction, count)
+            steps = slip_steps(rest, changes[:count].reshape(-1, 3), friction)
+            slips, motion = steps.reshape(count, -1).min(axis=1), every[:count]
+            found.append(
+                Expected(
+                    first_slip=float(slips.min()),
+                    slipping=motion[first_best(-slips)],
+                    moved_m=float(np.linalg.norm(motion[:, :3], axis=1).max()),
+                    turn_rad=float(np.linalg.norm(motion[:, 3:], axis=1).max()),
+                )
             )
-        )
-    return found
+        return found
 
+    def _load(self, drive: Drive) -> tuple[Array, Array]:
+        """Return w of (2), (n, 6), and the accelerations b_i, (n, k, 3), in the palm's axes.
 
-def _load(dynamics: HeldDynamics, drive: Drive) -> tuple[Array, Array]:
-    """Return w of (2), (n, 6), and the accelerations b_i, (n, k, 3), in the palm's axes.
+        A table carries the object until its share of the load is one.
+        """
+        layout, turning = self.layout, drive.accelerations[:, 3:]
+        angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(turning, axis=0), axis=0)
+        share = drive.shares if drive.table is not None else np.ones(len(drive))
+        load = drive.wrenches.copy()
+        # the palm's angles are about one axis at a time
+        half = 0.5 * np.linalg.norm(angles, axis=1, keepdims=True)
+        turns = rotations(np.hstack([np.cos(half), 0.5 * np.sinc(half / math.pi) * angles]))
+        weight = layout.object_kg * share[:, None] * drive.gravity
+        load[:, :3] += np.einsum("nji,nj->ni", turns, weight)
+        # the palm's rate of turning in the middle of each sample
+        rates = SAMPLE_S * (np.cumsum(turning, axis=0) - 0.5 * turning)
+        inwards = cross(rates[:, None], cross(rates[:, None], layout.tip_centers))
+        sideways = cross(turning[:, None], layout.tip_centers)
+        bases = drive.accelerations[:, None, :3] + sideways + inwards
+        load -= drive.accelerations @ self.own.T
+        load[:, 3:] -= cross(rates, rates @ layout.inertia_kg_m2)
+        load -= np.einsum("kij,k,nkj->ni", self.maps, layout.tips_carried, bases)
+        return load, bases
 
-    A table carries the object until its share of the load is one.
-    """
-    layout, turning = dynamics.layout, drive.accelerations[:, 3:]
-    angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(turning, axis=0), axis=0)
-    share = drive.shares if drive.table is not None else np.ones(len(drive))
-    load = drive.wrenches.copy()
-    load[:, :3] += _turned_back(layout.object_kg * share[:, None] * drive.gravity, angles)
-    # the palm's rate of turning in the middle of each sample
-    rates = SAMPLE_S * (np.cumsum(turning, axis=0) - 0.5 * turning)
-    inwards = cross(rates[:, None], cross(rates[:, None], layout.tip_centers))
-    sideways = cross(turning[:, None], layout.tip_centers)
-    bases = drive.accelerations[:, None, :3] + sideways + inwards
-    load -= drive.accelerations @ dynamics.own.T
-    load[:, 3:] -= cross(rates, rates @ layout.inertia_kg_m2)
-    load -= np.einsum("kij,k,nkj->ni", dynamics.maps, dynamics.carried, bases)
-    return load, bases
+    def _responses(self, loads: Array, bases: Array) -> tuple[Array, Array]:
+        """Return x, (drives, n, 6), and the contact forces' changes by (3), (drives, n, k, 3)."""
+        grip, turned_maps = self.grip, self.maps.transpose(0, 2, 1)
+        motion, speed, acceleration = self._solved(loads)
+        inertia = self.tips @ turned_maps @ acceleration
+        inertia += self.layout.tips_carried[:, None, None] * bases[..., None]
+        forces = -grip.force_changes @ motion + self.dampers @ turned_maps @ speed
+        turns = np.array([cross_matrix(force) for force in grip.squeeze])
+        changes = turns @ motion[..., 3:, :] - forces - inertia
+        return motion[:, :, 0, :, 0], np.einsum("kij,...kil->...kj", grip.frames, changes)
 
-
-def _turned_back(vectors: Array, angles: Array) -> Array:
-    """Turn vectors (n, 3) back by the palm's angles (n, 3), which are about one axis at a time."""
-    size = np.linalg.norm(angles, axis=1, keepdims=True)
-    axis = angles / np.where(size > 0.0, size, 1.0)
-    along = np.einsum("ni,ni->n", axis, vectors)[:, None] * axis
-    turned = np.cos(size) * (vectors - along) - np.sin(size) * cross(axis, vectors) + along
-    return np.where(size > 0.0, turned, vectors)
-
-
-def _responses(dynamics: HeldDynamics, loads: Array, bases: Array) -> tuple[Array, Array]:
-    """Return x, (drives, n, 6), and the contact forces' changes by (3), (drives, n, k, 3)."""
-    grip = dynamics.grip
-    motion, speed, acceleration = _solved(dynamics, loads)
-    turned_maps = dynamics.maps.transpose(0, 2, 1)
-    inertia = dynamics.tips @ turned_maps @ acceleration
-    inertia += dynamics.carried[:, None, None] * bases[..., None]
-    forces = -grip.force_changes @ motion + dynamics.dampers @ turned_maps @ speed
-    turns = np.array([cross_matrix(force) for force in grip.squeeze])
-    changes = turns @ motion[..., 3:, :] - forces - inertia
-    return motion[:, :, 0, :, 0], np.einsum("kij,...kil->...kj", grip.frames, changes)
-
-
-def _solved(dynamics: HeldDynamics, loads: Array) -> tuple[Array, Array, Array]:
-    """Solve (1) from rest; return x, x' and x'' after each sample, (drives, n, 1, 6, 1) each."""
-    linalg: Any = importlib.import_module("scipy.linalg")
-    inverse = np.linalg.inv(dynamics.mass)
-    stiff, damp = inverse @ dynamics.grip.grasp_stiffness, inverse @ dynamics.damping
-    system = np.zeros((3 * POSE, 3 * POSE))
-    system[:POSE, POSE : 2 * POSE] = np.eye(POSE)
-    system[POSE : 2 * POSE] = np.hstack([-stiff, -damp, inverse])
-    advanced: Array = linalg.expm(SAMPLE_S * system)[: 2 * POSE]
-    step, gain = advanced[:, : 2 * POSE].T, advanced[:, 2 * POSE :].T
-    states = np.zeros((*loads.shape[:2], 2 * POSE))
-    pushed = loads @ gain
-    state = np.zeros((len(loads), 2 * POSE))
-    for sample in range(loads.shape[1]):
-        state = state @ step + pushed[:, sample]
-        states[:, sample] = state
-    motion, speed = states[..., :POSE], states[..., POSE:]
-    acceleration = loads @ inverse.T - motion @ stiff.T - speed @ damp.T
-    return motion[..., None, :, None], speed[..., None, :, None], acceleration[..., None, :, None]
+    def _solved(self, loads: Array) -> Array:
+        """Solve (1) from rest; return x, x' and x'' after each sample, (3, drives, n, 1, 6, 1)."""
+        linalg: Any = importlib.import_module("scipy.linalg")
+        inverse = np.linalg.inv(self.mass)
+        stiff, damp = inverse @ self.grip.grasp_stiffness, inverse @ self.damping
+        system = np.zeros((3 * POSE, 3 * POSE))
+        system[:POSE, POSE : 2 * POSE] = np.eye(POSE)
+        system[POSE : 2 * POSE] = np.hstack([-stiff, -damp, inverse])
+        advanced: Array = linalg.expm(SAMPLE_S * system)[: 2 * POSE]
+        step, gain = advanced[:, : 2 * POSE].T, advanced[:, 2 * POSE :].T
+        states = np.zeros((*loads.shape[:2], 2 * POSE))
+        pushed = loads @ gain
+        state = np.zeros((len(loads), 2 * POSE))
+        for sample in range(loads.shape[1]):
+            state = state @ step + pushed[:, sample]
+            states[:, sample] = state
+        motion, speed = states[..., :POSE], states[..., POSE:]
+        acceleration = loads @ inverse.T - motion @ stiff.T - speed @ damp.T
+        return np.stack([motion, speed, acceleration])[..., None, :, None]
 
 
 CLEAR = 1.1
@@ -275,7 +244,7 @@ def planned(
 ) -> tuple[HeldScene, HeldDynamics, tuple[Trial, ...], tuple[Skipped, ...]]:
     """Plan an execution: its scene and dynamics, its trials, and those that are left out."""
     scene = holder.scene(settings, best)
-    dynamics = held_dynamics(best.grip, scene.layout)
+    dynamics = HeldDynamics(best.grip, scene.layout)
     trials = trials_of(holder.body, scene.layout, settings, dynamics.lowest_frequency)
     return scene, dynamics, *trials
 
@@ -381,7 +350,7 @@ def _predicted(
     """Predict the multiples of first slip and of loss, of the trial that is lost first."""
     # all misplacements have the prediction of the weight
     _, dynamics, trials, _ = planned(holder, replace(settings, misplacements=1), best)
-    found = predicted_losses(dynamics, trials, settings)
+    found = dynamics.losses(trials, settings)
     if not found:
         return math.inf, math.inf
     return found[first_best([-loss for _, loss in found])]

@@ -49,8 +49,8 @@ from scenes.mujoco.held_scene import HeldLayout
 from scenes.mujoco.mjcf_text import quaternion, rotations
 from scenes.mujoco.scene_text import TOUCH
 from sim_validate.execution import paths
-from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome, seen, slides
-from sim_validate.execution.paths import Drive, Pose, Table, joined
+from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome
+from sim_validate.execution.paths import Drive, Pose, Table
 from sim_validate.execution.verdict import ExecutionControl, Skipped
 from sim_validate.settings import ExecutionSettings, TrialKind
 
@@ -268,7 +268,7 @@ def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Tria
     reached = met(layout, poses, off_m, off_rad)
     closing, weight = paths.closing(), paths.held_weight(layout.gravity)
     for place, (pose, tips) in enumerate(zip(poses, reached, strict=True)):
-        drive = replace(joined(closing, weight), pose=pose, reached=tips)
+        drive = replace(closing.then(weight), pose=pose, reached=tips)
         name = f"misplaced {place}"
         yield Trial("misplaced", name, drive, len(closing) - 1, apart=True, expected=weight)
 
@@ -306,29 +306,27 @@ def run_controls(
     bench: HeldBench, best: BestSqueeze, lowest_frequency: float
 ) -> tuple[ExecutionControl, ...]:
     """Simulate the weaker grips under loads that grow slowly and must make a contact slip."""
-    layout = bench.scene.layout
     rise_s = min(max(2.0 * paths.RISE_S, FOLLOWED / lowest_frequency), LONGEST_RISE_S)
     share = paths.smooth(paths.samples(rise_s))
     closing, loading = paths.closing(), paths.loaded(share, np.zeros(3))
-    weaker, drives = tuple(weaker_grips(best, layout)), list[Drive]()
+    weaker, drives = tuple(weaker_grips(best, bench.scene.layout)), list[Drive]()
     for each in weaker:
-        drive = joined(closing, replace(loading, wrenches=share[:, None] * each.load))
-        drives.append(replace(drive, grasping=np.outer(drive.grasping, each.pushing)))
-    motions = bench.run(drives, friction=np.array([each.friction for each in weaker]))
+        drive = closing.then(replace(loading, wrenches=share[:, None] * each.load))
+        grasping = np.outer(drive.grasping, each.pushing)
+        drives.append(replace(drive, grasping=grasping, friction=each.friction))
+    motions = bench.run(drives)
     return tuple(
-        _judged(each, motion, layout, drive, len(closing) - 1)
+        _judged(each, motion, drive, len(closing) - 1)
         for each, motion, drive in zip(weaker, motions, drives, strict=True)
     )
 
 
-def _judged(
-    weaker: Weaker, motion: HeldMotion, layout: HeldLayout, drive: Drive, begun: int
-) -> ExecutionControl:
+def _judged(weaker: Weaker, motion: HeldMotion, drive: Drive, begun: int) -> ExecutionControl:
     """Say whether a contact slipped under the load, or while fingers closed and one was idle."""
-    found = outcome(motion, layout, drive, weaker.friction, begun)
+    found = outcome(motion, drive, weaker.friction, begun)
     if weaker.idle:
-        closing = slides(seen(motion, layout), layout)[: begun + 1]
-        if float(closing.max()) > SLID * layout.radius_m:
+        closing = motion.slides()[: begun + 1]
+        if float(closing.max()) > SLID * motion.layout.radius_m:
             return ExecutionControl(weaker.name, let_go=True, first_slip=0.0)
     return ExecutionControl(weaker.name, found.slipped, found.first_slip)
 

@@ -204,9 +204,7 @@ class KnownHand:
 def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
     """Check the simulator on the known hand, and refuse settings under which a check fails."""
     plain = replace(setup, threads=1, timeout_s=math.inf)
-    gate = measured(KnownHand(plain, two_digits(friction)))
-    gate.require("no hand is simulated")
-    return gate.checks
+    return measured(KnownHand(plain, two_digits(friction))).require("no hand is simulated").checks
 
 
 def cube() -> Polyhedron:

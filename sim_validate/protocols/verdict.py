@@ -8,11 +8,25 @@ from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, Key, RecordFile, recorded
-from grasp_core.kinds import Friction, Number, OrInfinity, Quantity
+from grasp_core.kinds import Friction, Measured, Number, OrInfinity, Quantity
 from grasp_core.provenance import versions
 from sim_validate.kit.files import AboutObject
 from sim_validate.protocols.published import PublishedProtocol
-from sim_validate.protocols.runs import RunVerdict
+
+
+@dataclass(frozen=True, slots=True)
+class RunVerdict(Declared):
+    """How one run of a published test ended."""
+
+    number: Number
+    passed: bool
+    reason: str
+    displacement_m: Measured
+    """Largest displacement at a look, up to the first that did not pass [m]."""
+    turn_deg: Measured
+    """Largest turn at a look, likewise [deg]."""
+    fingers: Number
+    """Least number of fingers that touched the object at a look, likewise."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,10 @@ from sim_validate.baselines.compare import (
     differing_figures,
     failing,
 )
-from sim_validate.engine.bench import HoldProtocol
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit.files import AboutObject
+from sim_validate.settings import HoldProtocol
 
 FIGURES = VerdictFigures(
     outcome=Outcome.HELD,

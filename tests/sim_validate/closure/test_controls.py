@@ -12,7 +12,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.families.regulus_kernel import LEAST_DEPTH
 from sim_validate.closure.controls import Control, negative_controls, try_control
-from sim_validate.engine.bench import Schedule
+from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.settings import HoldProtocol
 from tests.grasp_core.families.printed_paper import printed_regulus
@@ -124,12 +124,13 @@ def test_the_simulator_lets_go_of_every_control(every):
 @pytest.mark.parametrize("factor", [1.5])
 def test_a_simulator_with_too_much_friction_is_caught(monkeypatch, factor):
     """Half as much friction again in the simulation only: low-friction controls then hold."""
-    hold = Schedule.hold
+    holds = Rig.holds
 
-    def with_more_friction(idle, load, frictions, clock, protocol):
-        return hold(idle, load, tuple(factor * mu for mu in frictions), clock, protocol)
+    def with_more_friction(rig, loads, settling):
+        rough = replace(rig, friction=factor * rig.friction)
+        return holds(rough, loads, [factor * mu for mu in settling])
 
-    monkeypatch.setattr(Schedule, "hold", with_more_friction)
+    monkeypatch.setattr(Rig, "holds", with_more_friction)
     caught = tested = 0
     for name in ("random-12-1", "random-30-2", "screwdriver", "double-wedge-bar", "random-8-3"):
         body, found = grasps(name, 0.5, 6)

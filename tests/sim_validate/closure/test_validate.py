@@ -12,6 +12,7 @@ from scenes.mujoco.fingertips import clashes
 from scenes.settings import FingerSettings
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.verdict import Verdicts, trace_arrays
+from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from tests.marks import MORE, more
@@ -118,20 +119,18 @@ def test_a_users_wrench_is_applied_as_it_is_and_need_not_hold():
 
 def test_what_contradicts_the_analysis_is_said(monkeypatch):
     """With half of the friction in the simulation only, much goes wrong, and all of it is named."""
-    from sim_validate.engine.bench import Schedule
+    holds, releases = Rig.holds, Rig.releases
 
-    hold, release = Schedule.hold, Schedule.release
+    def slippery_holds(rig, loads, settling):
+        return holds(replace(rig, friction=0.5 * rig.friction), loads, settling)
 
-    def slippery_hold(idle, load, frictions, *rest):
-        return hold(idle, load, tuple(0.5 * mu for mu in frictions), *rest)
-
-    def slippery_release(still, frictions, *rest, **settled):
-        return release(still, (frictions[0], 0.3 * frictions[1]), *rest, **settled)
+    def slippery_releases(rig, high, frictions):
+        return releases(rig, high, [0.3 * friction for friction in frictions])
 
     body, (grasp, *_) = grasps("random-12-1", 0.4, 1, ("regulus",))
     sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)  # the gate is measured before
-    monkeypatch.setattr(Schedule, "hold", slippery_hold)
-    monkeypatch.setattr(Schedule, "release", slippery_release)
+    monkeypatch.setattr(Rig, "holds", slippery_holds)
+    monkeypatch.setattr(Rig, "releases", slippery_releases)
     verdict = sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)
     assert not verdict.good
     assert any("though the predicted limit is 1.25" in line for line in verdict.mismatches)
@@ -226,25 +225,25 @@ def test_a_simulator_that_disagrees_makes_the_verdict_bad(monkeypatch):
     grasp = next(g for g in found if 0.01 < g.critical_friction < 0.3)
     agenda = replace(WITHOUT_CONTROLS, limits="ramp")
     assert sv.validate(body, grasp, 0.5, agenda=agenda).good
-    for kind, says in (("release", "critical friction: "), ("ramp", "limit")):
+    for kind, says in (("releases", "critical friction: "), ("ramps", "limit")):
         with monkeypatch.context() as patched:
-            patched.setattr(f"sim_validate.engine.bench.Schedule.{kind}", _weaker(kind))
+            patched.setattr(Rig, kind, _weaker(kind))
             verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
         assert not verdict.good
         assert any(says in mismatch for mismatch in verdict.mismatches)
 
 
 def _weaker(kind):
-    from sim_validate.engine.bench import Schedule
+    faithful = getattr(Rig, kind)
 
-    faithful = getattr(Schedule, kind)
+    def weaker(plan):
+        lowered = np.arange(len(plan.friction)) >= plan.watched
+        return replace(plan, friction=np.where(lowered, 0.7, 1.0) * plan.friction)
 
-    def weakened(*arguments, **settled):
-        made = faithful(*arguments, **settled)
-        plan, *rest = made if isinstance(made, tuple) else (made,)
-        friction = plan.friction.copy()
-        friction[plan.watched :] *= 0.7
-        weak = replace(plan, friction=friction)
+    def weakened(*arguments):
+        made = faithful(*arguments)
+        plans, *rest = made if isinstance(made, tuple) else (made,)
+        weak = [weaker(plan) for plan in plans]
         return (weak, *rest) if rest else weak
 
     return weakened

@@ -8,8 +8,8 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.mujoco.closure_scene import build_scene
-from sim_validate.engine.bench import Bench, Schedule
-from sim_validate.engine.rig import bisected, forces_just_above, released_friction
+from sim_validate.engine.bench import Bench
+from sim_validate.engine.rig import Rig, bisected, forces_just_above, released_friction
 from sim_validate.engine.setup import Setup
 from sim_validate.settings import FrictionProtocol
 from tests.marks import more
@@ -86,15 +86,14 @@ def test_forces_just_above_the_critical_friction_need_it_and_balance():
 )
 def test_a_simulator_with_another_friction_is_seen_through(monkeypatch, factor, found):
     """Friction in the simulation is so many times what it should be: the critical one is less."""
-    release = Schedule.release
+    releases = Rig.releases
 
-    def with_other_friction(still, frictions, *rest, **settled):
-        high, friction = frictions
-        return release(still, (high, factor * friction), *rest, **settled)
+    def with_other_friction(rig, high, frictions):
+        return releases(rig, high, [factor * friction for friction in frictions])
 
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1, ("regulus",))
     sv.simulated_critical_friction(body, grasp)  # measures the gate, which is kept
-    monkeypatch.setattr(Schedule, "release", with_other_friction)
+    monkeypatch.setattr(Rig, "releases", with_other_friction)
     simulated = sv.simulated_critical_friction(body, grasp)
     if found:
         assert simulated * factor == pytest.approx(grasp.critical_friction, rel=0.03)

@@ -7,11 +7,11 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
-from sim_validate.engine.bench import Load, Schedule
+from sim_validate.engine.bench import Load
 from sim_validate.engine.rig import part
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import USABLE, WATCHED, EarlyEnds, Outcome, Thresholds, judge
-from sim_validate.settings import FrictionProtocol, HoldProtocol
+from sim_validate.settings import HoldProtocol
 from tests.marks import more
 from tests.sim_validate.engine.test_traces import pose
 from tests.sim_validate.engine.whole_and_early import compared
@@ -32,10 +32,9 @@ def held():
 def looking(held):
     """One trial that squeezes without a wrench, looked at from the last sample of settling on."""
     _, _, rig = held
-    layout, idle = rig.bench.scene.layout, rig.idle
+    layout = rig.bench.scene.layout
     limit = 2e-4 * layout.grasp_size_m
-    trial = Schedule.hold(idle, idle, (1.5, 0.5), SAMPLE_S, HoldProtocol())
-    return EarlyEnds(layout, [trial], SAMPLE_S, Thresholds(limit, limit))
+    return EarlyEnds(layout, rig.holds([rig.idle]), SAMPLE_S, Thresholds(limit, limit))
 
 
 def answers(ends, joints, speeds, count=6):
@@ -111,15 +110,14 @@ def test_a_trial_ends_in_the_same_sample_alone_and_beside_one_that_is_lost(held)
         np.testing.assert_array_equal(alone.displacements_m, together.displacements_m)
 
 
-def test_contacts_nearly_on_a_line_end_only_when_lost(looking):
+def test_contacts_nearly_on_a_line_end_only_when_lost(held, looking):
     """Their levers are shorter than the size that the bound is told with."""
     layout = looking.layout
     wide = replace(layout, grasp_size_m=1.01 * layout.grasp_size_m)
-    trial = Schedule.hold(Load(np.zeros(6), np.zeros((4, 3))), Load(np.zeros(6), np.zeros((4, 3))),
-                 (1.5, 0.5), SAMPLE_S, HoldProtocol())  # fmt: skip
+    trials = held[2].holds([held[2].idle])
     limits = Thresholds(layout.grasp_size_m, layout.grasp_size_m)
-    assert EarlyEnds(layout, [trial], SAMPLE_S, limits).springs is not None
-    assert EarlyEnds(wide, [trial], SAMPLE_S, limits).springs is None
+    assert EarlyEnds(layout, trials, SAMPLE_S, limits).springs is not None
+    assert EarlyEnds(wide, trials, SAMPLE_S, limits).springs is None
 
 
 def test_controls_end_in_the_sample_in_which_they_let_go():
@@ -226,9 +224,7 @@ def test_settling_ends_when_the_object_is_calm_and_not_before(looking):
 def test_rigid_fingertips_end_only_by_loss(held):
     layout = held[2].bench.scene.layout
     rigid = replace(layout, drive=replace(layout.drive, rigid=True))
-    trial = Schedule.release(
-        Load(np.zeros(6), np.zeros((4, 3))), (1.0, 0.5), SAMPLE_S, FrictionProtocol()
-    )
+    (trial,) = held[2].releases(1.0, [0.5])
     ends = EarlyEnds(rigid, [trial], SAMPLE_S, Thresholds(1e-6))
     still, lost = pose()[:7], pose((2e-6, 0.0, 0.0))[:7]
     for sample in range(40):

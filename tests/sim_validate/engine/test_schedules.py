@@ -1,14 +1,18 @@
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from sim_validate.engine.bench import Load, Schedule, smooth
-from sim_validate.engine.rig import OVERLOAD, part
-from sim_validate.settings import FrictionProtocol, HoldProtocol, LimitProtocol
+from sim_validate.engine.bench import Load, smooth
+from sim_validate.engine.rig import OVERLOAD, Rig, part
+from sim_validate.engine.setup import Setup
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
-SAMPLE_S, STILL = 0.01, Load(np.zeros(6), np.full((4, 3), 5.0))
-IDLE = Load(np.zeros(6), np.full((4, 3), 2.0))
 LOAD = Load(np.arange(1.0, 7.0), np.full((4, 3), 5.0))
+RIG = Rig(
+    SimpleNamespace(sample_s=0.01), Setup(), 0.5, Load(np.zeros(6), np.full((4, 3), 2.0)), None
+)
 
 
 def test_smooth_shares_rise_from_almost_nothing_to_one():
@@ -20,22 +24,19 @@ def test_smooth_shares_rise_from_almost_nothing_to_one():
 
 
 def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
-    schedule = Schedule.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol())
+    (schedule,) = RIG.holds([LOAD], [1.4])
     watched = schedule.watched
     assert watched == 16 + 10
     assert len(schedule.friction) == watched + 40
-    assert set(schedule.friction[:watched]) == {1.5}
+    assert set(schedule.friction[:watched]) == {1.4}
     assert set(schedule.friction[watched:]) == {0.5}
     np.testing.assert_array_equal(schedule.wrenches[watched - 10 :], np.tile(LOAD.wrench, (50, 1)))
     np.testing.assert_array_equal(schedule.forces[-1], LOAD.forces)
+    assert RIG.holds([LOAD])[0].friction[0] == 1.5
 
 
 def test_schedules_say_from_where_their_loads_are_constant():
-    made = (
-        Schedule.hold(IDLE, LOAD, (1.5, 0.5), SAMPLE_S, HoldProtocol()),
-        Schedule.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol()),
-        Schedule.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, (HoldProtocol(), LimitProtocol()))[0],
-    )
+    made = [*RIG.holds([LOAD]), *RIG.releases(2.0, [0.3]), *RIG.ramps([LOAD], (0.9, 1.1))[0]]
     assert [each.resting for each in made] == [16, 0, len(made[2].friction)]
     for each in made:
         rest = each.forces[each.resting :]
@@ -43,9 +44,8 @@ def test_schedules_say_from_where_their_loads_are_constant():
 
 
 def test_settling_and_a_settled_release_are_a_release():
-    whole = Schedule.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol())
-    rest = Schedule.settle(STILL, 2.0, SAMPLE_S, FrictionProtocol())
-    left = Schedule.release(STILL, (2.0, 0.3), SAMPLE_S, FrictionProtocol(), settled=True)
+    (whole,), rest = RIG.releases(2.0, [0.3]), RIG.settling(2.0)
+    (left,) = replace(RIG, settled=True).releases(2.0, [0.3])
     assert (rest.watched, left.watched) == (10, 0)
     for name in ("forces", "wrenches", "friction"):
         parts = [getattr(each, name) for each in (rest, left)]
@@ -53,8 +53,7 @@ def test_settling_and_a_settled_release_are_a_release():
 
 
 def test_a_ramp_watches_while_the_load_rises_between_the_shares():
-    protocols = HoldProtocol(), LimitProtocol()
-    schedule, shares = Schedule.ramp(IDLE, LOAD, (0.9, 1.1), 0.5, SAMPLE_S, protocols)
+    (schedule,), shares = RIG.ramps([LOAD], (0.9, 1.1))
     assert len(shares) == len(schedule.friction) - schedule.watched == 50
     assert shares[-1] == pytest.approx(1.1)
     applied = schedule.wrenches[schedule.watched :] / LOAD.wrench

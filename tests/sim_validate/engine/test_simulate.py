@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.arrays import to_digits
-from sim_validate.engine.bench import CHUNK, Bench, Load, Schedule
+from sim_validate.engine.bench import CHUNK, Bench, Load
 from sim_validate.engine.rig import part, squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Outcome, judge
@@ -28,11 +29,9 @@ def trials_of(held, count=5):
     body, grasp, rig = held
     limits = limiting_loads(body, grasp, 0.5, count)
     shares = np.linspace(0.8, 1.2, count)
-    protocol, sample_s = HoldProtocol(), rig.bench.sample_s
-    return [
-        Schedule.hold(rig.idle, part(rig.idle, limit, share), (1.5, 0.5), sample_s, protocol)
-        for limit, share in zip(limits, shares, strict=True)
-    ]
+    return rig.holds(
+        [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
+    )
 
 
 def plain_loop(scene, schedule, start):
@@ -59,7 +58,8 @@ def test_trials_together_are_those_of_a_plain_loop_to_the_last_bit(held, threads
     _, _, rig = held
     trials = trials_of(held)
     scene = rig.bench.scene
-    motions = Bench(scene, threads=threads).run(trials, rig.closed.state)
+    told = [trial.told(scene.layout) for trial in trials]
+    motions = Bench(scene, threads=threads).simulated(told, rig.closed.state)
     for motion, trial in zip(motions, trials, strict=True):
         np.testing.assert_array_equal(motion.joints, plain_loop(scene, trial, rig.closed.state))
     moved = [np.abs(motion.joints[-1, :3]).max() for motion in motions]
@@ -74,8 +74,8 @@ def test_friction_is_that_of_the_schedule_and_not_of_the_scene(held):
     load = part(rig.idle, limit, 0.97)
     outcomes = []
     for friction in (0.5, 0.4):
-        trial = Schedule.hold(rig.idle, load, (1.5, friction), rig.bench.sample_s, HoldProtocol())
-        (motion,) = rig.bench.run([trial], rig.closed.state)
+        (trial,) = replace(rig, friction=friction).holds([load], [1.5])
+        (motion,) = rig.bench.simulated([trial.told(rig.bench.scene.layout)], rig.closed.state)
         outcomes.append(np.abs(motion.joints[-1, :3] - motion.joints[trial.watched - 1, :3]).max())
     assert outcomes[0] < 1e-7
     assert outcomes[1] > 1e-4
@@ -103,11 +103,12 @@ def test_a_good_hold_beside_a_blow_up_is_judged_on_its_own(held):
 def test_trials_past_their_time_are_stopped_and_say_so(held):
     body, grasp, _ = held
     bench = Bench(scenes.build_scene(body, grasp, 0.5), timeout_s=0.0)
-    (motion,) = bench.run(trials_of(held)[:1])
+    told = [trials_of(held)[0].told(bench.scene.layout)]
+    (motion,) = bench.simulated(told)
     assert motion.health.timed_out
     assert len(motion.joints) == 0
     assert motion.health.error == ""
-    assert not Bench(bench.scene).run(trials_of(held)[:1])[0].health.timed_out
+    assert not Bench(bench.scene).simulated(told)[0].health.timed_out
 
 
 def test_a_long_grasp_stays_where_it_is_while_it_is_squeezed():

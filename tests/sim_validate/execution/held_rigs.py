@@ -8,7 +8,7 @@ import grasp_core as gc
 import scenes
 from sim_validate.execution import paths
 from sim_validate.execution.bench import HeldBench
-from sim_validate.execution.predictions import held_dynamics
+from sim_validate.execution.predictions import HeldDynamics
 from tests.grasp_core.execution.held import box
 
 MASS = 0.3
@@ -56,7 +56,7 @@ def squeezed(**rig):
 
 def box_dynamics(push=5.0, friction=0.5, stiffness=2000.0, mass=MASS):
     layout = box_scene(push, friction, stiffness, mass).layout
-    return held_dynamics(box_grip(push, friction, stiffness), layout)
+    return HeldDynamics(box_grip(push, friction, stiffness), layout)
 
 
 @cache

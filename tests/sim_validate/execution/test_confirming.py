@@ -18,7 +18,7 @@ from sim_validate.execution.execute import (
     run_again,
     run_trials,
 )
-from sim_validate.execution.predictions import held_dynamics
+from sim_validate.execution.predictions import HeldDynamics
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import trial_in_words
 from tests.sim_validate.execution.held_rigs import planned
@@ -76,16 +76,14 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
     best = fingers.squeeze(settings)
     scene = fingers.scene(settings, best)
     bench = HeldBench(scene)
-    lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
+    lowest = HeldDynamics(best.grip, scene.layout).lowest_frequency
     trials, _ = trials_of(body, scene.layout, settings, lowest)
     motions = run_trials(bench, trials)
     slipped = 0
-    for trial, motion, again in zip(
-        trials, motions, run_again(bench, trials, motions, settings), strict=True
-    ):
+    for trial, again in run_again(bench, motions, settings).items():
+        motion = motions[trial]
         first, second = (
-            outcome(each, scene.layout, trial.drive, best.grip.friction, trial.begun)
-            for each in (motion, again)
+            outcome(each, trial.drive, best.grip.friction, trial.begun) for each in (motion, again)
         )
         slipped += first.slipped
         assert len(again.moved) == len(motion.moved)
@@ -148,10 +146,11 @@ def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
     best = fingers.squeeze(settings)
     scene = fingers.scene(settings, best)
     bench = HeldBench(scene)
-    lowest = held_dynamics(best.grip, scene.layout).lowest_frequency
+    lowest = HeldDynamics(best.grip, scene.layout).lowest_frequency
     trials, _ = trials_of(body, scene.layout, settings, lowest)
     motions = run_trials(bench, trials)
-    (again,) = run_again(confirming_bench(bench), trials, motions, settings)
-    assert len(again.moved) == len(motions[0].moved)
-    assert np.array_equal(again.moved[0], motions[0].moved[0])
-    assert (again.moved[1:] != motions[0].moved[1:]).any(axis=1).all()
+    (motion,) = motions.values()
+    (again,) = run_again(confirming_bench(bench), motions, settings).values()
+    assert len(again.moved) == len(motion.moved)
+    assert np.array_equal(again.moved[0], motion.moved[0])
+    assert (again.moved[1:] != motion.moved[1:]).any(axis=1).all()

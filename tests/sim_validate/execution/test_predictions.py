@@ -14,7 +14,7 @@ from grasp_core.closure.contacts import cross_matrix
 from scenes.mujoco.held_scene import SAMPLE_S
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Table, idle
-from sim_validate.execution.predictions import expected, held_dynamics, predicted_losses
+from sim_validate.execution.predictions import HeldDynamics
 from sim_validate.execution.trials import Trial
 from sim_validate.settings import ExecutionSettings
 from tests.grasp_core.execution.held import planned_grips
@@ -33,7 +33,7 @@ def dynamics_of(name, push=8.0):
     (grip,) = planned_grips((name,), limit=1, push=push, tip_radius_m=0.005)
     held = scenes.HeldSettings(mass_kg=MASS)
     scene = scenes.build_held_scene(scenes.example_object(name), grip, held)
-    return held_dynamics(grip, scene.layout)
+    return HeldDynamics(grip, scene.layout)
 
 
 def slip_multiple(rest, change, friction):
@@ -114,7 +114,7 @@ def drives():
 @pytest.mark.parametrize("name", ["box", "wedge"])
 def test_predictions_are_those_of_a_fine_integration(name, kind):
     dynamics, drive = dynamics_of(name), drives()[kind]
-    (found,) = expected(dynamics, [drive])
+    (found,) = dynamics.expected([drive])
     seen = (found.first_slip, found.moved_m, found.turn_rad)
     assert seen == pytest.approx(integrated(dynamics, drive), rel=1e-5)
     assert found.first_slip < 1e3
@@ -208,7 +208,7 @@ def losses_of(dynamics, drives, most_m=5e-3, most_rad=0.09, turning=False):
         mass_kg=MASS, max_mm=1000.0 * most_m, max_deg=math.degrees(most_rad)
     )
     trials = [Trial("weight", "weight", drive, 0, turning=turning) for drive in drives]
-    return np.reshape(predicted_losses(dynamics, trials, settings), (-1, 2)).T
+    return np.reshape(dynamics.losses(trials, settings), (-1, 2)).T
 
 
 @pytest.mark.parametrize("name", ["box", "wedge"])
@@ -216,7 +216,7 @@ def test_an_object_is_lost_after_the_first_slip_and_before_it_moves_too_far_with
     dynamics, several = dynamics_of(name), list(drives().values())
     slips, losses = losses_of(dynamics, several)
     assert slips == pytest.approx(predicted_slips(dynamics, several), rel=1e-12)
-    found = expected(dynamics, several)
+    found = dynamics.expected(several)
     sticking = [1.0 / max(one.moved_m / 5e-3, one.turn_rad / 0.09) for one in found]
     assert (losses <= np.array(sticking) * (1 + 1e-9)).all()
     assert (losses >= np.minimum(slips, sticking)).all()
@@ -228,7 +228,7 @@ def test_an_object_is_lost_after_the_first_slip_and_before_it_moves_too_far_with
 def test_narrow_limits_lose_the_object_before_it_slips():
     dynamics, several = dynamics_of("box"), list(drives().values())
     slips, losses = losses_of(dynamics, several, most_m=1e-6)
-    found = expected(dynamics, several)
+    found = dynamics.expected(several)
     assert losses == pytest.approx([1e-6 / one.moved_m for one in found], rel=1e-9)
     assert (losses < slips).all()
     (_, twice) = losses_of(dynamics, several, most_m=2e-6)

@@ -12,11 +12,8 @@ from sim_validate.execution.bench import (
     SLID,
     TOUCHED,
     HeldMotion,
-    Seen,
     _first_slip,
     outcome,
-    seen,
-    slides,
 )
 from sim_validate.execution.paths import Table, idle
 from tests.judges import random_rotation
@@ -37,14 +34,13 @@ def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
         forces = np.broadcast_to(layout.pushes, (COUNT, 4, 3))
     turned = np.tile([1.0, 0, 0, 0], (COUNT, 1)) if turned is None else turned
     palm = np.zeros((COUNT, 6)) if palm is None else palm
+    moved = np.zeros((COUNT, 3)) if moved is None else moved
     return HeldMotion(
-        moved=np.zeros((COUNT, 3)) if moved is None else moved,
-        turned=turned,
-        palm=palm,
+        layout=layout,
+        joints=np.hstack([moved, turned, palm, tips.reshape(COUNT, -1)]),
         pressed=hinged(palm[:, 3:]).transpose(0, 2, 1) @ rotations(turned),
-        fingers=tips.reshape(COUNT, -1),
         tips=tips,
-        tip_turns=None,
+        tip_turns=np.tile(np.eye(3), (COUNT, 1, 1, 1)),
         forces=forces,
         table=np.zeros((COUNT, 3)),
         states=np.zeros((COUNT, 0)),
@@ -57,7 +53,7 @@ def loaded():
 
 
 def judged(motion, drive=None):
-    return outcome(motion, box_scene().layout, drive or loaded(), FRICTION)
+    return outcome(motion, drive or loaded(), FRICTION)
 
 
 def test_nothing_that_moves_has_slipped():
@@ -82,10 +78,9 @@ def test_a_palm_that_carries_everything_along_shows_no_motion():
     parts = [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]]
     turned = np.column_stack([w, np.array(parts).T / (4.0 * w)[:, None]])
     motion = motion_of(moved=path, turned=turned, palm=np.hstack([path, angles]))
-    found = seen(motion, layout)
-    assert found.moved == pytest.approx(np.zeros((COUNT, 3)), abs=1e-15)
-    assert found.tips - layout.tip_centers == pytest.approx(np.zeros((COUNT, 4, 3)), abs=1e-15)
-    assert slides(found, layout).max() == pytest.approx(0.0, abs=1e-12)
+    assert motion.shifts == pytest.approx(np.zeros((COUNT, 3)), abs=1e-15)
+    assert motion.centers - layout.tip_centers == pytest.approx(np.zeros((COUNT, 4, 3)), abs=1e-15)
+    assert motion.slides().max() == pytest.approx(0.0, abs=1e-12)
     assert judged(motion).turn_rad == pytest.approx(0.0, abs=1e-6)
 
 
@@ -109,7 +104,7 @@ def test_rolling_without_sliding_is_no_slip(axis):
     if abs(unit @ [1, 0, 0]) < 1e-12:  # otherwise the point of contact twists, which is no slip
         assert np.abs(across).max() < 1e-3 * layout.radius_m
     motion = motion_of(turned=quaternions(unit, angles), centers=centers)
-    assert slides(seen(motion, layout), layout).max() < 1e-3 * SLID * layout.radius_m
+    assert motion.slides().max() < 1e-3 * SLID * layout.radius_m
     found = judged(motion)
     assert found.turn_rad == pytest.approx(0.3, rel=1e-9)
     assert not found.slipped
@@ -143,8 +138,8 @@ def test_an_object_that_slides_through_the_fingers_is_displaced_by_as_much():
 def test_what_happened_before_the_trial_began_does_not_count():
     moved = np.zeros((COUNT, 3))
     moved[:100, 1] = np.linspace(3e-3, 0.0, 100)
-    motion, layout = motion_of(moved=moved), box_scene().layout
-    late = outcome(motion, layout, loaded(), FRICTION, begun=100)
+    motion = motion_of(moved=moved)
+    late = outcome(motion, loaded(), FRICTION, begun=100)
     assert (late.slip_m, late.displacement_m) == (0.0, 0.0)
     assert judged(motion).displacement_m == pytest.approx(3e-3)
 
@@ -195,12 +190,9 @@ def test_what_is_seen_does_not_depend_on_where_the_palm_is():
     place = rng.normal(size=3)
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     angle = np.arctan2(np.linalg.norm(axis), np.trace(R) - 1.0)
-    there = replace(
-        here,
-        moved=here.moved + place,
-        turned=quaternions(axis, np.full(COUNT, angle)),
-        palm=np.tile(np.append(place, [a, b, c]), (COUNT, 1)),
-    )
+    moved, turned = here.moved + place, quaternions(axis, np.full(COUNT, angle))
+    palm = np.tile(np.append(place, [a, b, c]), (COUNT, 1))
+    there = replace(here, joints=np.hstack([moved, turned, palm, here.joints[:, 13:]]))
     one, other = judged(here), judged(there)
     assert (other.slip_m, other.first_slip) == pytest.approx((one.slip_m, one.first_slip), rel=1e-6)
     assert one.slip_m == pytest.approx(1e-3)
@@ -252,7 +244,5 @@ def test_only_a_take_off_may_touch_a_cone():
 def test_a_slip_in_the_first_sample_of_a_load_has_a_multiple():
     """Before it nothing has changed and no load is there: nothing can be extrapolated from that."""
     forces = np.array([[[1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[1.0, 0.6, 0.0]]])
-    still, unmoved = np.zeros((3, 1, 3)), np.tile(np.eye(3), (3, 1, 1))
-    found = Seen(still[:, 0], unmoved, unmoved[:, None], still, forces)
     shares = np.array([0.0, 0.0, 0.3])
-    assert _first_slip(found, shares, FRICTION[:1], 0) == 0.3
+    assert _first_slip(forces, shares, FRICTION[:1], 0) == 0.3

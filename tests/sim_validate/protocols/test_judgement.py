@@ -3,24 +3,21 @@
 import numpy as np
 import pytest
 
+from sim_validate.protocols.judging import Look, judged_run
 from sim_validate.protocols.published import Passing
-from sim_validate.protocols.runs import Motion, Timeline, judged_run
 
 START = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
-def moving(*heights, fingers=2, fault=""):
-    """An object that is at these heights after samples 0, 1, .., and looked at after each."""
+def moving(*heights, fingers=2):
+    """An object that is at these heights after samples 0, 1, .., and looked at from 2 on."""
     poses = np.tile(START, (len(heights), 1))
     poses[:, 2] = heights
-    looks = tuple(range(2, len(heights)))
-    touching = tuple(frozenset(range(fingers)) for _ in looks)
-    run = Timeline(np.zeros((len(heights), 1)), np.zeros((len(heights), 6)), looks)
-    return Motion(poses, touching, fault), run
+    return [Look(pose, fingers) for pose in poses[2:]]
 
 
-def judged(passing, *heights, **more):
-    return judged_run(0, *moving(*heights, **more), passing)
+def judged(passing, *heights, fault="", **more):
+    return judged_run(0, moving(*heights, **more), fault, passing)
 
 
 def test_displacement_counts_from_before_closing():
@@ -40,11 +37,11 @@ def test_what_comes_after_a_failed_look_does_not_count():
 
 
 def test_a_turn_counts_as_an_angle():
-    motion, run = moving(0.0, 0.0, 0.0)
+    looks = moving(0.0, 0.0, 0.0)
     half = np.radians(20.0) / 2.0
-    motion.poses[2, 3:] = [np.cos(half), 0.0, np.sin(half), 0.0]
-    assert not judged_run(0, motion, run, Passing(most_deg=15.0)).passed
-    found = judged_run(0, motion, run, Passing(most_deg=25.0))
+    looks[0].pose[3:] = [np.cos(half), 0.0, np.sin(half), 0.0]
+    assert not judged_run(0, looks, "", Passing(most_deg=15.0)).passed
+    found = judged_run(0, looks, "", Passing(most_deg=25.0))
     assert (found.passed, found.turn_deg) == (True, pytest.approx(20.0))
 
 

@@ -19,9 +19,8 @@ from sim_validate.hands.dexgraspbench import (
     reach_of_record,
     recorded_postures,
 )
-from sim_validate.protocols.judging import judge_hand_by
+from sim_validate.protocols.judging import CHUNK, judge_hand_by, their_verdict, timeline
 from sim_validate.protocols.published import protocol
-from sim_validate.protocols.runs import CHUNK, their_verdict, timeline
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 TEST = protocol("dexgraspbench")

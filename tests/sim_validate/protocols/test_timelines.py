@@ -8,8 +8,8 @@ import pytest
 import grasp_core as gc
 from scenes.mujoco.tested import TestedObject
 from scenes.settings import FingerSettings
+from sim_validate.protocols.judging import CHUNK, timeline
 from sim_validate.protocols.published import Step, protocol
-from sim_validate.protocols.runs import CHUNK, timeline
 from tests.grasp_core.hands.gripping import scaled
 
 BODY = scaled("dodecahedron", 0.05)
