@@ -32,7 +32,10 @@ The weakest wrench. The wrench -y / |y| meets a limiting facet squarely, so
     limit of -y / |y|  <=  h(y) / |y|:                                                  (4)
 
 stepping from a wrench to the one its limiting facet points at never raises the limit, and stops
-at a wrench that is locally the weakest. Torques are compared with forces through a stated length.
+at a wrench that is locally the weakest. Without motors the direction of the `linf` quality is a
+start that no other wrench beats by more than the quality's gap; with motors, which that direction
+does not know, the weakest axes are starts as well. Torques are compared with forces through a
+stated length.
 """
 
 from collections.abc import Iterable, Sequence
@@ -61,6 +64,7 @@ from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
+from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import minimize
 from grasp_core.solvers.ties import first_best, smallest_first
@@ -83,7 +87,9 @@ SETTLED = 1e-3
 """The search for the weakest wrench ends when a step lowers the limit by less than this share."""
 MAX_STEPS = 30
 STARTS = 3
-"""How many of the weakest axis wrenches the search starts from."""
+"""How many of the weakest axis wrenches the search starts from, where there are motors."""
+WEAKEST_GAP = 0.01
+"""Gap of the quality whose direction the search for the weakest wrench starts from."""
 
 
 class Farthest(NamedTuple):
@@ -189,6 +195,12 @@ class WrenchBody:
         each = self.levers.reshape(len(self.levers), self.count, 3)
         longest = np.linalg.norm(each, axis=2).max(axis=1)
         return self.max_normal_force * longest / self.motors.limits
+
+    def pushed(self, torque_scale: float) -> WrenchSet:
+        """Return the wrenches of unit pushes about the centre, with torques over a scale [m]."""
+        G = self.G * self.scale[:, None]
+        G[3:] = (G[3:] + cross(self.middle, G[:3].T).T) / torque_scale
+        return replace(self.bounded, G=G)
 
     def about_middle(self, wrench: Array) -> Array:
         """Move a wrench's reference point to the contacts' mean, and scale it to unit size."""
@@ -382,11 +394,18 @@ def axis_wrenches(torque_scale: float) -> Array:
 def weakest_from(
     body: WrenchBody, limits: Iterable[WrenchLimit], torque_scale: float
 ) -> WrenchLimit:
-    """Search for a wrench with |(force, torque / torque_scale)| = 1 that is locally the weakest."""
+    """Search for the weakest wrench with |(force, torque / torque_scale)| = 1.
+
+    Takes the limits of other such wrenches, from the weakest of which the search starts, too.
+    """
     scale = np.array([1.0] * 3 + [torque_scale] * 3)
-    every, ends = list(limits), list[WrenchLimit]()
-    for place in smallest_first([found.limit for found in every])[:STARTS]:
-        best = every[place]
+    # on a grid, so that of equally weak wrenches every machine starts from the same one
+    quality = wrench_set_quality(body.pushed(torque_scale).on_grid(), WEAKEST_GAP)
+    starts, ends = [limit_of(body, -quality.direction * scale)], list[WrenchLimit]()
+    if len(body.levers):
+        every = list(limits)
+        starts += [every[at] for at in smallest_first([each.limit for each in every])[:STARTS]]
+    for best in starts:
         for _ in range(MAX_STEPS):
             # (4): the wrench that the limiting facet points at, by the scaled product of wrenches
             facing = -best.facet * scale**2
