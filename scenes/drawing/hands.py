@@ -79,6 +79,10 @@ INSIDE = 0.9
 contact."""
 
 
+WHOLE = np.ones((2, 3), dtype=bool)
+"""Ends of a rounded box of which nothing is cut off."""
+
+
 def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[Array, ...]:
     """Make the flat sides of a rounded box, (k, 3) each [m], counter-clockwise from outside.
 

@@ -37,9 +37,9 @@ from scenes.drawing.pictures import (
     AZIMUTH_DEG,
     ELEVATION_DEG,
     Drawing,
-    bar,
     coarse,
     glass,
+    pin,
     sheet_of,
 )
 from scenes.drawing.sheets import svg_of
@@ -289,13 +289,14 @@ def placed(layout: Layout) -> str:
     """Draw the object of a scene with the bars of its fingers as a small SVG element."""
     size, inward = layout.radius_m, layout.frames[:, :, 0]
     extent = Alone(np.zeros(3), size)
-    bars = [
-        Shape("finger", finger, polygons=bar(tip, way, size))
+    pins = [
+        shape
         for finger, (tip, way) in enumerate(zip(layout.contacts, inward, strict=True))
+        for shape in pin(finger, tip, way, size)
     ]
     surface = Shape("object", polygons=tuple(coarse(layout.vertices, layout.triangles)))
     view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, extent)
-    return picture([surface, *bars, Shape("contact", points=layout.contacts)], extent, view)
+    return picture([surface, *pins, Shape("contact", points=layout.contacts)], extent, view)
 
 
 def _alone(body: Polyhedron) -> str:

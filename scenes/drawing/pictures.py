@@ -30,7 +30,15 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import SAME_SHARE, first_best
 from grasp_core.values import Contact, Grasp
-from scenes.drawing.hands import PosedHand, hand_shapes, numbers_behind, posed_hand, view_of_hand
+from scenes.drawing.hands import (
+    WHOLE,
+    PosedHand,
+    hand_shapes,
+    numbers_behind,
+    posed_hand,
+    rounded_box,
+    view_of_hand,
+)
 from scenes.drawing.painting import (
     LOOKS,
     POLYGON,
@@ -51,8 +59,8 @@ RULINGS = 40
 PARALLEL = 1e-9
 """Least length of the cross product that gives the direction of a transversal, relative to the
 squared reach."""
-BAR_LENGTH, BAR_RADIUS = 0.75, 0.05
-"""Length and radius of a finger's bar, in finger sizes."""
+BAR_LENGTH, BAR_RADIUS, BALL_RADIUS = 0.75, 0.04, 0.1
+"""Length and radius of a finger's bar, and radius of its fingertip, in finger sizes."""
 NUMBER_BEYOND = 0.12
 """Distance of a finger's number from the end of its bar, in finger sizes."""
 CONE_LENGTH = 0.42
@@ -173,7 +181,7 @@ class Drawing:
         for finger, (contact, cone, inward) in enumerate(
             zip(grasp.contacts, grasp.force_cones, approaches(grasp), strict=True)
         ):
-            yield Shape("finger", finger, polygons=bar(contact.position, inward, size))
+            yield from pin(finger, contact.position, inward, size)
             yield self._friction_cone(contact, finger)
             lean = float(angles_between(cone.axis, contact.normal))
             if lean + cone.half_angle <= half_angle + SLACK_RAD:
@@ -267,9 +275,14 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
     return middles[joined[np.sort(first)]]
 
 
-def bar(tip: Array, inward: Array, size: float) -> tuple[Array, ...]:
-    """Return the polygons of a finger of a given size that stands on a point."""
-    return tube(tip, tip - BAR_LENGTH * size * inward, BAR_RADIUS * size)
+def pin(finger: int, tip: Array, inward: Array, size: float) -> tuple[Shape, Shape]:
+    """Return the fingertip and the bar of a finger of a given size that stands on a point."""
+    middle, radius = tip - BALL_RADIUS * size * inward, BALL_RADIUS * size
+    bar = tube(middle, tip - BAR_LENGTH * size * inward, BAR_RADIUS * size)
+    return (
+        Shape("finger", finger, polygons=rounded_box(middle, middle, radius, WHOLE)),
+        Shape("finger", finger, polygons=bar),
+    )
 
 
 def _unit(vector: Array) -> Array:
