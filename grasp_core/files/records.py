@@ -106,7 +106,7 @@ def entries(kind: type) -> Entries:
             flat = inside_record(each) if FLAT in marks else None
             own.append(Entry(name, key, each, defaults[name], form_of(each), flat))
     properties = [
-        Entry(name, name, said, MISSING, form_of(said), None)
+        Entry(name, name, said, MISSING, Form(form_of(said).write, None), None)
         for name, said in property_kinds(kind, recorded).items()
     ]
     return Entries(tuple(own), tuple(properties))
