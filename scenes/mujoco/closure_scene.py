@@ -69,9 +69,10 @@ PAD_DEPTH = 0.1
 FLAT = 1e-6
 """Share of the largest moment of inertia that is added to all three. Coplanar contacts give moments
 at the very limit of what a body can have, and rounding must not pass that limit."""
-NEARBY = 4.0
+NEARBY = 2.0
 """Distance from contacts up to which an object that is not convex has a surface to be touched, in
-radii of fingertips. Trials end long before an object has moved as far."""
+radii of fingertips. A fingertip meets no other until an object has moved by one, and trials end
+long before."""
 PAD_TOUCH = 1e-9
 """Least depth of fingertips in pads at the start, in grasp sizes. At depth zero, rounding would
 decide which fingertips press in the first step, and the impact of the others one step later can

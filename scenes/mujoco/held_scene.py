@@ -30,7 +30,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText, rotations
+from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText
 from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import HeldSettings, PhysicsSettings
@@ -72,14 +72,13 @@ ISOTROPIC = 1e-9
 
 def hinged(angles: Array) -> Array:
     """Return the palm's rotation, (n, 3, 3): about x, then the turned y, then the turned z."""
-    half = 0.5 * angles
-    zero = np.zeros(len(angles))
-    turn = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for axis in range(3):
-        parts = [np.cos(half[:, axis]), zero, zero, zero]
-        parts[axis + 1] = np.sin(half[:, axis])
-        turn = turn @ rotations(np.stack(parts, axis=1))
-    return turn
+    (a, b, c), (sin_a, sin_b, sin_c) = np.cos(angles).T, np.sin(angles).T
+    rows = [
+        [b * c, -b * sin_c, sin_b],
+        [a * sin_c + sin_a * sin_b * c, a * c - sin_a * sin_b * sin_c, -sin_a * b],
+        [sin_a * sin_c - a * sin_b * c, sin_a * c + a * sin_b * sin_c, a * b],
+    ]
+    return np.array(rows).transpose(2, 0, 1)
 
 
 def gravity_of(settings: HeldSettings) -> Array:

@@ -14,7 +14,8 @@ separated.
 """
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import nearest_on_segments
+from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.objects.surface import areas_and_normals
 
@@ -34,7 +36,7 @@ THIN = 1e-5
 
 
 def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, ...] | None:
-    """Return the corners of each convex solid that fingertips may touch, (n, 3) each [m].
+    """Return the corners of each convex solid within `reach` of points, (n, 3) each [m].
 
     Takes `near` (k, 3) [m]; `reach` [m]. Gives corners from the centre of mass; None for a convex
     object, which is such a solid itself.
@@ -47,11 +49,10 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
     spatial: Any = importlib.import_module("scipy.spatial")
     tree, kernel = spatial.KDTree(middles), compiled("scenes.mujoco.clearance_kernel")
     found, thin, slack = list[Array](), THIN * body.radius, TOUCHING * body.radius
-    for corners, inward in _flat_pieces(body):
+    pieces = list(_flat_pieces(body))
+    for corners, inward in compress(pieces, _distances(pieces, near) <= reach):
         middle = corners.mean(axis=0)
         extent = float(np.linalg.norm(corners - middle, axis=1).max())
-        if float(np.linalg.norm(near - middle, axis=1).min()) > reach + extent:
-            continue
         edges = nearest_on_segments(corners, np.roll(corners, -1, axis=0), middle)
         width = float(np.linalg.norm(edges - middle, axis=1).min())
         if width > thin:
@@ -60,6 +61,15 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
             depth = float(kernel.clear_depth(corners, inward, depth, triangles, near_by, slack))
             found.append(np.vstack([corners, middle + depth * inward]))
     return tuple(found)
+
+
+def _distances(pieces: Sequence[tuple[Array, Array]], points: Array) -> Array:
+    """Return how far each piece is from the nearest of points (k, 3), (pieces,) [m]."""
+    counts = [len(corners) - 2 for corners, _ in pieces]
+    fans = [corners[[0, at, at + 1]] for corners, _ in pieces for at in range(1, len(corners) - 1)]
+    away = nearest_on_triangles(np.array(fans), points) - points[:, None]
+    distances = np.linalg.norm(away, axis=2).min(axis=0)
+    return np.minimum.reduceat(distances, np.cumsum([0, *counts[:-1]]))
 
 
 def _flat_pieces(body: Polyhedron) -> Iterator[tuple[Array, Array]]:

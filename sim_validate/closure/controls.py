@@ -114,8 +114,9 @@ def _contacts_moved(
             corner, middle = piece[int(rng.integers(len(piece)))], piece.mean(axis=0)
             moved.append(Contact(middle + TOWARD_CORNER * (corner - middle), contact.normal))
         positions, normals = stacked(moved)
-        if not clashes(body, positions, normals, fitting_radius(body, positions, normals)):
-            yield from _refuted("contacts_moved", moved, friction, setup)
+        for control in _refuted("contacts_moved", moved, friction, setup):
+            if not clashes(body, positions, normals, fitting_radius(body, positions, normals)):
+                yield control
 
 
 def _refuted(

@@ -41,7 +41,7 @@ from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, hinged, palm_armature
 from scenes.mujoco.mjcf_text import rotations
 from sim_validate.engine.bench import FREE, PALM, Bench, Health, Motion, Told
-from sim_validate.execution.paths import WHOLE, Drive, Rows
+from sim_validate.execution.paths import WHOLE, Drive, Rows, closing
 
 KEPT = ("qvel", "qfrc_constraint", "state")
 """What is read beside the positions of joints."""
@@ -179,6 +179,11 @@ class HeldBench(Bench[HeldScene]):
         """Simulate one trial; return its motion and the simulator's complete state at its end."""
         (motion,) = self.run([drive], start)
         return motion, motion.states[-1]
+
+    @cached_property
+    def squeezed(self) -> Array:
+        """The simulator's complete state when fingers have closed on the weightless object."""
+        return self.settled(closing())[1]
 
     def placed(self, reached: Array | None) -> Array:
         """Return the positions of all joints where fingertips are displaced along their springs."""

@@ -40,7 +40,6 @@ from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held_scene import SAMPLE_S, HeldScene, build_held_scene, held_physics
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
-from sim_validate.execution import paths
 from sim_validate.execution.bench import (
     FULL,
     IDLE,
@@ -302,20 +301,19 @@ def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> 
 
 def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> dict[Trial, HeldMotion]:
     """Simulate trials: some with open fingers, others from a squeezed object or its weight."""
-    _, squeezed = bench.settled(paths.closing())
     found = dict[Trial, HeldMotion]()
     if weighing := [trial for trial in trials if trial.weighing]:
         # The weight comes once for all. Hand and object get the speed that they start with when it
         # has come: uniform motion changes nothing.
         first = weighing[0].drive.rows(slice(weighing[0].weighing))
-        weight, state = bench.settled(replace(first, velocity=np.zeros(3)), squeezed)
+        weight, state = bench.settled(replace(first, velocity=np.zeros(3)), bench.squeezed)
         rests = [trial.drive.rows(slice(trial.weighing, None)) for trial in weighing]
         for trial, motion in zip(weighing, bench.run(rests, state), strict=True):
             health = motion.health.after(weight.health)
             found[trial] = replace(weight.then(motion), health=health)
     apart = [trial for trial in trials if trial.apart]
     others = [trial for trial in trials if not (trial.weighing or trial.apart)]
-    for own, start in ((apart, None), (others, squeezed)):
+    for own, start in ((apart, None), (others, bench.squeezed)):
         if own:
             motions = bench.run([trial.drive for trial in own], start)
             found |= dict(zip(own, motions, strict=True))
