@@ -12,10 +12,10 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 60_426,
-    "modules of packages": 269,
-    "lines of tests": 49_006,
-    "lines of docs": 7_193,
+    "lines of packages": 58_215,
+    "modules of packages": 240,
+    "lines of tests": 49_023,
+    "lines of docs": 7_200,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
@@ -32,6 +32,8 @@ RISES = (
     "lines of packages, 60,323 to 60,426: first slips of sudden loads; the object's surface",
     "lines of tests, 48,885 to 49,006: a benchmark of the object's surface against pads",
     "lines of docs, 7,189 to 7,193: what fingertips touch",
+    "lines of tests, 49,006 to 49,023: objects that are not convex; margins that files hold",
+    "lines of docs, 7,193 to 7,200: durations of trials; fidelity on objects that are not convex",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
 
