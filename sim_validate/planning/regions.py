@@ -225,7 +225,7 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
         raise InputError(
             f"the array {missing[0]} is missing; certify again with `graspproof regions`"
         )
-    fields: dict[str, Any] = {field: kept[name][()] for field, name in FIELDS.items()}
+    fields: dict[str, Any] = {field: np.asarray(kept[name])[()] for field, name in FIELDS.items()}
     for optional in ("open_choice", "open_wrench"):  # empty where nothing was found
         fields[optional] = fields[optional] if np.size(fields[optional]) else None
     scale = number(fields["scale"], "scale_m", least=SMALLEST_SCALE, most=LARGEST)
