@@ -133,23 +133,9 @@ class Layout(SceneObject):
         return np.einsum("kij,kj->ki", self.frames, self.squeeze)
 
     @property
-    def tip_radii(self) -> Array:
-        """Return the radii of the fingertips, (k,) [m]."""
-        return self.holder.tip_radii
-
-    @property
-    def tip_centers(self) -> Array:
-        """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
-        return self.holder.tip_centers
-
-    @property
     def has_springs(self) -> bool:
         """Return whether each fingertip stands on springs of its own, alike in all directions."""
         return isinstance(self.holder, Slides) and not self.drive.rigid
-
-    def tips(self, joints: Array) -> Array:
-        """Compute the centres of the fingertips, (n, k, 3) [m], at joints (n, j) [m or rad]."""
-        return self.holder.tips(joints)
 
     def commands(self, forces: Array) -> Array:
         """Compute what servos are told to make fingertips push with forces, (n, j) [m or rad].

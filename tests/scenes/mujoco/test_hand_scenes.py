@@ -42,7 +42,7 @@ def test_links_and_tips_are_where_the_hand_has_them(hand):
     for contact, finger in enumerate(reach.fingers):
         name = held.fingers[finger].name
         tip = data.geom(f"tip_{name}").xpos
-        assert tip == pytest.approx(scene.layout.tip_centers[contact], abs=WRITTEN)
+        assert tip == pytest.approx(scene.layout.holder.tip_centers[contact], abs=WRITTEN)
         there = reach.contacts[contact]
         touched = tip + held.fingers[finger].tip.radius * there.normal
         assert touched == pytest.approx(there.position - body.center_of_mass, abs=2e-5)
