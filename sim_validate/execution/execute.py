@@ -82,18 +82,24 @@ def confirming_bench(bench: HeldBench) -> HeldBench | None:
 def run_again(
     bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
 ) -> dict[Trial, HeldMotion]:
-    """Simulate trials with short steps from before their trouble on."""
+    """Simulate trials with short steps from before their trouble on.
+
+    A trial that starts to move when its weight has come has its speed in later states; one that
+    goes on from before gets it at once, as uniform motion changes nothing.
+    """
     begins = [_begin(trial, motion) for trial, motion in motions.items()]
     drives, starts = list[Drive](), list[Array]()
     for (trial, motion), begin in zip(motions.items(), begins, strict=True):
-        drives.append(replace(_rest(trial, begin), lost=_lost(motion, trial.begun, settings)))
+        rest = trial.drive.rows(slice(begin + 1, None))
+        velocity = rest.velocity if begin < trial.weighing else np.zeros(3)
+        lost = _lost(motion, trial.begun, settings)
+        drives.append(replace(rest, velocity=velocity, lost=lost))
         starts.append(motion.states[begin])
-    found = dict[Trial, HeldMotion]()
     rests = bench.run(drives, np.stack(starts))
-    for (trial, motion), begin, rest in zip(motions.items(), begins, rests, strict=True):
-        first = replace(motion.rows(slice(begin + 1)), health=rest.health)  # faults came later
-        found[trial] = first.then(rest)
-    return found
+    return {  # faults came later than what is kept of a first run
+        trial: replace(motion.rows(slice(begin + 1)), health=rest.health).then(rest)
+        for (trial, motion), begin, rest in zip(motions.items(), begins, rests, strict=True)
+    }
 
 
 def _begin(trial: Trial, motion: HeldMotion) -> int:
@@ -108,16 +114,6 @@ def _begin(trial: Trial, motion: HeldMotion) -> int:
         return 0
     trouble = first_trouble(motion, layout.friction, trial.begun)
     return max(0, trouble - BEFORE) if trouble < len(motion.moved) else 0
-
-
-def _rest(trial: Trial, begin: int) -> Drive:
-    """Return what is applied after a sample.
-
-    A trial that starts to move when its weight has come has its speed in later states; one that
-    goes on from before gets it at once, as uniform motion changes nothing.
-    """
-    rest = trial.drive.rows(slice(begin + 1, None))
-    return rest if begin < trial.weighing else replace(rest, velocity=np.zeros(3))
 
 
 def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[float, float]:
