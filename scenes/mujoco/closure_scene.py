@@ -137,14 +137,6 @@ class Layout(SceneObject):
         """Return whether each fingertip stands on springs of its own, alike in all directions."""
         return isinstance(self.holder, Slides) and not self.drive.rigid
 
-    def commands(self, forces: Array) -> Array:
-        """Compute what servos are told to make fingertips push with forces, (n, j) [m or rad].
-
-        Takes contact forces on the object, (n, k, 3) [N], world axes. Commands are rounded like
-        the numbers of a scene; rigid fingers have none, (n, 0).
-        """
-        return to_digits(self.holder.efforts(forces)) / self.holder.servo
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Scene(SceneText, InNotebooks):

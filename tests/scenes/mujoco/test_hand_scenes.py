@@ -66,13 +66,13 @@ def test_only_fingertips_touch_and_they_touch_the_object(hand):
 @pytest.mark.parametrize("hand", ["allegro", "leap"])
 def test_commands_turn_into_joint_torques_and_limits_hold(hand):
     *_, scene, model, data = stood(hand)
-    layout = scene.layout
+    holder = scene.layout.holder
     forces = np.random.default_rng(0).normal(size=(1, 4, 3))
-    data.ctrl[:] = layout.commands(forces)[0]
+    data.ctrl[:] = holder.efforts(forces)[0] / holder.servo
     mujoco.mj_forward(model, data)
     torques = scene.hand.motors.levers @ forces.ravel()
     assert torques == pytest.approx(data.qfrc_actuator[6:], abs=1e-8)
-    data.ctrl[:] = layout.commands(1e3 * forces)[0]
+    data.ctrl[:] = holder.efforts(1e3 * forces)[0] / holder.servo
     mujoco.mj_forward(model, data)
     large = np.abs(1e3 * torques) > 0.35
     assert large.sum() > 8
