@@ -201,54 +201,52 @@ class HandGrip(Grip):
         if not (super()._is_consistent() and self.joint_axes.shape[1]):
             return False
         lengths = np.linalg.norm(self.joint_axes, axis=2)
-        units = (lengths == 0.0) | (np.abs(lengths - 1.0) <= UNIT_SLACK)
-        return bool(units.all()) and all(map(self._gives, range(len(self.friction))))
-
-    def _gives(self, k: int) -> bool:
-        """Return whether the joints of a finger let its fingertip move in all directions."""
-        stiffness, L, _ = self._turning(k)
-        if not float(np.linalg.cond(stiffness)) < STIFFEST:
+        if not ((lengths == 0.0) | (np.abs(lengths - 1.0) <= UNIT_SLACK)).all():
             return False
-        given = L.T @ np.asarray(np.linalg.inv(stiffness)) @ L
-        return float(np.linalg.cond(given)) < STIFFEST
+        stiffness, L, _ = self._turning()
+        if not (np.linalg.cond(stiffness) < STIFFEST).all():
+            return False
+        given = L.transpose(0, 2, 1) @ np.linalg.inv(stiffness) @ L
+        return bool((np.linalg.cond(given) < STIFFEST).all())
 
     @cached_property
     def force_changes(self) -> Array:
         """Change of each contact force per motion of the object by (6), (k, 3, 6), world axes."""
-        return np.array([self._finger(k)[0] for k in range(len(self.arms))])
+        return self._moved()[0]
 
     @cached_property
     def geometric_stiffness(self) -> Array:
         """What squeeze and turning links add to the springs' stiffness, (6, 6) [N/m, N, N m]."""
+        changes, turns = self._moved()
         total = self.rolling_stiffness - self.elastic_stiffness
         for k, (force, normal) in enumerate(zip(self.squeeze, self.normals, strict=True)):
-            df, turn = self._finger(k)
-            total = total - self._maps[k] @ df
+            total = total - self._maps[k] @ changes[k]
             arm = float(self.tip_radius_m[k]) * cross_matrix(force) @ cross_matrix(normal)
-            total[3:] += arm @ turn
+            total[3:] += arm @ turns[k]
         return total
 
-    def _finger(self, k: int) -> tuple[Array, Array]:
-        """Return df of (6), (3, 6), and the fingertip's turn v, (3, 6), per motion (d, t)."""
-        stiffness, L, B = self._turning(k)
-        S = np.asarray(np.linalg.inv(stiffness))
-        moved: Array = self._maps[k].T + L.T @ S @ B
-        df = np.asarray(-np.linalg.solve(L.T @ S @ L, moved), dtype=np.float64)
-        turn: Array = -self.joint_axes[k].T @ S @ (L @ df + B)
-        return df, turn
+    def _moved(self) -> tuple[Array, Array]:
+        """Return df of (6) and the turns v of fingertips per motion (d, t), (k, 3, 6) each."""
+        stiffness, L, B = self._turning()
+        S, back = np.asarray(np.linalg.inv(stiffness)), L.transpose(0, 2, 1)
+        moved: Array = self._maps.transpose(0, 2, 1) + back @ S @ B
+        df = np.asarray(-np.linalg.solve(back @ S @ L, moved), dtype=np.float64)
+        turns: Array = -self.joint_axes.transpose(0, 2, 1) @ S @ (L @ df + B)
+        return df, turns
 
-    def _turning(self, k: int) -> tuple[Array, Array, Array]:
-        """Return k_q 1 + H, (m, m), L, (m, 3), and B, (m, 6), of a finger."""
-        w, f, n = self.joint_axes[k], self.squeeze[k], self.normals[k]
-        rho = float(self.tip_radius_m[k])
-        L = cross(w, self.joint_arms[k])
-        outer: Array = cross(w[None], L[:, None]) @ f  # f . (w_b x l_a)
-        rolled: Array = cross(w[:, None], cross(w, n)[None]) @ f
-        H: Array = np.tril(outer) + np.tril(outer, -1).T - rho * rolled
-        B = np.zeros((len(w), WRENCH))
+    def _turning(self) -> tuple[Array, Array, Array]:
+        """Return k_q 1 + H, (k, m, m), L, (k, m, 3), and B, (k, m, 6), of all fingers."""
+        w, f, n = self.joint_axes, self.squeeze[:, None], self.normals[:, None]
+        rho = self.tip_radius_m[:, None, None]
+        L = cross(w, self.joint_arms)
+        # f . (w_b x l_a), and f . (w_a x (w_b x n))
+        outer: Array = (cross(w[:, None], L[:, :, None]) @ f[..., None])[..., 0]
+        rolled: Array = (cross(w[:, :, None], cross(w, n)[:, None]) @ f[..., None])[..., 0]
+        H: Array = np.tril(outer) + np.tril(outer, -1).transpose(0, 2, 1) - rho * rolled
+        B = np.zeros((*w.shape[:2], WRENCH))
         # f . (w x (t x n)) = (n x (f x w)) . t
-        B[:, 3:] = rho * cross(n, cross(f, w))
-        return self.servo_n_m_per_rad * np.eye(len(w)) + H, L, B
+        B[..., 3:] = rho * cross(n, cross(f, w))
+        return self.servo_n_m_per_rad * np.eye(w.shape[1]) + H, L, B
 
 
 def hand_grip(hand: Hand, stance: Stance, loose: Grip, servo_n_m_per_rad: float) -> HandGrip:

@@ -56,7 +56,7 @@ def write_clip(
 ) -> Path:
     """Draw the motion of a scene, joints (n, 7 + 3k), one frame for each sample."""
     layout = scene.layout
-    tips = layout.tips(joints[:, RIGID:])
+    tips = layout.holder.tips(joints[:, RIGID:])
     farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
     shown = max(layout.radius_m, NEARER * farthest)
     return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,

@@ -133,31 +133,9 @@ class Layout(SceneObject):
         return np.einsum("kij,kj->ki", self.frames, self.squeeze)
 
     @property
-    def tip_radii(self) -> Array:
-        """Return the radii of the fingertips, (k,) [m]."""
-        return self.holder.tip_radii
-
-    @property
-    def tip_centers(self) -> Array:
-        """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
-        return self.holder.tip_centers
-
-    @property
     def has_springs(self) -> bool:
         """Return whether each fingertip stands on springs of its own, alike in all directions."""
         return isinstance(self.holder, Slides) and not self.drive.rigid
-
-    def tips(self, joints: Array) -> Array:
-        """Compute the centres of the fingertips, (n, k, 3) [m], at joints (n, j) [m or rad]."""
-        return self.holder.tips(joints)
-
-    def commands(self, forces: Array) -> Array:
-        """Compute what servos are told to make fingertips push with forces, (n, j) [m or rad].
-
-        Takes contact forces on the object, (n, k, 3) [N], world axes. Commands are rounded like
-        the numbers of a scene; rigid fingers have none, (n, 0).
-        """
-        return to_digits(self.holder.efforts(forces)) / self.holder.servo
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

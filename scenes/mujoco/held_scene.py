@@ -123,11 +123,6 @@ class HeldLayout(SceneObject):
     holder: "Slides | StandingHand"
 
     @property
-    def tip_names(self) -> tuple[str, ...]:
-        """Return the names of the fingertips' shapes in the scene."""
-        return self.holder.tip_names
-
-    @property
     def tip_centers(self) -> Array:
         """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
         height = self.tip_radius_m - TOUCH * self.radius_m
@@ -142,21 +137,11 @@ class HeldLayout(SceneObject):
         """Return the stiffness of all springs against a motion along a unit vector [N/m]."""
         return float(((way @ self.axes) ** 2 * self.stiffness).sum())
 
-    def joints(self, reached: Array) -> Array:
-        """Find where the joints of the fingers are when tips are moved along springs, (k, 3)."""
-        return self.holder.joints(reached)
-
     def commands(self, shares: Array, reached: Array | None) -> Array:
         """Find what the servos are told, (n, joints), for shares (n, k) of the squeeze."""
-        base = 0.0 if reached is None else self.joints(reached)
+        base = 0.0 if reached is None else self.holder.joints(reached)
         forces = shares[:, :, None] * self.squeeze
         return base + self.holder.efforts(forces) / self.holder.servo
-
-    def fingers_seen(
-        self, joints: Array, loads: Array, turned: Array
-    ) -> tuple[Array, Array, Array | None]:
-        """See what fingers did in n samples, as the palm sees it (see `Slides.seen`)."""
-        return self.holder.seen(joints, loads, turned)
 
 
 def held_layout(

@@ -396,8 +396,8 @@ class Schedule:
         wrenches = self.wrenches.copy()
         wrenches[:, 3:] -= cross(layout.center, wrenches[:, :3])
         wrenches = np.hstack([to_digits(wrenches[:, :3]), to_digits(wrenches[:, 3:])])
-        friction = to_digits(self.friction)[:, None]
-        return Told(wrenches, layout.commands(self.forces), friction=friction)
+        commands = to_digits(layout.holder.efforts(self.forces)) / layout.holder.servo
+        return Told(wrenches, commands, friction=to_digits(self.friction)[:, None])
 
     @staticmethod
     def between(

@@ -434,14 +434,9 @@ def angles(normals: Array, faces: Array) -> Array:
     return np.arctan2(across, np.einsum("ki,ki->k", normals, faces))
 
 
-def tips_of(scene: Scene) -> list[str]:
-    """Return the names of the fingertips of a scene."""
-    return [f"finger{finger}" for finger in range(len(scene.layout.contacts))]
-
-
 def require_touch(bench: Bench[Scene]) -> None:
     """Check that each fingertip touches the object at its start as the face lies."""
-    normals, _ = bench.touched(tips_of(bench.scene), one=False)
+    normals, _ = bench.touched(bench.scene.layout.holder.tip_names, one=False)
     turned = angles(normals, bench.scene.layout.frames[:, :, 0])
     finger = int(np.argmax(np.nan_to_num(turned, nan=np.inf)))
     if not turned[finger] <= NORMAL_ERROR:
@@ -464,7 +459,7 @@ def surface_touches(case: Case) -> tuple[Check, Check]:
         size = setup.scene(body, group, 1.0).layout.grasp_size_m
         setup = replace(setup, fingers=replace(rigid, indentation=depth / size))
         scene, faces = setup.scene(body, group, 1.0), stacked(group)[1]
-        normals, depths = Bench(scene).touched(tips_of(scene))
+        normals, depths = Bench(scene).touched(scene.layout.holder.tip_names)
         depths /= depth
         off = np.maximum(angles(normals, faces) / NORMAL_ERROR, np.abs(depths - 1.0) / DEPTH_ERROR)
         worst = int(np.argmax(np.nan_to_num(off, nan=np.inf)))

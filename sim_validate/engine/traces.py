@@ -118,7 +118,7 @@ def traces(
     parts = [motion.joints[first:] for motion, first in zip(motions, firsts, strict=True)]
     of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     joints, ends = np.concatenate(parts), np.cumsum([len(part) for part in parts])[:-1]
-    size, normals, radii = layout.grasp_size_m, layout.frames[:, :, 0], layout.tip_radii
+    size, normals, radii = layout.grasp_size_m, layout.frames[:, :, 0], layout.holder.tip_radii
     shifts, rotations = moved(joints[:, :7], starts[of, :7], layout)
     tips, began = _tips(joints, layout), _tips(starts, layout)
     _, slips = normal_and_tangential(tips - began[of], normals)
@@ -167,7 +167,7 @@ def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
 
 def _tips(joints: Array, layout: Layout) -> Array:
     """Compute fingertip centres in the object's frame, (n, k, 3)."""
-    centers = layout.tips(joints[:, 7:]) - joints[:, None, :3]
+    centers = layout.holder.tips(joints[:, 7:]) - joints[:, None, :3]
     # The conjugate of the object's quaternion turns world vectors into its frame.
     backwards = joints[:, None, 3:7] * np.array([1.0, -1.0, -1.0, -1.0])
     return rotated(backwards, centers)

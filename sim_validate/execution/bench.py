@@ -162,7 +162,7 @@ class HeldBench(Bench[HeldScene]):
             )
         super().__init__(scene, threads=threads, chunk=chunk, step_s=step_s, kept=KEPT)
         self.lost_m = lost_m
-        self.tips = self.shapes(scene.layout.tip_names)
+        self.tips = self.shapes(scene.layout.holder.tip_names)
         self.rubbing = slice(min(self.tips), max(self.tips) + 1)
 
     def run(self, drives: Sequence[Drive], start: Array | None = None) -> tuple[HeldMotion, ...]:
@@ -189,7 +189,7 @@ class HeldBench(Bench[HeldScene]):
         """Return the positions of all joints where fingertips are displaced along their springs."""
         joints = self.home.copy()
         if reached is not None:
-            joints[PALM + 1 :] = self.scene.layout.joints(reached)
+            joints[PALM + 1 :] = self.scene.layout.holder.joints(reached)
         return joints
 
     def _told_by(self, drive: Drive, *, fresh: bool) -> Told:
@@ -234,9 +234,9 @@ class HeldBench(Bench[HeldScene]):
         half /= np.linalg.norm(half, axis=1)[:, None]
         palm_then = hinged(palm[:, 3:] + back[:, FREE + 3 : PALM]).transpose(0, 2, 1)
         pressed = palm_then @ object_turns @ rotations(half)
-        tips, _, turns = layout.fingers_seen(fingers, forces[:, PALM:], turned)
+        tips, _, turns = layout.holder.seen(fingers, forces[:, PALM:], turned)
         before = fingers + back[:, PALM:]
-        _, contact, _ = layout.fingers_seen(before, forces[:, PALM:], pressed)
+        _, contact, _ = layout.holder.seen(before, forces[:, PALM:], pressed)
         if turns is None:
             turns = np.broadcast_to(np.eye(3), (length, 1, 3, 3))
         table = forces[:, :3] - np.einsum("kij,nkj->ni", layout.axes, contact)

@@ -27,9 +27,7 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
 from grasp_core.errors import GraspError, InputError, NoForcesError
-from grasp_core.execution.best_squeeze import best_squeeze
-from grasp_core.execution.grips import Grip
-from grasp_core.execution.loads import LoadSet, any_direction
+from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.kinds import Range, instance, one_of, value_of
 from grasp_core.objects.on_faces import check_body, check_on_faces
@@ -82,18 +80,24 @@ def confirming_bench(bench: HeldBench) -> HeldBench | None:
 def run_again(
     bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
 ) -> dict[Trial, HeldMotion]:
-    """Simulate trials with short steps from before their trouble on."""
+    """Simulate trials with short steps from before their trouble on.
+
+    A trial that starts to move when its weight has come has its speed in later states; one that
+    goes on from before gets it at once, as uniform motion changes nothing.
+    """
     begins = [_begin(trial, motion) for trial, motion in motions.items()]
     drives, starts = list[Drive](), list[Array]()
     for (trial, motion), begin in zip(motions.items(), begins, strict=True):
-        drives.append(replace(_rest(trial, begin), lost=_lost(motion, trial.begun, settings)))
+        rest = trial.drive.rows(slice(begin + 1, None))
+        velocity = rest.velocity if begin < trial.weighing else np.zeros(3)
+        lost = _lost(motion, trial.begun, settings)
+        drives.append(replace(rest, velocity=velocity, lost=lost))
         starts.append(motion.states[begin])
-    found = dict[Trial, HeldMotion]()
     rests = bench.run(drives, np.stack(starts))
-    for (trial, motion), begin, rest in zip(motions.items(), begins, rests, strict=True):
-        first = replace(motion.rows(slice(begin + 1)), health=rest.health)  # faults came later
-        found[trial] = first.then(rest)
-    return found
+    return {  # faults came later than what is kept of a first run
+        trial: replace(motion.rows(slice(begin + 1)), health=rest.health).then(rest)
+        for (trial, motion), begin, rest in zip(motions.items(), begins, rests, strict=True)
+    }
 
 
 def _begin(trial: Trial, motion: HeldMotion) -> int:
@@ -108,16 +112,6 @@ def _begin(trial: Trial, motion: HeldMotion) -> int:
         return 0
     trouble = first_trouble(motion, layout.friction, trial.begun)
     return max(0, trouble - BEFORE) if trouble < len(motion.moved) else 0
-
-
-def _rest(trial: Trial, begin: int) -> Drive:
-    """Return what is applied after a sample.
-
-    A trial that starts to move when its weight has come has its speed in later states; one that
-    goes on from before gets it at once, as uniform motion changes nothing.
-    """
-    rest = trial.drive.rows(slice(begin + 1, None))
-    return rest if begin < trial.weighing else replace(rest, velocity=np.zeros(3))
 
 
 def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[float, float]:
@@ -137,8 +131,6 @@ STICKING = 20.0
 """Friction of contacts that stick, relative to the true one."""
 DIVERGED = Outcome(math.inf, math.inf, math.inf, dropped=True, slipped=True, first_slip=0.0)
 """What is known of an object that the simulator cannot follow."""
-SPARE = 0.05
-"""How much farther a curved surface is there than fingertips come, in object radii."""
 
 
 def execute(
@@ -179,40 +171,28 @@ def execute(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fingertips:
-    """Fingertips on springs, which hold an object by contacts (see `Holder`)."""
+class Fingertips(Holder):
+    """Fingertips on springs, which hold an object by contacts."""
 
-    body: Polyhedron
     contacts: Sequence[Contact]
     friction: ArrayLike
     physics: PhysicsSettings | Mapping[str, Any] | None = None
     """Settings of the simulator, or those of the usual ones that differ, by name; None for the
     usual ones."""
 
-    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
-        """Choose the squeeze that carries the most of the weight in any direction.
-
-        With loads it is the one of the least push that survives them, however hard fingers may
-        push.
-        """
-        best = best_squeeze(
-            self.body, self.contacts, self.friction, loads or any_direction(settings.object_kg),
-            max_push_n=settings.push_n if loads is None else None,
-            stiffness=settings.tip_stiffness_n_per_m,
-            tip_radius_m=tip_radius(self.body, self.contacts, settings),
-        )  # fmt: skip
-        if best.scale == 0.0:
-            raise NoForcesError(
-                "no squeeze carries any part of the weight in every direction; use other contacts "
-                "or more friction"
-            )
-        return best
+    def loose(self, settings: ExecutionSettings) -> tuple[Grip, None]:
+        """Return the contacts before they are squeezed; no motors limit fingertips."""
+        stiffness = settings.tip_stiffness_n_per_m
+        radius = tip_radius(self.body, self.contacts, settings)
+        return unsqueezed(
+            self.body, self.contacts, self.friction, stiffness=stiffness, tip_radius_m=radius
+        ), None
 
     def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
         """Build the scene in which a squeeze is executed."""
         build = partial(
             build_held_scene, self.body, best.grip, settings,
-            reach_m=surface_reach(self.body, best.grip, settings),
+            reach_m=self.reach_m(settings, best.grip),
         )  # fmt: skip
         if not isinstance(self.physics, Mapping):
             return build(physics=self.physics)
@@ -288,15 +268,6 @@ def tip_radius(body: Polyhedron, contacts: Sequence[Contact], settings: Executio
     if settings.tip_radius_m is not None:
         return settings.tip_radius_m
     return fitting_radius(body, *contact_arrays(*stacked(contacts)))
-
-
-def surface_reach(body: Polyhedron, grip: Grip, settings: ExecutionSettings) -> float | None:
-    """Return how far fingertips come from contacts on a curved surface [m]; None for flat ones."""
-    if body.patches is None:
-        return None
-    turn = settings.most_rad + math.radians(settings.off_deg)
-    moved = settings.most_m + settings.off_mm / 1000.0
-    return moved + (turn + SPARE) * body.radius + float(grip.tip_radius_m.max())
 
 
 def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> dict[Trial, HeldMotion]:

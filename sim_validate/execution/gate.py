@@ -508,7 +508,7 @@ def on_faces(case: HeldCase, name: str) -> tuple[Check, ...]:
     bench = HeldBench(scene)
     into = DEPTH * case.radius_m * normals
     reached = np.einsum("kij,ki->kj", scene.layout.axes, into)
-    found, depths = bench.touched(scene.layout.tip_names, bench.placed(reached))
+    found, depths = bench.touched(scene.layout.holder.tip_names, bench.placed(reached))
     depths /= (DEPTH + TOUCH) * case.radius_m
     motion, _ = bench.settled(paths.closing(SETTLE_S))
     forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])

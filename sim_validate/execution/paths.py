@@ -175,7 +175,7 @@ def turned_weight(slowest_rad_per_s: float) -> Drive:
     evenly = along[-1] * np.arange(count) / (count - 1.0)
     path = _spiral(np.asarray(np.interp(evenly, along, fine), dtype=np.float64), turns)
     way = np.concatenate([np.broadcast_to(path[0], (WEIGHING, 3)), path])
-    return _weighed(GRAVITY_M_PER_S2 * way, count)
+    return weighed(GRAVITY_M_PER_S2 * way, count)
 
 
 def _spiral(u: Array, turns: float) -> Array:
@@ -184,12 +184,7 @@ def _spiral(u: Array, turns: float) -> Array:
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(polar)], axis=1)
 
 
-def held_weight(gravity: Array, rest_s: float = RISE_S) -> Drive:
-    """Return the drive in which the weight comes in one direction, and stays."""
-    return _weighed(gravity, samples(rest_s))
-
-
-def _weighed(gravity: Array, count: int) -> Drive:
+def weighed(gravity: Array, count: int = WEIGHING) -> Drive:
     """Return the drive in which the weight comes, and stays for so many samples."""
     return loaded(np.concatenate([smooth(WEIGHING), np.ones(count)]), gravity)
 
@@ -206,7 +201,7 @@ def shake(gravity: Array, axis: Array, frequency_hz: float) -> Drive:
     speeds = -size * np.cos(rate * times) / rate
     accelerations = np.zeros((WEIGHING + wave, 6))
     accelerations[WEIGHING:] = np.diff(speeds)[:, None] / SAMPLE_S * axis
-    return replace(_weighed(gravity, wave), accelerations=accelerations)
+    return replace(weighed(gravity, wave), accelerations=accelerations)
 
 
 def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive:
@@ -222,7 +217,7 @@ def stop(gravity: Array, way: Array, deceleration: float, speed: float) -> Drive
     accelerations = np.zeros((WEIGHING + len(shape) + rest, 6))
     size = speed / (SAMPLE_S * float(shape.sum()))  # the deceleration, but for the shortest stops
     accelerations[WEIGHING : WEIGHING + len(shape), :3] = -size * shape[:, None] * way
-    under = _weighed(gravity, len(shape) + rest)
+    under = weighed(gravity, len(shape) + rest)
     return replace(under, accelerations=accelerations, velocity=speed * way)
 
 
@@ -234,7 +229,7 @@ def knock(gravity: Array, impulse: Array, point: Array) -> Drive:
     force = impulse / (SAMPLE_S * shape.sum())
     whole = np.concatenate([force, np.cross(point, force)])
     wrenches[WEIGHING : WEIGHING + strike] = shape[:, None] * whole
-    return replace(_weighed(gravity, strike + rest), wrenches=wrenches)
+    return replace(weighed(gravity, strike + rest), wrenches=wrenches)
 
 
 def lift(up: Array, height: float, duration_s: float, give_m: float = 0.0) -> tuple[Drive, int]:

@@ -42,21 +42,24 @@ moves too far.
 
 import importlib
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array, cross
 from grasp_core.closure.contacts import cross_matrix, grasp_map
 from grasp_core.errors import InputError, NoForcesError, SolverError
+from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, LoadSet, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.motors import Motors
 from grasp_core.solvers.ties import first_best
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, gravity_of
 from scenes.mujoco.mjcf_text import rotations
@@ -222,21 +225,49 @@ class NoSqueezeError(NoForcesError):
         self.enough = enough
 
 
-class Holder(Protocol):
+SPARE = 0.05
+"""How much farther a curved surface is there than fingertips come, in object radii."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Holder(ABC):
     """What holds the object in an execution: fingertips on springs, or a hand."""
 
-    @property
-    def body(self) -> Polyhedron:
-        """Return the object."""
-        ...
+    body: Polyhedron
 
-    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
-        """Choose the squeeze that carries most weight, or the least one that survives loads."""
-        ...
+    @abstractmethod
+    def loose(self, settings: ExecutionSettings) -> tuple[Grip, Motors | None]:
+        """Return the contacts before they are squeezed, and the motors behind them."""
 
+    @abstractmethod
     def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
         """Build the scene in which a squeeze is executed."""
-        ...
+
+    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
+        """Choose the squeeze that carries the most of the weight in any direction.
+
+        With loads it is the one of the least push that survives them, however hard fingers may
+        push.
+        """
+        start, motors = self.loose(settings)
+        most = settings.push_n if loads is None else None
+        best = searched(start, loads or any_direction(settings.object_kg), most, motors)
+        if best.scale == 0.0:
+            within = "" if motors is None else " within the motors' torques"
+            others = "other contacts" if motors is None else "stronger motors, another pose,"
+            raise NoForcesError(
+                f"no squeeze{within} carries any part of the weight in every direction; use "
+                f"{others} or more friction"
+            )
+        return best
+
+    def reach_m(self, settings: ExecutionSettings, grip: Grip) -> float | None:
+        """Return how far tips come from contacts on a curved surface [m]; None for flat ones."""
+        if self.body.patches is None:
+            return None
+        turn = settings.most_rad + math.radians(settings.off_deg)
+        moved = settings.most_m + settings.off_mm / 1000.0
+        return moved + (turn + SPARE) * self.body.radius + float(grip.tip_radius_m.max())
 
 
 def planned(

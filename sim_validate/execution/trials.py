@@ -266,7 +266,7 @@ def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Tria
     off_m, off_rad = settings.off_mm / 1000.0, math.radians(settings.off_deg)
     poses = misplacements(layout, off_m, off_rad, settings.misplacements, settings.seed)
     reached = met(layout, poses, off_m, off_rad)
-    closing, weight = paths.closing(), paths.held_weight(layout.gravity)
+    closing, weight = paths.closing(), paths.weighed(layout.gravity)
     for place, (pose, tips) in enumerate(zip(poses, reached, strict=True)):
         drive = replace(closing.then(weight), pose=pose, reached=tips)
         name = f"misplaced {place}"

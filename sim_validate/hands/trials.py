@@ -43,9 +43,7 @@ from grasp_core.arrays import Array, Shape, rounded, to_digits
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError, NoForcesError
-from grasp_core.execution.best_squeeze import searched
-from grasp_core.execution.grips import unsqueezed
-from grasp_core.execution.loads import LoadSet, any_direction
+from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.figures import Shown
 from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
@@ -76,7 +74,8 @@ from sim_validate.engine.gate import Check, measured, require_faithful, two_digi
 from sim_validate.engine.rig import Analysis, PlannedLoad, closed_on, part, ramped_limits, squeezed
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, HoldVerdict, judge
-from sim_validate.execution.execute import asked_settings, execution_of, result_of, surface_reach
+from sim_validate.execution.execute import asked_settings, execution_of, result_of
+from sim_validate.execution.predictions import Holder
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.settings import ExecutionSettings
 
@@ -450,7 +449,7 @@ def execute_hand(
         UnfaithfulError: The simulator fails on a case with a known answer.
     """
     settings = asked_settings("execute_hand", settings, mass_kg, hand_execution_settings)
-    holder = HandHolder(hand, body, reach, friction)
+    holder = HandHolder(body, hand, reach, friction)
     return execution_of(holder, settings.for_body(body), threads=threads, enough=enough)
 
 
@@ -460,16 +459,15 @@ def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HandHolder:
-    """A hand that stands in a grasp, and holds the object by its motors (see `Holder`)."""
+class HandHolder(Holder):
+    """A hand that stands in a grasp, and holds the object by its motors."""
 
     hand: Hand
-    body: Polyhedron
     reach: HandReach
     friction: float
 
-    def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
-        """Choose the squeeze that carries most, or needs least push for loads, by its torques."""
+    def loose(self, settings: ExecutionSettings) -> tuple[Grip, Motors]:
+        """Return the contacts before they are squeezed, and the motors behind them."""
         hand, body, reach = self.hand, self.body, self.reach
         check_body(body)
         stance, spring = stance_of(hand, reach), settings.tip_stiffness_n_per_m
@@ -483,19 +481,11 @@ class HandHolder:
             body, stance.contacts, self.friction, tip_radius_m=stance.tip_radii,
             stiffness=finger_springs(motors, spring),
         )  # fmt: skip
-        start = hand_grip(hand, stance, loose, servo_stiffness(motors, spring))
-        most = settings.push_n if loads is None else None
-        best = searched(start, loads or any_direction(settings.object_kg), most, motors)
-        if best.scale == 0.0:
-            raise NoForcesError(
-                "no squeeze within the motors' torques carries any part of the weight in every "
-                "direction; use stronger motors, another pose, or more friction"
-            )
-        return best
+        return hand_grip(hand, stance, loose, servo_stiffness(motors, spring)), motors
 
     def scene(self, settings: ExecutionSettings, best: BestSqueeze) -> HeldScene:
         """Build the scene in which a squeeze is executed."""
-        near = surface_reach(self.body, best.grip, settings)
+        near = self.reach_m(settings, best.grip)
         return held_hand_scene(self.hand, self.body, self.reach, best.grip, settings, near)
 
 

@@ -42,7 +42,7 @@ def test_links_and_tips_are_where_the_hand_has_them(hand):
     for contact, finger in enumerate(reach.fingers):
         name = held.fingers[finger].name
         tip = data.geom(f"tip_{name}").xpos
-        assert tip == pytest.approx(scene.layout.tip_centers[contact], abs=WRITTEN)
+        assert tip == pytest.approx(scene.layout.holder.tip_centers[contact], abs=WRITTEN)
         there = reach.contacts[contact]
         touched = tip + held.fingers[finger].tip.radius * there.normal
         assert touched == pytest.approx(there.position - body.center_of_mass, abs=2e-5)
@@ -66,13 +66,13 @@ def test_only_fingertips_touch_and_they_touch_the_object(hand):
 @pytest.mark.parametrize("hand", ["allegro", "leap"])
 def test_commands_turn_into_joint_torques_and_limits_hold(hand):
     *_, scene, model, data = stood(hand)
-    layout = scene.layout
+    holder = scene.layout.holder
     forces = np.random.default_rng(0).normal(size=(1, 4, 3))
-    data.ctrl[:] = layout.commands(forces)[0]
+    data.ctrl[:] = holder.efforts(forces)[0] / holder.servo
     mujoco.mj_forward(model, data)
     torques = scene.hand.motors.levers @ forces.ravel()
     assert torques == pytest.approx(data.qfrc_actuator[6:], abs=1e-8)
-    data.ctrl[:] = layout.commands(1e3 * forces)[0]
+    data.ctrl[:] = holder.efforts(1e3 * forces)[0] / holder.servo
     mujoco.mj_forward(model, data)
     large = np.abs(1e3 * torques) > 0.35
     assert large.sum() > 8

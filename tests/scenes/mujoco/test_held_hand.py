@@ -24,7 +24,7 @@ def test_springs_are_those_of_the_servos_by_the_simulators_own_jacobians(hand):
     layout, model = scene.layout, mujoco.MjModel.from_xml_string(scene.xml)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    for contact, name in enumerate(layout.tip_names):
+    for contact, name in enumerate(layout.holder.tip_names):
         J = np.zeros((3, model.nv))
         link = int(model.geom(name).bodyid[0])
         mujoco.mj_jac(model, data, J, None, layout.contacts[contact], link)
@@ -55,7 +55,7 @@ def test_forces_seen_are_those_of_the_simulators_contacts(hand):
     data = mujoco.MjData(bench.model)
     mujoco.mj_setState(bench.model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION.value)
     mujoco.mj_forward(bench.model, data)
-    names = {bench.model.geom(name).id: k for k, name in enumerate(scene.layout.tip_names)}
+    names = {bench.model.geom(name).id: k for k, name in enumerate(scene.layout.holder.tip_names)}
     seen = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])
     found = np.zeros_like(seen)
     for number in range(data.ncon):
@@ -74,10 +74,10 @@ def test_reached_places_are_met_by_joints():
     _, _, scene, _ = standing("allegro")
     layout = scene.layout
     reached = np.random.default_rng(0).uniform(-1e-3, 1e-3, size=(4, 3))
-    joints = layout.joints(reached)
-    tips, _, _ = layout.fingers_seen(joints[None], np.zeros((1, len(joints))), np.eye(3)[None])
+    joints = layout.holder.joints(reached)
+    tips, _, _ = layout.holder.seen(joints[None], np.zeros((1, len(joints))), np.eye(3)[None])
     assert tips[0] == pytest.approx(reached, abs=1e-7)
-    _, _, still = layout.fingers_seen(np.zeros((1, 16)), np.zeros((1, 16)), np.eye(3)[None])
+    _, _, still = layout.holder.seen(np.zeros((1, 16)), np.zeros((1, 16)), np.eye(3)[None])
     assert still == pytest.approx(np.tile(np.eye(3), (1, 4, 1, 1)), abs=WRITTEN)
 
 

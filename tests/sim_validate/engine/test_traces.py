@@ -85,8 +85,8 @@ def test_slips_and_gaps_are_those_of_the_contact_frames(layout):
 def test_fingers_that_move_with_the_object_do_not_slip(layout):
     rng = np.random.default_rng(1)
     R, shift = random_rotation(rng), rng.normal(size=3)
-    there = layout.tip_centers @ R.T + shift
-    slides = np.einsum("kij,ki->kj", layout.frames, there - layout.tip_centers)
+    there = layout.holder.tip_centers @ R.T + shift
+    slides = np.einsum("kij,ki->kj", layout.frames, there - layout.holder.tip_centers)
     (found,) = traces([motion([pose(), pose(shift, R, slides, scale=1.1)])], layout, [1])
     assert found.slips_m.max() < 1e-14
     assert np.abs(found.gaps_m + layout.drive.indentation_m).max() < 1e-14

@@ -46,7 +46,7 @@ def same(one, other):
 def several():
     """Trials of different lengths."""
     return (
-        paths.held_weight(DOWN, 0.3),
+        paths.weighed(DOWN, paths.samples(0.3)),
         paths.shake(DOWN, np.array([0, 6.0, 0, 0, 0, 0]), 10.0),
         paths.knock(DOWN, np.array([0.02, 0, 0]), np.array([0, 0.01, 0])),
         paths.stop(DOWN, UP, 10.0, 0.3),
@@ -64,7 +64,7 @@ def test_the_squeeze_comes_and_leaves_the_object_where_it_is():
 @pytest.mark.parametrize("stiffness", [2000.0, 10000.0])
 def test_the_weight_sinks_by_load_over_stiffness(stiffness):
     """Across the pushes four equal springs carry it; contacts give a little beside them."""
-    (motion,) = ran(paths.held_weight(DOWN, 1.0), stiffness=stiffness)
+    (motion,) = ran(paths.weighed(DOWN, paths.samples(1.0)), stiffness=stiffness)
     assert motion.moved[-1] == pytest.approx([0, 0, -MASS * G / (4 * stiffness)], abs=1e-6)
     assert in_world(motion)[-1, :, 2] == pytest.approx(MASS * G / 4, rel=1e-3)
 
@@ -165,7 +165,7 @@ def test_friction_is_that_of_each_contact():
     """Only two fingers across from each other hold, and carry the weight in halves."""
     light = 0.8 * 2 * 0.5 * 5.0 / G
     friction = np.array([0.5, 0.0, 0.0, 0.5])
-    drive = paths.held_weight(DOWN, 0.4)
+    drive = paths.weighed(DOWN, paths.samples(0.4))
     bench = box_bench(mass=light)
     (motion,) = bench.run([replace(paths.closing().then(drive), friction=friction)])
     assert not motion.health.fault
@@ -208,7 +208,7 @@ def test_a_sample_must_be_a_number_of_steps():
 
 def test_a_trial_ends_where_the_object_is_lost():
     """It falls from open fingers; another trial goes on."""
-    falling = replace(paths.held_weight(DOWN), grasping=np.zeros(60))
+    falling = replace(paths.weighed(DOWN), grasping=np.zeros(60))
     held = paths.closing(0.2)
     scene = box_scene()
     whole = HeldBench(scene).run([falling, held])

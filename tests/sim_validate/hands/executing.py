@@ -22,6 +22,6 @@ def standing(name):
     """Return a pose of a hand, the hand, its scene with an object, and the squeeze."""
     reach, hand = stood(name)
     body, settings = scaled(OBJECT, RADIUS), hand_execution_settings(MASS)
-    best = HandHolder(hand, body, reach, FRICTION).squeeze(settings)
+    best = HandHolder(body, hand, reach, FRICTION).squeeze(settings)
     scene = held_hand_scene(hand, body, reach, best.grip, settings)
     return reach, hand, scene, best

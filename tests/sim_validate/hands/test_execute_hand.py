@@ -51,7 +51,7 @@ def test_hands_slip_where_they_are_predicted_to(name):
 def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost():
     reach, hand = stood("allegro")
     body = scaled(OBJECT, RADIUS)
-    able = HandHolder(hand, body, reach, FRICTION).squeeze(hand_execution_settings(MASS))
+    able = HandHolder(body, hand, reach, FRICTION).squeeze(hand_execution_settings(MASS))
     heavy = 10.0 * able.scale * MASS
     found = sv.execute_hand(
         hand, body, reach, FRICTION, replace(hand_execution_settings(heavy), trials=("weight",))
