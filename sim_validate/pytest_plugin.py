@@ -166,11 +166,10 @@ class GraspItem(_SuiteItem):
             _note(self, "status", "not comparable" if changed else "refused")
             raise
         (finding,) = done.findings
-        files, same = (suite.baseline, suite.grasps), finding.status is Status.SAME
-        why = "" if same else explained(done, files, suite.compared)
+        why = "" if finding.status is Status.SAME else explained(done)
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
         _note(self, "status", finding.status.value, suite.compared.mesh)
-        if not fails and (told := passing(done, suite.compared)):
+        if not fails and (told := passing(done)):
             self.user_properties.append((TOLD, told))
         if finding.after is not None:
             self.user_properties += finding.after.properties().items()

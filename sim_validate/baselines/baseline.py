@@ -5,20 +5,19 @@ that the classes of verdicts and executions declare as compared. Once it is writ
 part, it holds that shape, so that moves of faces are measured from what was accepted.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from inspect import get_annotations
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar, cast, get_args, get_origin
+from typing import Annotated, Any, Self, get_args, get_origin
 
 from grasp_core.arrays import Array, Indices, Shape
-from grasp_core.declared import Declared, types
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
-from grasp_core.figures import Figure, compared
+from grasp_core.figures import Figure, Kept, compared, keeps
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import FLAT, Key, RecordFile, record_of
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import Count, FrictionOrZero, NotNegative, Number, inside
+from grasp_core.kinds import Count, FrictionOrZero, NotNegative, Number
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
@@ -33,67 +32,31 @@ from sim_validate.settings import ExecutionSettings
 
 DIGITS = 12
 MARK = '"grasps_file"'
-Own = TypeVar("Own", bound="Kept")
 
 
-class Kept(Declared):
-    """Base of records of the figures of another class, which `keeps` gives them."""
+def in_baselines(kind: type) -> Iterator[Figure]:
+    """Yield the compared figures of a class: of a list without names, the number of items.
 
-    __slots__ = ()
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Return a figure; which there are says the other class."""
-
-    @classmethod
-    def of(cls, record: object) -> Self:
-        """Take the figures of a record: numbers to `DIGITS`, and how many items lists have."""
-        found: dict[str, Any] = {}
-        for name, kind in types(cls).items():
-            value, part = getattr(record, name), inside(kind, Kept)
-            if part is not None:
-                value = None if value is None else part.of(value)
-            elif isinstance(value, tuple) and get_args(kind)[0] is int:
-                value = len(cast("tuple[Any, ...]", value))
-            elif isinstance(value, float):
-                value = float(f"{value:.{DIGITS}g}")
-            found[name] = value
-        return cls(**found)
-
-
-def keeps(kind: type) -> Callable[[type[Own]], type[Own]]:
-    """Return what makes a class of records of the compared figures of another class.
-
-    Parts of records that are flat, the class names itself.
+    Parts of records that are flat, classes of kept figures name themselves.
     """
-
-    def made(own: type[Own]) -> type[Own]:
-        figures = {each.name: _kind(each) for each in compared(kind) if each.path == (each.name,)}
-        own.__annotations__ = {**get_annotations(own), **figures}
-        return dataclass(frozen=True, slots=True, eq=False, repr=False)(own)
-
-    return made
+    for each in (each for each in compared(kind) if each.path == (each.name,)):
+        whole, how = get_args(each.kind)[0], each.compared
+        counted = get_origin(whole) is tuple and how is not None and how.items is None
+        numbered = counted and float not in get_args(whole)
+        yield each._replace(kind=Annotated[Number, how]) if numbered else each
 
 
-def _kind(figure: Figure) -> Any:
-    """Return the kind of a figure in a baseline: of a list without names, the number of items."""
-    whole, how = get_args(figure.kind)[0], figure.compared
-    counted = get_origin(whole) is tuple and how is not None and how.items is None
-    return Annotated[Number, how] if counted and float not in get_args(whole) else figure.kind
-
-
-@keeps(Verdict)
+@keeps(in_baselines(Verdict), DIGITS)
 class VerdictFigures(Kept):
     """The figures of a verdict."""
 
 
-@keeps(Execution)
+@keeps(in_baselines(Execution), DIGITS)
 class ExecutionFigures(Kept):
     """The figures of an execution."""
 
 
-@keeps(ExecutedGrasp)
+@keeps(in_baselines(ExecutedGrasp), DIGITS)
 class ExecutedFigures(Kept):
     """The figures of a grasp that was to be executed."""
 

@@ -17,7 +17,7 @@ from grasp_core.figures import NONE, Shown, cell, compared
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import arithmetic, versions
 from scenes.settings import FingerSettings
-from sim_validate.baselines.baseline import Baseline, Entry, How
+from sim_validate.baselines.baseline import Baseline, Entry, How, write_baseline
 from sim_validate.baselines.compare import WORDS, Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
 from sim_validate.closure.validate import Job, prepared, verdict_of
@@ -46,20 +46,36 @@ def _silent(_: int, __: int) -> None:
 class Measured:
     """Verdicts on the grasps of a file, and the baseline made of them."""
 
+    now: Present
+    files: tuple[Path, Path]
+    """Paths of the baseline and of the grasps."""
     baseline: Baseline
     verdicts: Mapping[str, Verdict]
     refused: Mapping[str, str]
     executions: Mapping[str, ExecutedGrasp] = field(default_factory=dict[str, ExecutedGrasp])
 
+    def bless(self) -> Baseline:
+        """Write the baseline, with the part that it is about; every grasp must be in it."""
+        now = self.now.testable(self.baseline.limit)
+        if self.refused:
+            raise InputError("; ".join(self.refused.values()))
+        unit, scale = now.file_lengths
+        found = replace(self.baseline, part=now.recorded, unit=unit, scale=scale)
+        write_baseline(self.files[0], found)
+        return found
+
 
 def measured(
-    saved: Plan, about: tuple[str, int | None], how: How, processors: int = 1,
+    now: Present, files: tuple[Path, Path], limit: int | None, how: How, processors: int = 1,
     report: Report = _silent,
 ) -> Measured:  # fmt: skip
-    """Simulate grasps and make a baseline of their verdicts."""
-    chosen = saved.grasps[: about[1]]
+    """Simulate the first grasps of a file and make a baseline of their verdicts."""
+    now = now.testable(limit)
+    saved, chosen = now.saved, now.saved.grasps
+    baseline, grasps = (path.resolve() for path in files)
+    where = Path(os.path.relpath(grasps, baseline.parent)).as_posix()
     if not chosen:
-        raise InputError(f"{about[0]}: expected at least one grasp to simulate, found none")
+        raise InputError(f"{where}: expected at least one grasp to simulate, found none")
     require_faithful(how.setup, saved.friction, saved.body.radius)
     jobs = [Job(saved.body, grasp, saved.friction, how.agenda, how.setup) for grasp in chosen]
     executing = list[ExecutionJob]()
@@ -93,8 +109,8 @@ def measured(
         if grasp.id in verdicts and grasp.id not in refused
     ]
     kept = Baseline(
-        grasps_file=about[0],
-        limit=about[1],
+        grasps_file=where,
+        limit=limit,
         object=AboutObject.of(saved.body),
         friction=saved.friction,
         planned_radius_m=_planned_radius(saved),
@@ -103,7 +119,7 @@ def measured(
         arithmetic=arithmetic(),
         entries=tuple(sorted(entries, key=lambda entry: entry.id)),
     )
-    return Measured(kept, verdicts, refused, executions)
+    return Measured(now, files, kept, verdicts, refused, executions)
 
 
 def _or_refusal(work: Callable[[Any], Any], job: Any) -> Any:
@@ -112,14 +128,6 @@ def _or_refusal(work: Callable[[Any], Any], job: Any) -> Any:
         return work(job)
     except InputError as error:
         return str(error)
-
-
-def complete(found: Measured, now: Present) -> Baseline:
-    """Return the baseline of a measurement in which every grasp could be simulated."""
-    if found.refused:
-        raise InputError("; ".join(found.refused.values()))
-    unit, scale = now.file_lengths
-    return replace(found.baseline, part=now.recorded, unit=unit, scale=scale)
 
 
 def setup_for(saved: Plan, path: Path | None) -> Setup:
@@ -137,11 +145,6 @@ def with_planned_fingers(how: How, before: Baseline, saved: Plan) -> How:
     return replace(how, setup=replace(how.setup, fingers=fingers))
 
 
-def seen_from(baseline: Path, grasps: Path) -> str:
-    """Return the path of a file of grasps, relative to a baseline's folder."""
-    return Path(os.path.relpath(grasps.resolve(), baseline.resolve().parent)).as_posix()
-
-
 def _planned_radius(saved: Plan) -> float | None:
     return None if saved.finger is None else saved.finger.radius_m
 
@@ -157,7 +160,7 @@ class Checked:
 
 
 def check(
-    before: Baseline, now: Present, where: str, how: How, processors: int = 1,
+    before: Baseline, now: Present, files: tuple[Path, Path], how: How, processors: int = 1,
     report: Report = _silent, name: str | None = None,
 ) -> Checked:  # fmt: skip
     """Simulate grasps again, or the one with an id, and compare them with a baseline."""
@@ -167,9 +170,10 @@ def check(
         before = replace(before, entries=own, limit=None)
     how = with_planned_fingers(how, before, now.saved)
     if not now.saved.grasps and (now.gone or name is not None):
-        found = _nothing_measured(before, now)
+        body = AboutObject.of(now.saved.body)
+        found = Measured(now, files, replace(before, entries=(), object=body), {}, {})
     else:
-        found = measured(now.saved, (where, before.limit), how, processors, report)
+        found = measured(now, files, before.limit, how, processors, report)
     carried = _carried(now)
     return Checked(
         compare(before, found.baseline, found.refused, carried),
@@ -182,11 +186,6 @@ def _carried(now: Present) -> Carried | None:
     """Say what a comparison must know of a part that is not the planned or the recorded one."""
     known = now.carried is not None or now.since is not None or bool(now.change)
     return Carried(now.change, now.gone) if known else None
-
-
-def _nothing_measured(before: Baseline, now: Present) -> Measured:
-    """Return a measurement of no grasp, on the part as it is now."""
-    return Measured(replace(before, entries=(), object=AboutObject.of(now.saved.body)), {}, {})
 
 
 def demanded(done: Checked) -> Checked:
@@ -208,7 +207,7 @@ def demanded(done: Checked) -> Checked:
 PLAIN = Shown("", infinite="infinite")
 
 
-def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
+def explained(done: Checked) -> str:
     """Explain a change: prediction, simulation, baseline, and commands to run next."""
     (finding,) = done.findings
     verdict, how = done.measured.verdicts.get(finding.id), done.how
@@ -226,13 +225,13 @@ def explained(done: Checked, files: tuple[Path, Path], now: Present) -> str:
     if verdict is not None and failed is not None:
         names = (each.name for each in verdict.failures)
         at = next((name for name in names if name in (*AXIS_NAMES, WEAKEST)), None)
-    return "\n".join([*lines, *_next_steps(finding.id, at, files, now)])
+    return "\n".join([*lines, *_next_steps(finding.id, at, done.measured)])
 
 
-def passing(done: Checked, now: Present) -> str:
+def passing(done: Checked) -> str:
     """Say in one short line what became of a grasp that passes, if anything."""
     (finding,) = done.findings
-    if not now.change and finding.status is not Status.IMPROVED:
+    if not done.measured.now.change and finding.status is not Status.IMPROVED:
         return ""
     said = finding.id
     if finding.status is Status.GONE or finding.after is None:
@@ -252,8 +251,8 @@ def written(path: Path, baseline: Baseline, now: Present) -> str:
     return f"{said}{left if gone else ''}"
 
 
-def _next_steps(name: str, at: str | None, files: tuple[Path, Path], now: Present) -> Iterator[str]:
-    baseline, grasps = (shlex.quote(str(path)) for path in files)
+def _next_steps(name: str, at: str | None, found: Measured) -> Iterator[str]:
+    now, (baseline, grasps) = found.now, (shlex.quote(str(path)) for path in found.files)
     chosen = f" --wrench={shlex.quote(at)}" if at else ""
     check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"
     if now.carried is None:

@@ -8,10 +8,10 @@ from grasp_core.files.records import record_of
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import extended
 from sim_validate.baselines import flags as baseline_flags
-from sim_validate.baselines.baseline import How, check_writable, read_baseline, write_baseline
-from sim_validate.baselines.check import Checked, check, complete, measured, seen_from, setup_for
+from sim_validate.baselines.baseline import How, check_writable, read_baseline
+from sim_validate.baselines.check import Checked, check, measured, setup_for
 from sim_validate.baselines.compare import Finding, Status, failing
-from sim_validate.baselines.part import Present, present, testable
+from sim_validate.baselines.part import Present, present
 from sim_validate.closure.command import check_noise
 from sim_validate.engine.setup import Agenda, setup_from_file, wrenches_from_file
 from sim_validate.kit.console import TABLE_ROWS, Reporter
@@ -28,13 +28,10 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     wrenches = () if command.wrenches is None else wrenches_from_file(command.wrenches)
     seed = saved.seed if command.seed is None else command.seed
     agenda = extended(Agenda, command.more, wrenches=wrenches, seed=seed)
-    how = How(setup_for(saved, command.setup), agenda)
-    about = seen_from(command.out, command.grasps)
+    how, files = How(setup_for(saved, command.setup), agenda), (command.out, command.grasps)
     with reporter.progress("simulating") as steps:
-        tested = testable(now, command.limit)
-        done = measured(tested, (about, command.limit), how, command.jobs, steps.update)
-    found = complete(done, now)
-    write_baseline(command.out, found)
+        done = measured(now, files, command.limit, how, command.jobs, steps.update)
+    found = done.bless()
     held = sum(entry.held for entry in found.entries)
     reporter.say(f"wrote {command.out}: {held} of {len(found.entries)} grasps held")
     _say_mesh(now, reporter)
@@ -52,14 +49,12 @@ def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
     how = before.settings
     if command.setup is not None:
         how = replace(how, setup=setup_from_file(command.setup, how.setup))
-    where = seen_from(command.baseline, path)
     with reporter.progress("simulating") as steps:
-        done = check(before, now, where, how, command.jobs, steps.update)
+        done = check(before, now, (command.baseline, path), how, command.jobs, steps.update)
     _show(done, reporter)
     _say_mesh(now, reporter)
     if command.bless:
-        testable(now, before.limit)
-        write_baseline(command.baseline, complete(done.measured, now))
+        done.measured.bless()
         reporter.say(f"wrote {command.baseline}")
         return Exit.GOOD
     return exit_code(done.findings, strict=command.strict)

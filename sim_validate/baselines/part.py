@@ -228,6 +228,17 @@ class Present:
         grasps = self.saved.grasps if self.carried is None else moved
         return self.only(*(grasp.id for grasp in grasps[:limit]))
 
+    def testable(self, limit: int | None) -> "Present":
+        """Return the first grasps, some of which must exist on the part."""
+        first = self.first(limit)
+        if first.gone and not first.saved.grasps:
+            name, why = next(iter(first.gone.items()))
+            raise ChangedPartError(
+                f"{self.change}; none of its {len(first.gone)} grasps exists on it, so there is "
+                f"nothing to record ({name}: {why}); plan on it again"
+            )
+        return first
+
     def only(self, *names: str) -> "Present":
         """Return only the grasps with these ids, of those that the file has."""
         chosen = tuple(grasp for grasp in self.saved.grasps if grasp.id in names)
@@ -309,15 +320,3 @@ def _carried(saved: Plan, path: Path, file: Path, asked: IfChanged) -> tuple[str
             f"{file}: this is not the mesh that {path} was planned on, and its grasps cannot be "
             f"carried over: {said}"
         ) from error
-
-
-def testable(now: Present, limit: int | None) -> Plan:
-    """Return the grasps that a new baseline is about."""
-    first = now.first(limit)
-    if first.gone and not first.saved.grasps:
-        name, why = next(iter(first.gone.items()))
-        raise ChangedPartError(
-            f"{now.change}; none of its {len(first.gone)} grasps exists on it, so there is nothing "
-            f"to record ({name}: {why}); plan on it again"
-        )
-    return first.saved

@@ -21,14 +21,8 @@ from grasp_core.settings import CHOSEN, Settings, for_users, named
 from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines import check
-from sim_validate.baselines.baseline import (
-    Baseline,
-    How,
-    check_writable,
-    read_baseline,
-    write_baseline,
-)
-from sim_validate.baselines.part import CARRY, TABLE, IfChanged, Present, Source, present, testable
+from sim_validate.baselines.baseline import Baseline, How, check_writable, read_baseline
+from sim_validate.baselines.part import CARRY, TABLE, IfChanged, Present, Source, present
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_file
@@ -112,14 +106,14 @@ class Suite(Settings):
         return sorted(ours if kept is None else ours | {entry.id for entry in kept.entries})
 
     @property
-    def where(self) -> str:
-        """Path of the file of grasps, relative to the baseline's folder."""
-        return check.seen_from(self.baseline, self.grasps)
+    def files(self) -> tuple[Path, Path]:
+        """The paths of the baseline and of the grasps."""
+        return self.baseline, self.grasps
 
     def tested(self, name: str) -> check.Checked:
         """Simulate one grasp again, and compare the result with the baseline."""
         now, before = self.compared, self.kept
-        done = check.check(before, now, self.where, self._how(before), name=name)
+        done = check.check(before, now, self.files, self._how(before), name=name)
         return check.demanded(done) if self.survives else done
 
     def bless(self) -> Baseline:
@@ -135,11 +129,7 @@ class Suite(Settings):
         how = self._how(before)
         if before is not None:
             how = check.with_planned_fingers(how, before, now.saved)
-        limit = before and before.limit
-        done = check.measured(testable(now, limit), (self.where, limit), how)
-        found = check.complete(done, now)
-        write_baseline(self.baseline, found)
-        return found
+        return check.measured(now, self.files, before and before.limit, how).bless()
 
     def _how(self, before: Baseline | None) -> How:
         """Take the baseline's settings, or the default ones, replaced by those of the file."""

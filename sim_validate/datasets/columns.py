@@ -1,8 +1,8 @@
 """Makes the columns of a table of the fields of its row class, and reads and writes Parquet files.
 
 A field is a column of its name. A record that is `FLAT` in the row gives a column for each of its
-entries, and a mapping that is marked by `FiguresOf` one for each figure of a class of records, so
-that a new figure is a new column. `Asked` marks fields that a dataset only has on request.
+entries, also one that keeps the figures of another class, so that a new figure is a new column.
+`Asked` marks fields that a dataset only has on request.
 
 Equal rows give equal bytes. Every page carries a checksum, and reading checks it: without that, a
 flipped bit goes unnoticed. Units and meanings are in the metadata of the columns. A whole dataset
@@ -20,7 +20,7 @@ from functools import cache
 from itertools import chain
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from grasp_core.declared import rules, types
 from grasp_core.errors import InputError
 from grasp_core.figures import Figure, figures, meanings, unit_of
 from grasp_core.files.json_text import shown
-from grasp_core.files.records import entries, from_record, record_of
+from grasp_core.files.records import Key, entries, record_of
 from grasp_core.kinds import OrInfinity
 from grasp_core.values import FINGERS
 from sim_validate.datasets.config import KEYS, Name
@@ -38,7 +38,6 @@ from sim_validate.datasets.config import KEYS, Name
 CellKind: TypeAlias = Literal["text", "bool", "int", "float"]
 Cells: TypeAlias = Mapping[str, Any]
 """The cells of a row as plain values, by column."""
-RowOf = TypeVar("RowOf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,23 +45,6 @@ class Asked:
     """The mark of a field that a dataset has only if it has a group of columns."""
 
     group: str
-
-
-@dataclass(frozen=True, slots=True)
-class FiguresOf:
-    """The mark of a mapping of figures by name: each figure of a class is a column."""
-
-    kind: type
-    told: tuple[str, ...]
-    """Figures that other columns tell."""
-    beginning: str = ""
-    """First letters of the names of these columns."""
-
-    @property
-    def columns(self) -> Mapping[str, Figure]:
-        """The figures that cells can hold, by the names of their columns."""
-        new = (each for each in figures(self.kind) if each.name not in self.told)
-        return {f"{self.beginning}{each.name}": each for each in new if _form(each.kind, {})}
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +91,6 @@ def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[Column, ...]:
             continue
         if each.flat is not None:
             found += columns_of(each.flat, groups)
-        elif each.name in _figures(kind):
-            found += [
-                _column(name, figure.kind, figure.meaning, groups)
-                for name, figure in _figures(kind)[each.name].items()
-            ]
         else:
             found.append(_column(each.key, each.kind, meanings(kind).get(each.name, ""), groups))
     return tuple(found)
@@ -158,38 +135,26 @@ def _form_of_items(parts: tuple[Any, ...]) -> Form | None:
     return inner[0], (len(parts),)
 
 
-@cache
-def _figures(kind: type) -> Mapping[str, Mapping[str, Figure]]:
-    """Return the figures that mappings of a row class hold: by field, then by column."""
-    return {
-        each.name: mark.columns
-        for each in entries(kind).fields
-        for mark in rules(each.kind)
-        if isinstance(mark, FiguresOf)
-    }
+def in_columns(kind: type, told: tuple[str, ...], beginning: str = "") -> Iterator[Figure]:
+    """Yield the figures of a class that cells can hold, but for those that other columns tell.
 
-
-def figures_in(kind: type, holder: str, record: object) -> Cells:
-    """Return the figures of a record by column, for a field of a row class that holds them."""
-    return {name: _plain(figure.of(record)) for name, figure in _figures(kind)[holder].items()}
+    They may be null, and their columns may all begin alike. Of texts, the number is held.
+    """
+    for each in figures(kind):
+        form = _form(each.kind, {})
+        if form is not None and each.name not in told:
+            held = int if form[0] == "int" else each.kind
+            yield each._replace(kind=Annotated[held | None, Key(f"{beginning}{each.name}")])
 
 
 def _plain(value: Any) -> Any:
-    """Return a figure as a cell: of texts how many there are, null for what is not finite."""
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, tuple):
-        items = cast("tuple[Any, ...]", value)
-        texts = all(isinstance(item, str) for item in items)
-        return len(items) if texts else [_plain(item) for item in items]
+    """Return a number as a cell: null for one that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def cells_of(row: object, columns: tuple[Column, ...]) -> dict[str, Any]:
     """Return the cells of a row; where it has fewer fingers than a column, the last are null."""
     found = record_of(row)
-    for holder in _figures(type(row)):
-        found |= found.pop(holder)
     return {each.name: _filled(found.get(each.name), each) for each in columns}
 
 
@@ -198,14 +163,6 @@ def _filled(value: Any, column: Column) -> Any:
         return _plain(value)
     missing = np.full(column.shape[1:], None).tolist()
     return value + [missing] * (column.shape[0] - len(value))
-
-
-def row_of(kind: type[RowOf], cells: Cells, where: str = "") -> RowOf:
-    """Make a row of its cells; `where` says which row it is, for errors."""
-    given = dict(cells)
-    for holder, held in _figures(kind).items():
-        given[holder] = {name: given.pop(name) for name in held if name in given}
-    return from_record(kind, given, where)
 
 
 def agrees(kind: type, name: str, stated: Any, value: Any) -> bool:

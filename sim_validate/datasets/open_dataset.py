@@ -25,7 +25,7 @@ from typing import Annotated, Any
 from grasp_core.declared import Declared, FieldError
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import object_of
-from grasp_core.files.records import RecordFile, from_record, record_of, recorded
+from grasp_core.files.records import Record, RecordFile, from_record, record_of, recorded
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import Number, Range, one_of, path_of, shown
 from grasp_core.mesh_files.limits import MeshChoices
@@ -34,7 +34,7 @@ from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from sim_validate.closure.replaying import Recorded, Wanted
-from sim_validate.datasets.columns import Columns, RowOf, Tables, each_batch, read_columns, row_of
+from sim_validate.datasets.columns import Columns, Tables, each_batch, read_columns
 from sim_validate.datasets.config import (
     KEYS,
     SHORT,
@@ -233,7 +233,7 @@ class Dataset:
                 raise InputError(f"{each.path}: {fault}; see `graspproof dataset verify`")
         return [path_inside(self.folder, each.path) for each in files]
 
-    def rows(self, kind: type[RowOf], **cells: str | bool) -> Iterator[RowOf]:
+    def rows(self, kind: type[Record], **cells: str | bool) -> Iterator[Record]:
         """Yield rows of a class, or those with some cells, without holding all in memory."""
         name: Name = next(name for name, each in ROWS.items() if each is kind)
         for each in self.manifest.of_table(name, self.split):
@@ -241,7 +241,7 @@ class Dataset:
             for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
                 for number, row in enumerate(batch.to_pylist(), start=found):
                     if cells == {column: row[column] for column in cells}:
-                        yield row_of(kind, row, f"{each.path}: row {number}")
+                        yield from_record(kind, row, f"{each.path}: row {number}")
                 found += batch.num_rows
             if found != each.rows:
                 raise InputError(

@@ -7,7 +7,7 @@ value that could not be measured is null.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices, Shape, Wrench
 from grasp_core.declared import Declared, rules, types
 from grasp_core.errors import InputError
+from grasp_core.figures import Kept, keeps
 from grasp_core.files.records import FLAT
 from grasp_core.kinds import Family, Friction, Number, Range, Seed
 from grasp_core.objects.polyhedron import Polyhedron
@@ -24,12 +25,12 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import (
     Asked,
     Column,
-    FiguresOf,
     Known,
     Tables,
     Within,
     cells_of,
     columns_of,
+    in_columns,
 )
 from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName, id_beginning
 from sim_validate.engine.traces import HoldVerdict, Outcome
@@ -93,6 +94,16 @@ class ObjectRow(Declared):
     """Centre of mass."""
 
 
+@keeps(in_columns(Verdict, ("id", "outcome", "predicted_critical_friction")))
+class VerdictCells(Kept):
+    """Figures of a verdict."""
+
+
+@keeps(in_columns(Execution, TOLD, "execution_"))
+class ExecutionCells(Kept):
+    """Figures of an execution."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
 class GraspRow(Declared):
     """Four contacts on an object at one friction, or a negative control made from them."""
@@ -149,9 +160,7 @@ class GraspRow(Declared):
     """Number of simulated trials."""
     mismatches: Number = 0
     """Number of contradictions between simulation and analysis."""
-    verdict: Annotated[
-        Mapping[str, Any], FiguresOf(Verdict, ("id", "outcome", "predicted_critical_friction"))
-    ] = field(default_factory=dict[str, Any])
+    verdict: Annotated[VerdictCells | None, FLAT] = None
     """Figures of the verdict; null for controls."""
 
     executed: Annotated[bool, Asked(EXECUTED)] = False
@@ -177,9 +186,7 @@ class GraspRow(Declared):
     """Number of trials of the execution."""
     execution_mismatches: Annotated[int | None, Asked(EXECUTED)] = None
     """Number of the execution's own negative controls that did not slip, but must."""
-    execution: Annotated[
-        Mapping[str, Any], FiguresOf(Execution, TOLD, "execution_"), Asked(EXECUTED)
-    ] = field(default_factory=dict[str, Any])
+    execution: Annotated[ExecutionCells | None, FLAT, Asked(EXECUTED)] = None
     """Figures of the execution."""
 
     kind: Annotated[str | None, Asked("kinds")] = None

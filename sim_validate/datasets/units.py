@@ -41,7 +41,7 @@ from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict,
 from sim_validate.closure.validate import tested
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import learning
-from sim_validate.datasets.columns import Cells, figures_in
+from sim_validate.datasets.columns import Cells
 from sim_validate.datasets.config import CREDITS, SPLITS, DatasetConfig, SplitName, id_beginning
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.rows import (
@@ -52,6 +52,7 @@ from sim_validate.datasets.rows import (
     ObjectRow,
     Rows,
     TrialRow,
+    VerdictCells,
 )
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
@@ -281,7 +282,7 @@ class _Tried:
                 "held": verdict.held,
                 "outcome": verdict.outcome.value,
                 "mismatches": len(verdict.mismatches),
-                "verdict": figures_in(GraspRow, "verdict", verdict),
+                "verdict": VerdictCells.of(verdict),
             }
         assert isinstance(verdict, ControlVerdict)  # noqa: S101 - only closed ones have verdicts
         ends = [each.hold.outcome for each in verdict.tried]

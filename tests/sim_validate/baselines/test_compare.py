@@ -7,8 +7,8 @@ from typing import Annotated
 import pytest
 
 from grasp_core.declared import Declared
-from grasp_core.figures import Compared, Shown, figure, less
-from sim_validate.baselines.baseline import Baseline, Entry, How, Kept, VerdictFigures, keeps
+from grasp_core.figures import Compared, Kept, Shown, figure, keeps, less
+from sim_validate.baselines.baseline import Baseline, Entry, How, VerdictFigures, in_baselines
 from sim_validate.baselines.compare import (
     OTHER_PROCESSOR,
     OTHER_VERSIONS,
@@ -306,7 +306,7 @@ class Trial(Declared):
         return self.grip > 1.0
 
 
-@keeps(Trial)
+@keeps(in_baselines(Trial))
 class TrialFigures(Kept):
     """The figures of a trial."""
 

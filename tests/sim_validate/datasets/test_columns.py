@@ -1,10 +1,9 @@
 """Columns are the fields of row classes, and figures of records are columns by themselves."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -12,18 +11,17 @@ import pytest
 import grasp_core as gc
 from grasp_core.arrays import Array, Shape
 from grasp_core.declared import Declared
-from grasp_core.figures import Shown, figures
-from grasp_core.files.records import FLAT, recorded
+from grasp_core.figures import Kept, Shown, figures, keeps
+from grasp_core.files.records import FLAT, from_record, recorded
+from grasp_core.kinds import Null
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets.columns import (
     Asked,
-    FiguresOf,
     Known,
     agrees,
     cells_of,
     columns_of,
-    figures_in,
-    row_of,
+    in_columns,
 )
 from sim_validate.datasets.rows import ROWS, TABLES, GraspRow, dataset_tables, groups_asked
 from sim_validate.engine.traces import HoldVerdict
@@ -43,7 +41,7 @@ class Pie(Declared):
     parts: Annotated[tuple["Part", ...], Shown("parts")] = ()
 
     @recorded
-    def weight_kg(self) -> Annotated[float, Shown("kg")]:
+    def weight_kg(self) -> Annotated[float, Null(math.nan), Shown("kg")]:
         """How heavy it is."""
         return math.nan
 
@@ -55,6 +53,11 @@ class Part(Declared):
     slips_m: Annotated[Array, Shape(None, nan=True)]
 
 
+@keeps(in_columns(Pie, (), "pie_"))
+class PieCells(Kept):
+    """The figures of a pie."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Row(Declared):
     """A row with a column of each kind."""
@@ -63,11 +66,11 @@ class Row(Declared):
     part: Annotated[Part, FLAT]
     limit: Known = None
     angles_rad: Annotated[Annotated[Array, Shape("hand")] | None, Asked("hand")] = None
-    pie: Annotated[Mapping[str, Any], FiguresOf(Pie, (), "pie_")] = field(default_factory=dict)
+    pie: Annotated[PieCells | None, FLAT] = None
 
 
 PIE = Pie(Taste.SWEET, ("dough", "apples"))
-GIVEN = Row("a", Part([0.1, math.nan]), math.inf, [1.0, 2.0], figures_in(Row, "pie", PIE))
+GIVEN = Row("a", Part([0.1, math.nan]), math.inf, [1.0, 2.0], PieCells.of(PIE))
 
 
 def test_each_field_and_each_figure_is_a_column():
@@ -89,11 +92,11 @@ def test_cells_are_plain_and_make_the_row_again():
         "name": "a", "slips_m": [0.1, None, None, None], "limit": None, "angles_rad": [1.0, 2.0],
         "pie_taste": "sweet", "pie_layers": 2, "pie_weight_kg": None,
     }  # fmt: skip
-    back = row_of(Row, cells)
+    back = from_record(Row, cells)
     assert cells_of(back, columns_of(Row, {"hand": 2})) == cells
     np.testing.assert_array_equal(back.angles_rad, [1.0, 2.0])
     with pytest.raises(gc.InputError, match=r"file: row 3\.name must be text, got 1"):
-        row_of(Row, {**cells, "name": 1}, "file: row 3")
+        from_record(Row, {**cells, "name": 1}, "file: row 3")
 
 
 def test_every_figure_of_a_verdict_and_its_trials_is_a_column():
