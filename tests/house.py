@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 58_215,
+    "lines of packages": 58_116,
     "modules of packages": 240,
-    "lines of tests": 49_025,
+    "lines of tests": 49_028,
     "lines of docs": 7_200,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -32,7 +32,7 @@ RISES = (
     "lines of packages, 60,323 to 60,426: first slips of sudden loads; the object's surface",
     "lines of tests, 48,885 to 49,006: a benchmark of the object's surface against pads",
     "lines of docs, 7,189 to 7,193: what fingertips touch",
-    "lines of tests, 49,006 to 49,025: objects that are not convex; margins that files hold",
+    "lines of tests, 49,006 to 49,028: objects that are not convex; margins that files hold",
     "lines of docs, 7,193 to 7,200: durations of trials; fidelity on objects that are not convex",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
