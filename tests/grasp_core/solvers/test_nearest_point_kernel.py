@@ -78,7 +78,7 @@ def test_without_variables_rows_hold_or_nothing_is_found():
 @pytest.mark.parametrize("factor", [1.0 + 1e-9, 0.0, -1.0, np.nan])
 @pytest.mark.parametrize("which", ["point", "multipliers"])
 def test_wrong_answers_are_not_taken(factor, which):
-    """Of polyhedra whose farthest row is at one, as the kernel scales them."""
+    """The kernel scales polyhedra so that their farthest row is at one, as these are."""
     missed, kernel = compiled(KERNEL)._unmet, compiled(KERNEL)
     for C, D, _ in polyhedra(12):
         for d in D[D.min(axis=1) < 0.0]:
