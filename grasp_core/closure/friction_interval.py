@@ -4,7 +4,7 @@ The upper end is proved by forces f_i that balance exactly and lie inside the co
 end by a twist whose velocities v_i leave each contact at rest or depart steeply enough.
 
 Solved: whether numbers that a search found prove what they are meant to prove, for positions and
-normals exactly as they are given: a float is a rational number.
+normals exactly as they are given: a float is a rational number, a whole one over a power of two.
 
 Forces found in floating point balance but for rounding, and a depth in the cones that falls with
 the square of the friction is soon smaller than any bound on that. So the imbalance is removed
@@ -25,28 +25,28 @@ but for the rounding of their coordinates.
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
 from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
 from grasp_core.declared import Declared
 from grasp_core.kinds import LARGEST_FRICTION, Range
 
-Exact = list[Fraction]
-"""A vector of rational numbers, without rounding."""
+Whole: TypeAlias = NDArray[np.object_]
+"""Whole numbers of any size: numerators over a denominator that all share."""
 
 INDEPENDENT = (1e-6, 1e-9)
 """Distances of a unit-size wrench from the span of others above which it is independent of them,
 tried in turn; the last one defines the rank that force closure asks for."""
 NEARLY_AT_REST = 1e-9
 """Speed below which a contact is meant to be at rest, for twists of unit size."""
-UNITS: list[Exact] = [[Fraction(int(i == axis)) for i in range(3)] for axis in range(3)]
-SAME = Fraction(1, 10**12)
-"""Speed at which a contact that cannot be put to rest exactly still counts as at rest, for twists
-of unit size: moving it by this share of the contacts' size would put it to rest."""
+AXES: Whole = np.eye(3, dtype=np.int64).astype(np.object_)
+SAME = 10**12
+"""One over the speed at which a contact that cannot be put to rest exactly still counts as at rest,
+for twists of unit size: moving it by that share of the contacts' size would put it to rest."""
 FRICTIONLESS = 1e-6
 """Smallest friction at which closure is sought: files that keep six digits do not place contacts
 more precisely."""
@@ -80,12 +80,11 @@ def closing_forces(
     balanced = _balanced(near, positions, columns)
     if balanced is None:
         return None
-    steepest = Fraction(friction) ** 2
-    for force, normal in zip(balanced, _vectors(normals), strict=True):
-        along, across = _squares(force, normal)
-        if not (across < steepest * along and _dot(force, normal) > 0):
-            return None
-    return np.array(balanced, dtype=np.float64)
+    exact, unit = balanced
+    pushes, across, _ = _split(exact, normals)
+    above, below = friction.as_integer_ratio()
+    inside = (pushes > 0) & (below**2 * across < above**2 * pushes**2)  # (1)
+    return (exact / unit).astype(np.float64) if inside.all() else None
 
 
 def separates(twist: Array, positions: Array, normals: Array, friction: float) -> bool:
@@ -99,24 +98,25 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
     rows = grasp_map(arms).T
     still = np.flatnonzero(np.linalg.norm((rows @ unit).reshape(-1, 3), axis=1) <= NEARLY_AT_REST)
     wanted = (3 * still[:, None] + np.arange(3)).ravel()
-    exact_arms = [
-        [(x - o) / Fraction(size) for x, o in zip(point, first, strict=True)]
-        for first in _vectors(positions[:1])
-        for point in _vectors(positions)
-    ]
     # an independent choice of the velocities to be made zero: the others vanish with them
-    resting = [divmod(int(wanted[each]), 3) for each in _independent(rows[wanted], INDEPENDENT[-1])]
-    exact = _at_rest([Fraction(x) for x in unit.tolist()], exact_arms, resting)
-    if exact is None or not any(exact):
+    resting = wanted[_independent(rows[wanted], INDEPENDENT[-1])]
+    lengths, _ = _whole(np.append(positions, size))
+    exact_arms, length = lengths[:-1].reshape(-1, 3) - lengths[:3], lengths[-1]
+    exact = _at_rest(_whole(unit)[0], exact_arms, length, resting)
+    if exact is None or not exact.any():
         return False
+    # all speeds are `length` times as large
+    velocities = length * exact[:3] + _cross(exact[3:], exact_arms)
     # what is left of a twist that is put to rest may be short: all speeds are relative to it
-    rest = SAME * max(map(abs, exact))
-    slope = None if friction == math.inf else Fraction(friction) ** 2
-    for arm, normal in zip(exact_arms, _vectors(normals), strict=True):
-        velocity = [a + b for a, b in zip(exact[:3], _cross(exact[3:], arm), strict=True)]
-        if not _departs(velocity, normal, slope, rest):
-            return False
-    return True
+    rest = (length * np.abs(exact).max()) ** 2
+    along, across, squares = _split(velocities, normals)
+    at_rest = SAME**2 * (velocities**2).sum(axis=1) <= rest
+    if friction == math.inf:
+        steep = SAME**2 * across <= rest * squares
+    else:
+        above, below = friction.as_integer_ratio()
+        steep = above**2 * across <= below**2 * along**2  # (2)
+    return bool((at_rest | (steep & (along <= 0))).all())
 
 
 def _arms(positions: Array) -> tuple[Array, float]:
@@ -126,17 +126,21 @@ def _arms(positions: Array) -> tuple[Array, float]:
     return arms / size, size
 
 
-def _vectors(rows: Array) -> list[Exact]:
-    return [[Fraction(x) for x in row] for row in rows.tolist()]
+def _whole(values: Array) -> tuple[Whole, int]:
+    """Return floats as whole numbers over a power of two, and that power."""
+    pairs = [x.as_integer_ratio() for x in values.ravel().tolist()]
+    unit = max(below for _, below in pairs)
+    whole = [above * (unit // below) for above, below in pairs]
+    return np.array(whole, dtype=np.object_).reshape(values.shape), unit
 
 
-def _columns(arms: Array, order: Indices) -> list[tuple[int, int]] | None:
-    """Choose six independent columns of the grasp map, (contact, axis), in an order of contacts."""
-    wrenches = grasp_map(arms).T.reshape(-1, 3, WRENCH)[order].reshape(-1, WRENCH)
+def _columns(arms: Array, order: Indices) -> Indices | None:
+    """Choose six independent columns of the grasp map, in an order of contacts."""
+    places = (3 * order[:, None] + np.arange(3)).ravel()
     for least in INDEPENDENT:
-        found = _independent(wrenches, least)
+        found = _independent(grasp_map(arms).T[places], least)
         if len(found) == WRENCH:
-            return [(int(order[each // 3]), each % 3) for each in found]
+            return places[found]
     return None
 
 
@@ -153,86 +157,68 @@ def _independent(rows: Array, least: float) -> list[int]:
     return found
 
 
-def _balanced(
-    forces: Array, positions: Array, columns: list[tuple[int, int]]
-) -> list[Exact] | None:
-    """Change components of forces, listed as (contact, axis), until they balance exactly."""
-    balanced, points = _vectors(forces), _vectors(positions)
-    arms = [[x - o for x, o in zip(point, points[0], strict=True)] for point in points]
-    wrenches = [[*force, *_cross(arm, force)] for force, arm in zip(balanced, arms, strict=True)]
-    total = [sum(parts, Fraction(0)) for parts in zip(*wrenches, strict=True)]
-    changing = [[*UNITS[axis], *_cross(arms[contact], UNITS[axis])] for contact, axis in columns]
-    changes = _solution([list(row) for row in zip(*changing, strict=True)], total)
-    if changes is None:
+def _balanced(forces: Array, positions: Array, columns: Indices) -> tuple[Whole, int] | None:
+    """Change components of forces until they balance exactly; they are over a whole number."""
+    exact, unit = _whole(forces)
+    points, _ = _whole(positions)
+    arms = points - points[0]
+    total = np.append(exact.sum(axis=0), _cross(arms, exact).sum(axis=0))
+    contacts, axes = np.divmod(columns, 3)
+    changing = np.hstack([AXES[axes], _cross(arms[contacts], AXES[axes])])
+    found = _solution(changing.T, total)
+    if found is None:
         return None
-    for (contact, axis), change in zip(columns, changes, strict=True):
-        balanced[contact][axis] -= change
-    return balanced
+    changes, shared = found
+    exact = shared * exact
+    exact[contacts, axes] -= changes
+    return exact, shared * unit
 
 
-def _at_rest(twist: Exact, arms: list[Exact], resting: list[tuple[int, int]]) -> Exact | None:
-    """Change a twist so that contacts' velocities along some axes, (contact, axis), are zero."""
+def _at_rest(twist: Whole, arms: Whole, length: int, resting: Indices) -> Whole | None:
+    """Change a twist so that some components of contacts' velocities are zero; its size changes."""
     # the product of such a wrench of a unit force with a twist is a contact's speed
-    rows: list[Exact] = [
-        [*UNITS[axis], *_cross(arms[contact], UNITS[axis])] for contact, axis in resting
-    ]
-    speeds = [sum((a * b for a, b in zip(row, twist, strict=True)), Fraction(0)) for row in rows]
-    changes = _solution(rows, speeds)
-    return changes and [part - change for part, change in zip(twist, changes, strict=True)]
+    contacts, axes = np.divmod(resting, 3)
+    rows = np.hstack([length * AXES[axes], _cross(arms[contacts], AXES[axes])])
+    found = _solution(rows, (rows * twist).sum(axis=1))
+    if found is None:
+        return None
+    changes, shared = found
+    return shared * twist - changes
 
 
-def _solution(rows: list[Exact], right: Exact) -> Exact | None:
-    """Solve rows @ x = right for six numbers, free ones zero, by Bareiss's elimination; or None."""
-    table = [_whole([*row, value]) for row, value in zip(rows, right, strict=True)]
-    pivots, before = list[int](), 1
+def _solution(rows: Whole, right: Whole) -> tuple[Whole, int] | None:
+    """Solve rows @ x = right for six numbers, free ones zero, by Bareiss's elimination; or None.
+
+    The numbers are numerators, with the denominator that they share, which is positive.
+    """
+    table, pivots, before = np.column_stack([rows, right]), list[int](), 1
     for i in range(len(table)):
-        lead = table[i]
-        pivot = max(range(WRENCH), key=lambda column, row=lead: abs(row[column]))
+        lead = table[i].copy()
+        pivot = int(np.abs(lead[:WRENCH]).argmax())
         if not lead[pivot]:
             return None
+        table = (lead[pivot] * table - np.outer(table[:, pivot], lead)) // before
+        table[i], before = lead, lead[pivot]
         pivots.append(pivot)
-        for j, row in enumerate(table):
-            if j != i:
-                pairs = zip(row, lead, strict=True)
-                table[j] = [(lead[pivot] * a - row[pivot] * b) // before for a, b in pairs]
-        before = lead[pivot]
-    x = [Fraction(0)] * WRENCH
-    for pivot, row in zip(pivots, table, strict=True):
-        x[pivot] = Fraction(row[WRENCH], before)
-    return x
+    x = np.zeros(WRENCH, dtype=np.object_)
+    x[pivots] = table[:, WRENCH]
+    sign = 1 if before > 0 else -1
+    return sign * x, sign * before
 
 
-def _whole(row: Exact) -> list[int]:
-    """Return the least whole numbers in the same ratios, up to a common factor."""
-    unit = math.lcm(*(x.denominator for x in row))
-    return [x.numerator * (unit // x.denominator) for x in row]
+def _split(vectors: Whole, normals: Array) -> tuple[Whole, Whole, Whole]:
+    """Return vectors' parts along normals, the squares of those across, and of the normals.
+
+    A part is times the normal's length, a square times the normal's square.
+    """
+    units, _ = _whole(normals)
+    along, squares = (vectors * units).sum(axis=1), (units**2).sum(axis=1)
+    return along, (vectors**2).sum(axis=1) * squares - along**2, squares
 
 
-def _departs(velocity: Exact, normal: Exact, slope: Fraction | None, rest: Fraction) -> bool:
-    """Return whether a contact departs by (2) with mu^2 = slope, or any if None, or is at rest."""
-    if _dot(velocity, velocity) <= rest**2:
-        return True
-    along, across = _squares(velocity, normal)
-    steep = across <= rest**2 if slope is None else slope * across <= along
-    return steep and _dot(velocity, normal) <= 0
-
-
-def _squares(vector: Exact, normal: Exact) -> tuple[Fraction, Fraction]:
-    """Return squares of a vector's parts along and across a normal, times the normal's square."""
-    along = _dot(vector, normal) ** 2
-    return along, _dot(vector, vector) * _dot(normal, normal) - along
-
-
-def _dot(a: Exact, b: Exact) -> Fraction:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Exact, b: Exact) -> Exact:
-    return [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+def _cross(a: Whole, b: Whole) -> Whole:
+    ahead = np.roll(a, -1, axis=-1) * np.roll(b, -2, axis=-1)
+    return ahead - np.roll(a, -2, axis=-1) * np.roll(b, -1, axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

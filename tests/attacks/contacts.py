@@ -198,17 +198,12 @@ def put_to_rest(rng):
     return lambda: replace(found, lower=lower, upper=math.inf, twist=y, forces=None)
 
 
-def at_any_length(monkeypatch):
-    """Speeds count as none however short the twist is that is left."""
-    departs = friction_interval._departs
-    monkeypatch.setattr(
-        friction_interval,
-        "_departs",
-        lambda v, n, slope, _: departs(v, n, slope, friction_interval.SAME),
-    )
+def nearly_at_rest(monkeypatch):
+    """Speeds of a ten-thousandth of what is left of a twist count as none."""
+    monkeypatch.setattr(friction_interval, "SAME", 10**4)
 
 
 FRICTION = Attack(
     lambda rng: cycled(rng, [too_low_an_upper_end, too_high_a_lower_end, put_to_rest]),
-    (at_any_length,), 2000,
+    (nearly_at_rest,), 2000,
 )  # fmt: skip
