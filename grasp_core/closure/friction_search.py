@@ -5,8 +5,7 @@ Solved: a narrow interval with proofs of both of its ends (see `friction_interva
 The two ends of the scale come first: contacts that no friction closes, and contacts that any
 friction closes; both are questions of linear programs. Otherwise Newton's method, as
 `critical_friction` describes it, says at which friction to solve the margin program next. What its
-answers prove is decided in rational arithmetic, whatever the program says about itself: in the end
-or, where floats have misled the search, at every step.
+answers prove is decided in rational arithmetic, whatever the program says about itself.
 
 Every friction. Let S be no contacts at first. Seek pushes l_i >= 0 along the normals of the others
 that balance with any forces at all at the contacts in S,
@@ -37,7 +36,7 @@ so the search begins below theirs. It is proved in floating point at the frictio
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,17 +179,14 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
 
 def searched(points: Array, units: Array) -> "Ends":
     """Find ends of the critical friction as near each other as accuracy or proofs allow."""
-    strict = Ends.of(points, units)
-    for ends in (replace(strict, strict=False), strict):
-        hopeless = hopeless_twist(ends.cones.arms, units)
-        if hopeless is not None:
-            ends.opened(hopeless, math.inf)
-        if ends.lower < math.inf:
-            _try_little(ends)
-            _close_in(ends, max(FIRST_TRIAL, 2.0 * ends.lower))
-        if ends.proved:
-            return ends
-    return strict
+    ends = Ends.of(points, units)
+    hopeless = hopeless_twist(ends.cones.arms, units)
+    if hopeless is not None:
+        ends.opened(hopeless, math.inf)
+    if ends.lower < math.inf:
+        _try_little(ends)
+        _close_in(ends, max(FIRST_TRIAL, 2.0 * ends.lower))
+    return ends
 
 
 def soft_ends(cones: ContactCones, highest: float) -> "Ends":
@@ -280,8 +276,6 @@ class Ends:
     points: Array | None = None
     """Positions of hard contacts, (k, 3) [m], for proofs in rational arithmetic; None of soft ones,
     whose proofs are in floating point."""
-    strict: bool = True
-    """Whether each step is proved in rational arithmetic, or only the last ones."""
     lower: float = 0.0
     upper: float = math.inf
     forces: Array | None = None
@@ -306,17 +300,6 @@ class Ends:
         around = self.upper <= self.center + self.spread and self.lower >= self.center - self.spread
         beyond = max(self.lower, self.spread) >= LARGEST_FRICTION
         return self.upper <= FRICTIONLESS or narrow or around or beyond
-
-    @property
-    def proved(self) -> bool:
-        """Return whether both ends of hard contacts are proved in rational arithmetic."""
-        if self.strict:
-            return True
-        last = replace(self, lower=0.0, strict=True)
-        if self.twist is not None:
-            last.opened(self.twist, self.lower)
-        closed = self.forces is None or last._closes(self.forces, self.upper)
-        return closed and last.lower == self.lower
 
     def interval(self, points: Array) -> FrictionInterval:
         """Return the proved interval of hard contacts, with forces that balance as floats can."""
@@ -359,10 +342,9 @@ class Ends:
                 return
 
     def _closes(self, forces: Array, friction: float) -> bool:
-        easy = self.points is None or not self.strict
-        if easy and proves_closure(self.cones.at_friction(friction), forces):
-            return True
-        return self.points is not None and closes(forces, self.points, self.cones.inward, friction)
+        if self.points is None:
+            return bool(proves_closure(self.cones.at_friction(friction), forces))
+        return closes(forces, self.points, self.cones.inward, friction)
 
     def open(self, twist: Array) -> None:
         """Raise the lower end to the friction up to which a twist separates."""
@@ -383,8 +365,7 @@ class Ends:
             proved = bool(margin_ceiling(self.cones.at_friction(friction), twist) <= 0.0)
         else:
             at_first = at_the_first(twist, self.points)
-            proved = not self.strict and friction < math.inf
-            proved = proved or separates(at_first, self.points, self.cones.inward, friction)
+            proved = separates(at_first, self.points, self.cones.inward, friction)
         if proved:
             self.lower, self.twist = friction, twist
 
