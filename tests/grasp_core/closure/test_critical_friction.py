@@ -5,7 +5,6 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure import critical_friction as critical
-from grasp_core.closure import friction_search
 from grasp_core.closure.contacts import unit_size
 from grasp_core.compiled import compiled
 from scenes.example_objects import example_object
@@ -54,7 +53,7 @@ def test_many_at_once_and_one_by_one_give_intervals_that_overlap(count):
     every = gc.critical_frictions(positions, normals)
     width = 1.0 + 1.1 * critical.FRICTION_ACCURACY
     for i, (points, units) in enumerate(zip(positions, normals, strict=True)):
-        slow = friction_search.searched(points, units)
+        slow = critical.searched(points, units)
         if quick_ones[i]:
             assert every[i] == upper[i]
             assert slow.lower <= upper[i] <= width * slow.upper
@@ -144,7 +143,7 @@ def test_where_no_program_is_solved_nothing_wrong_is_claimed(monkeypatch):
     positions, normals = contact_sets(5)
     right = gc.critical_frictions(positions[:20], normals[:20])
     monkeypatch.setattr(critical, "_at_once", nothing_at_once)
-    monkeypatch.setattr(friction_search, "decide", unsolved)
+    monkeypatch.setattr(critical, "decide", unsolved)
     for i, known in enumerate(right):
         found = gc.critical_friction_interval(positions[i], normals[i])
         assert found.verify()

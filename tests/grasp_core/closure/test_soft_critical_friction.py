@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import unit_size
-from grasp_core.closure.friction_search import soft_ends
+from grasp_core.closure.critical_friction import soft_ends
 from grasp_core.closure.proofs import ContactCones, proves_closure, refutes_closure
 from tests.grasp_core.soft_cones import OPPOSITE
 from tests.judges import random_contacts
