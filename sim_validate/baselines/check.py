@@ -21,7 +21,7 @@ from scenes.settings import FingerSettings
 from sim_validate.baselines.baseline import Baseline, Entry, How, write_baseline
 from sim_validate.baselines.compare import WORDS, Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
-from sim_validate.closure.validate import Job, prepared, verdict_of
+from sim_validate.closure.validate import Job
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import (
@@ -78,28 +78,30 @@ def measured(
     if not chosen:
         raise InputError(f"{where}: expected at least one grasp to simulate, found none")
     require_faithful(how.setup, saved.friction, saved.body.radius)
-    jobs = [Job(saved.body, grasp, saved.friction, how.agenda, how.setup) for grasp in chosen]
+    job = Job(saved.body, saved.friction, how.agenda, how.setup)
     settings = None if how.execution is None else how.execution.for_body(saved.body)
     executing = [
         ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False)
         for grasp in chosen
         if settings is not None
     ]
-    count, total = processes(len(jobs), processors), len(jobs) + len(executing)
+    job = job.prepared(len(chosen), processors)
+    count, total = processes(len(chosen), processors), len(chosen) + len(executing)
     answers = chain(
-        each(partial(_or_refusal, verdict_of), prepared(jobs, processors), jobs=count),
+        each(partial(_or_refusal, job), chosen, jobs=count),
         each(partial(_or_refusal, executed_grasp), executing, jobs=processors),
     )
     verdicts, executions = dict[str, Verdict](), dict[str, ExecutedGrasp]()
     refused = dict[str, str]()
-    for done, (job, answer) in enumerate(zip([*jobs, *executing], answers, strict=True), start=1):
+    for done, answer in enumerate(answers, start=1):
+        name = chosen[(done - 1) % len(chosen)].id
         if isinstance(answer, Verdict):
-            verdicts[job.grasp.id] = answer
+            verdicts[name] = answer
         elif isinstance(answer, ExecutedGrasp):
-            executions[job.grasp.id] = answer
+            executions[name] = answer
         else:
-            why = answer if isinstance(job, Job) else f"the execution is refused: {answer}"
-            refused.setdefault(job.grasp.id, why)
+            why = answer if done <= len(chosen) else f"the execution is refused: {answer}"
+            refused.setdefault(name, why)
         report(done, total)
     entries = [
         Entry.of(verdicts[grasp.id], executions.get(grasp.id))
