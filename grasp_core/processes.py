@@ -4,8 +4,9 @@ They are no copies of the caller's program, as the processes of the standard lib
 needs no guard against being run again, the folder that it works in may be gone, and the end of one
 process fails the task that it does and no other. A thread for each process starts it, sends it
 tasks through a pipe, one after the other, and waits for answers. A task depends on nothing but
-itself, so it makes no difference who does it. The end of its input ends a process, so that none
-outlives this program.
+itself, so it makes no difference who does it. A process keeps the function of its last task, with
+all that belongs to it: what tasks have in common, such as an object, is sent once if the function
+holds it. The end of its input ends a process, so that none outlives this program.
 """
 
 import gc
@@ -119,7 +120,7 @@ class Processes:
         while asked := self._waiting.get():
             try:
                 process = process or self._started()
-                answer = process.ask((asked.function, asked.task))
+                answer = process.ask(asked.function, asked.task)
             except Exception as error:  # it ended, or none starts, or the task cannot be sent
                 if process is not None and isinstance(error, EOFError | OSError):
                     self._end(process)
@@ -183,6 +184,7 @@ class _Process:
     def __init__(self) -> None:
         if getattr(sys, "frozen", False) or not sys.executable:
             raise OSError("Python is a part of another program, which is not started again")
+        self.function: Callable[[Any], Any] | None = None  # that of its last task
         places = [place for place in (path or _working_folder() for path in sys.path) if place]
         # not -m alone: the current folder must not come before the installed packages
         self.program = subprocess.Popen(
@@ -191,11 +193,12 @@ class _Process:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
         )  # fmt: skip
 
-    def ask(self, task: Any) -> bytes:
+    def ask(self, function: Callable[[Any], Any], task: Any) -> bytes:
         """Have a task done; return a pickled pair of result and error."""
         if self.program.stdin is None or self.program.stdout is None:
             raise OSError("no pipe was opened")
-        send(self.program.stdin, task)
+        send(self.program.stdin, (None if function == self.function else function, task))
+        self.function = function
         return receive(self.program.stdout)
 
     def end(self) -> None:
@@ -264,9 +267,11 @@ def main() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what code prints is no answer
     messages = SimpleQueue[bytes]()
     Thread(target=_listen, args=(sys.stdin.buffer, messages), daemon=True).start()
+    function: Callable[[Any], Any] = repr
     try:
         while True:
-            function, task = unpacked(messages.get())
+            new, task = unpacked(messages.get())
+            function = function if new is None else new
             try:
                 answer = (function(task), None)
             except Exception as error:

@@ -351,23 +351,6 @@ def blocking(asked: Asked, pose: Pose, fingers: Indices | None = None) -> str:
     return "object" if kernel.of_object(*shapes, asked.tree, needs) < 0.0 else ""
 
 
-def compile_posing(hand: Hand, body: Polyhedron) -> None:
-    """Compile what moves a hand until its fingertips touch, on a hand that stands nowhere."""
-    arrays, tree = hand_arrays(hand), surface_tree(body)
-    kernel, count = compiled(KERNEL), min(len(hand.fingers), FINGERS)
-    up, none = np.array([0.0, 0.0, 1.0]), np.empty((0, 3))
-    aims = Targets(
-        np.arange(count), np.zeros((count, 3)), np.tile(up, (count, 1)), np.zeros((count, 2, 3)),
-        np.ones(count), np.full((count, 3), np.nan), SOFT, np.empty(0, np.int64), none, none, up,
-        -np.inf,
-    )  # fmt: skip
-    wanted = Wanted(0.0, 0.0, 0.0, 0.0, 0.0, overlaps=True, palm_moves=True)
-    pose: Pose = kernel.empty_pose(arrays, count)
-    pose.palm[:], pose.origin[:], pose.q[:] = np.eye(3), 1.0, hand.ranges.mean(axis=1)
-    kernel.settle(arrays, tree, aims, wanted, pose, kernel.empty_sums(arrays, aims), 0, 1.0)
-    kernel.lay(arrays, tree, aims, pose, np.empty((count, 3)))
-
-
 GAPS_M = (0.015, 0.01, 0.006, 0.003)
 """Distances of fingertips from the surface that are tried, the largest first [m]."""
 LEAST_GAP = 0.5  # part of such a distance that every fingertip must have

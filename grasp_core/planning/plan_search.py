@@ -8,12 +8,11 @@ At the end it is selected which of the grasps found are returned, in which order
 """
 
 import math
-import pickle
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from itertools import chain, combinations, islice, zip_longest
 from typing import TypeAlias
 
@@ -153,8 +152,16 @@ class PlanSearch:
         """Yield what each part holds, in order."""
         if self.workers is None:
             return map(self.found, parts)
-        find = partial(found_elsewhere, pickle.dumps((self.body, self.request)))
-        return self.workers.in_order(find, parts, here=self.found_at_once)
+        return self.workers.in_order(self.found_elsewhere, parts, here=self.found_at_once)
+
+    def __reduce__(self) -> tuple[Callable[..., "PlanSearch"], tuple[Polyhedron, PlanRequest]]:
+        """Have another process set up the search anew."""
+        return PlanSearch.of, (self.body, self.request)
+
+    def found_elsewhere(self, part: Part) -> Found:
+        """Search one part to its end in another process, which tells its time."""
+        begun, found = time.process_time(), self.found_at_once(part)
+        return replace(found, seconds=time.process_time() - begun)
 
     def found(self, part: Part) -> Found:
         """Search one part; it is gone through while its grasps are taken."""
@@ -258,18 +265,6 @@ def _reached(body: Polyhedron, finger: Finger | None, found: Certified) -> Certi
     positions = body.center_of_mass + body.radius * found.placement.positions
     ways = reach(body, found.faces, positions, found.normals, finger)
     return ways if isinstance(ways, str) else replace(found, ways_out=ways)
-
-
-def found_elsewhere(given: bytes, part: Part) -> Found:
-    """Search one part of the pickled search to its end in another process, which tells its time."""
-    begun, found = time.process_time(), _search_of(given).found_at_once(part)
-    return replace(found, seconds=time.process_time() - begun)
-
-
-@lru_cache(maxsize=1)
-def _search_of(given: bytes) -> PlanSearch:
-    # the process that started this one packed it
-    return PlanSearch.of(*pickle.loads(given))  # noqa: S301
 
 
 def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:

@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from scenes.settings import FingerSettings
 from sim_validate.baselines.baseline import Baseline, Entry, How, write_baseline
 from sim_validate.baselines.compare import WORDS, Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
-from sim_validate.closure.validate import Job, prepared, verdict_of
+from sim_validate.closure.validate import Job
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import (
@@ -77,32 +78,31 @@ def measured(
     if not chosen:
         raise InputError(f"{where}: expected at least one grasp to simulate, found none")
     require_faithful(how.setup, saved.friction, saved.body.radius)
-    jobs = [Job(saved.body, grasp, saved.friction, how.agenda, how.setup) for grasp in chosen]
-    executing = list[ExecutionJob]()
-    if how.execution is not None:
-        settings = how.execution.for_body(saved.body)
-        executing = [
-            ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False)
-            for grasp in chosen
-        ]
-    total = len(jobs) + len(executing)
-    verdicts, refused = dict[str, Verdict](), dict[str, str]()
-    count = processes(len(jobs), processors)
-    judged = each(partial(_or_refusal, verdict_of), prepared(jobs, processors), jobs=count)
-    for grasp, answer in zip(chosen, judged, strict=True):
+    job = Job(saved.body, saved.friction, how.agenda, how.setup)
+    settings = None if how.execution is None else how.execution.for_body(saved.body)
+    executing = [
+        ExecutionJob(saved.body, grasp, saved.friction, settings, enough=False)
+        for grasp in chosen
+        if settings is not None
+    ]
+    job = job.prepared(len(chosen), processors)
+    count, total = processes(len(chosen), processors), len(chosen) + len(executing)
+    answers = chain(
+        each(partial(_or_refusal, job), chosen, jobs=count),
+        each(partial(_or_refusal, executed_grasp), executing, jobs=processors),
+    )
+    verdicts, executions = dict[str, Verdict](), dict[str, ExecutedGrasp]()
+    refused = dict[str, str]()
+    for done, answer in enumerate(answers, start=1):
+        name = chosen[(done - 1) % len(chosen)].id
         if isinstance(answer, Verdict):
-            verdicts[grasp.id] = answer
+            verdicts[name] = answer
+        elif isinstance(answer, ExecutedGrasp):
+            executions[name] = answer
         else:
-            refused[grasp.id] = answer
-        report(len(verdicts) + len(refused), total)
-    executions = dict[str, ExecutedGrasp]()
-    answers = each(partial(_or_refusal, executed_grasp), executing, jobs=processors)
-    for done, (job, found) in enumerate(zip(executing, answers, strict=True), start=1):
-        if isinstance(found, str):
-            refused.setdefault(job.grasp.id, f"the execution is refused: {found}")
-        else:
-            executions[job.grasp.id] = found
-        report(len(jobs) + done, total)
+            why = answer if done <= len(chosen) else f"the execution is refused: {answer}"
+            refused.setdefault(name, why)
+        report(done, total)
     entries = [
         Entry.of(verdicts[grasp.id], executions.get(grasp.id))
         for grasp in chosen

@@ -79,7 +79,7 @@ def simulate_grasps(
         reporter.detail(str(check))
     if folder:
         remove_results(folder, "verdicts")
-    tasks = [Job(saved.body, g, saved.friction, agenda, setup) for g in saved.grasps]
+    job = Job(saved.body, saved.friction, agenda, setup)
 
     def kept(verdict: Verdict) -> bool:
         if folder and agenda.keep_traces:
@@ -88,7 +88,12 @@ def simulate_grasps(
 
     collect = partial(Verdicts.of, saved.body, saved.friction, gate)
     found = reporter.collected(
-        "simulating", validated(tasks, jobs), len(tasks), ("held", kept), collect, folder
+        "simulating",
+        validated(job, saved.grasps, jobs),
+        len(saved.grasps),
+        ("held", kept),
+        collect,
+        folder,
     )
     _show(found, setup, reporter)
     good = all(verdict.good for verdict in found)

@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -65,7 +65,7 @@ from sim_validate.engine.rig import (
 )
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
-from sim_validate.kit.processes import Shared, each, processes
+from sim_validate.kit.processes import each, processes
 from sim_validate.settings import Noise
 
 
@@ -90,7 +90,7 @@ def validate(
         InputError: The contacts are not on the body's faces, or not closed at this friction.
         UnfaithfulError: The simulator fails its checks with these settings.
     """
-    return verdict_of(Job(body, grasp, friction, *asked_for(agenda, setup)))
+    return Job(body, friction, *asked_for(agenda, setup))(grasp)
 
 
 def tested(
@@ -201,62 +201,47 @@ Progress: TypeAlias = Callable[[int, int, Verdict], object]
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One grasp to validate, as it is sent to a worker process."""
+    """How grasps of one object are validated: what is sent once to each worker process."""
 
     body: Polyhedron
-    grasp: Grasp
     friction: float
     agenda: Agenda
     setup: Setup
     gate: Gate | None = None
     """How the simulator did on the known cases, so that worker processes need not ask again."""
 
-    def __reduce__(self) -> tuple[Callable[..., "Job"], tuple[object, ...]]:
-        """Send the object so that all grasps of a worker process have the same one."""
-        rest = (self.grasp, self.friction, self.agenda, self.setup, self.gate)
-        return _arrived, (Shared(self.body), *rest)
+    def prepared(self, count: int, processors: int) -> "Job":
+        """Check the simulator, and give each of some grasps an equal share of the processors."""
+        threads = max(1, processors // processes(count, processors))
+        gate = measured_gate(self.setup.for_body(self.body), self.friction, self.body.radius)
+        return replace(self, setup=replace(self.setup, threads=threads), gate=gate)
+
+    def __call__(self, grasp: Grasp) -> Verdict:
+        """Validate one grasp."""
+        body, friction = self.body, self.friction
+        check_on_faces(body, grasp)
+        setup = self.setup.for_body(body)
+        value_of(Friction, friction, "friction")
+        critical = setup.critical_friction(grasp)
+        closed = friction > critical
+        if not (closed and setup.closure(grasp, friction).closed):
+            raise InputError(
+                f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got "
+                f"{friction}"
+            )
+        gate = self.gate or measured_gate(setup, friction, body.radius)
+        gate.require("no grasp is certified")
+        if self.agenda.repeats:  # their contacts lean, on pads
+            on_pads = measured_gate(replace(setup, surface="pads"), friction, body.radius)
+            on_pads.require("no grasp is repeated with noise")
+        proved = replace(grasp, critical_friction=critical)
+        return tested(body, proved, friction, gate, self.agenda, setup)
 
 
-def _arrived(body: Shared[Polyhedron], *rest: Any) -> Job:
-    return Job(body.value, *rest)
-
-
-def validated(jobs: Sequence[Job], processors: int) -> Iterator[Verdict]:
-    """Yield one verdict per job, in order; the number of processors does not change the results."""
-    return each(verdict_of, prepared(jobs, processors), jobs=processes(len(jobs), processors))
-
-
-def prepared(jobs: Sequence[Job], processors: int) -> list[Job]:
-    """Check the simulator for each job, and give each an equal share of processors that remain."""
-    threads = max(1, processors // processes(len(jobs), processors))
-    return [
-        replace(
-            job, setup=replace(job.setup, threads=threads),
-            gate=measured_gate(job.setup.for_body(job.body), job.friction, job.body.radius),
-        )
-        for job in jobs
-    ]  # fmt: skip
-
-
-def verdict_of(job: Job) -> Verdict:
-    """Validate one grasp."""
-    body, grasp, friction = job.body, job.grasp, job.friction
-    check_on_faces(body, grasp)
-    setup = job.setup.for_body(body)
-    value_of(Friction, friction, "friction")
-    critical = setup.critical_friction(grasp)
-    closed = friction > critical
-    if not (closed and setup.closure(grasp, friction).closed):
-        raise InputError(
-            f"grasp {grasp.id}: force closure needs friction above {critical:.6g}, got {friction}"
-        )
-    gate = job.gate or measured_gate(setup, friction, body.radius)
-    gate.require("no grasp is certified")
-    if job.agenda.repeats:  # their contacts lean, on pads
-        on_pads = measured_gate(replace(setup, surface="pads"), friction, body.radius)
-        on_pads.require("no grasp is repeated with noise")
-    proved = replace(grasp, critical_friction=critical)
-    return tested(body, proved, friction, gate, job.agenda, setup)
+def validated(job: Job, grasps: Sequence[Grasp], processors: int) -> Iterator[Verdict]:
+    """Yield one verdict per grasp, in order; the number of processors does not change results."""
+    count = len(grasps)
+    return each(job.prepared(count, processors), grasps, jobs=processes(count, processors))
 
 
 def validate_all(
@@ -297,12 +282,12 @@ def validate_all(
     value_of(Count, jobs, "jobs")
     if progress is not None:
         function(progress, "progress")
-    tasks = [Job(body, grasp, friction, agenda, setup) for grasp in listed]
+    job = Job(body, friction, agenda, setup)
     verdicts: list[Verdict] = []
-    for verdict in validated(tasks, jobs) if jobs > 1 else map(verdict_of, tasks):
+    for verdict in validated(job, listed, jobs) if jobs > 1 else map(job, listed):
         verdicts.append(verdict)
         if progress is not None:
-            progress(len(verdicts), len(tasks), verdict)
+            progress(len(verdicts), len(listed), verdict)
     return tuple(verdicts)
 
 

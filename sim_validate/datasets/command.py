@@ -10,7 +10,7 @@ from grasp_core.mesh_files.reading import FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
 from sim_validate.datasets import flags as dataset_flags
-from sim_validate.datasets.build import CARD, build
+from sim_validate.datasets.build import CARD, Engine, build
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,
@@ -21,7 +21,6 @@ from sim_validate.datasets.config import (
 from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verify import verify
-from sim_validate.datasets.workers import Engine
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.processes import dask_workers, ray_workers

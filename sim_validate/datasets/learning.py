@@ -28,7 +28,7 @@ from grasp_core.cones.spanning import span_angle
 from grasp_core.errors import GraspError, InputError, NoForcesError, SolverError, UndecidedError
 from grasp_core.execution.best_squeeze import best_squeeze
 from grasp_core.execution.loads import any_direction
-from grasp_core.geometry.polygons import plane_frame
+from grasp_core.geometry.polygons import convex_hull, edge_rows, plane_frame
 from grasp_core.hands.hand import load_hand
 from grasp_core.hands.reach import reach_with
 from grasp_core.kinds import LARGEST_FRICTION
@@ -250,18 +250,12 @@ def draws(seed: int, grasp: str, kind: str, number: int) -> np.random.Generator:
 
 def region_exit(region: ContactRegion, contact: Contact, way: Array) -> float:
     """Return how far a region reaches from its contact along a unit vector in its plane [m]."""
-    corners = region.polygon
-    if len(corners) < 3:  # noqa: PLR2004 - a point or a line has no inside
+    if len(region.polygon) < 3:  # noqa: PLR2004 - a point or a line has no inside
         return 0.0
-    edges = np.roll(corners, -1, axis=0) - corners
-    outward = np.cross(edges, contact.normal)
-    sizes = np.linalg.norm(outward, axis=1)
-    outward = outward[sizes > 0.0] / sizes[sizes > 0.0, None]
-    middle = corners.mean(axis=0)
-    outward *= np.sign(np.einsum("ki,ki->k", outward, corners[sizes > 0.0] - middle))[:, None]
-    gaps = np.einsum("ki,ki->k", outward, corners[sizes > 0.0] - contact.position)
-    speeds = outward @ way
-    reached = gaps[speeds > 0.0] / speeds[speeds > 0.0]
+    frame = plane_frame(contact.normal)
+    outward, ends = edge_rows(convex_hull((region.polygon - contact.position) @ frame))
+    speeds = outward @ (way @ frame)
+    reached = ends[speeds > 0.0] / speeds[speeds > 0.0]
     return max(0.0, float(reached.min(initial=math.inf)))
 
 

@@ -61,23 +61,6 @@ def _clearance() -> None:
     touched_solids(body, body.vertices[:1], body.radius)
 
 
-def _hand_checks() -> None:
-    from grasp_core.hands.collisions import clearances
-    from grasp_core.hands.hand import load_hand
-    from grasp_core.hands.pose_search import postures
-
-    hand, body = load_hand("allegro"), example_object("tetrahedron")
-    (joints, *_), _ = postures(hand, 0)
-    clearances(hand, body, joints, np.eye(4), np.arange(len(hand.fingers)))
-
-
-def _hand_posing() -> None:
-    from grasp_core.hands.hand import load_hand
-    from grasp_core.hands.pose_search import compile_posing
-
-    compile_posing(load_hand("allegro"), example_object("tetrahedron"))
-
-
 def _hand_reach() -> None:
     from grasp_core.hands.hand import load_hand
     from grasp_core.hands.reach import reach_with
@@ -99,11 +82,11 @@ PLANNING = Loops(
     ),
 )  # fmt: skip
 """What compiles the loops that plans need."""
-REACHING = Loops(("hands.collisions", "hands.pose"), (_hand_checks, _hand_posing))
+REACHING = Loops(("hands.collisions", "hands.pose"), (_hand_reach,))
 """What compiles the loops that put hands to contacts."""
 EVERYTHING = Loops(
     (*PLANNING.kernels, *REACHING.kernels, "regions.cover", "optimizing.search"),
-    (*PLANNING.calls, *REACHING.calls, _best, _hand_reach, _regions, _clearance),
+    (*PLANNING.calls, _best, *REACHING.calls, _regions, _clearance),
 )
 """What compiles all loops that there are."""
 

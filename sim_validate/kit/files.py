@@ -231,14 +231,9 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str) -> NDAr
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
-    """Write named arrays, compressed, as `numpy.load` reads them."""
+    """Write named arrays as `numpy.load` reads them; equal arrays give equal files."""
     held = io.BytesIO()
-    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in arrays.items():
-            # A member made this way has a fixed date, so that equal arrays give equal files.
-            member = zipfile.ZipInfo(f"{name}.npy")
-            with archive.open(member, "w") as stream:
-                np.lib.format.write_array(stream, array, allow_pickle=False)
+    np.savez(held, allow_pickle=False, **arrays)
     return write_parts(path, [held.getvalue()])
 
 

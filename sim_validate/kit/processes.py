@@ -12,7 +12,6 @@ on a unit. Without `address`, Ray and Dask start workers on this machine and sto
 
 import importlib
 import os
-import pickle
 import signal
 import socket
 import sys
@@ -21,16 +20,15 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from types import FrameType
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 from grasp_core.errors import InputError
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
-Value = TypeVar("Value")
 
 SHARE = Path("/sys/fs/cgroup/cpu.max")
 """The Linux file that limits a container's processor time: microseconds of use per period."""
@@ -39,8 +37,6 @@ START_S = 1.0
 UNITS_PER_PROCESS = 8
 """Number of simulated grasps for which a process is better than threads of the simulator: its start
 takes as long as eight validations."""
-KEPT = 4
-"""Number of shared values that a process keeps."""
 
 
 def available_cores() -> int:
@@ -63,7 +59,8 @@ def each(
 ) -> Iterator[Result]:
     """Yield the results of a function on each unit, in order, as they become ready.
 
-    This process works with the others, which start where there is work for them for longer than a
+    What units have in common is sent once to each process if the function holds it. This process
+    works with the others, which start where there is work for them for longer than a
     start takes.
     """
     # commands' flags count cores, and need not wait for this
@@ -75,31 +72,6 @@ def each(
         return
     with local_processes(others, START_S) as workers:
         yield from workers.in_order(function, units, ahead=len(units))
-
-
-class Shared(Generic[Value]):
-    """A hashable value that arrives in another process as the one that arrived there before.
-
-    Otherwise each unit would bring its own copy of, say, an object, and what is kept for that
-    object from one unit to the next would be computed again for each copy.
-    """
-
-    def __init__(self, value: Value) -> None:
-        self.value = value
-
-    def __reduce__(self) -> tuple[Callable[[bytes], "Shared[Any]"], tuple[bytes]]:
-        """Pickle the value by itself, so that equal bytes tell that it is the same."""
-        return _arrived, (_packed(self.value),)
-
-
-@lru_cache(maxsize=KEPT)
-def _packed(value: object) -> bytes:
-    return pickle.dumps(value)
-
-
-@lru_cache(maxsize=KEPT)
-def _arrived(data: bytes) -> Shared[Any]:
-    return Shared(pickle.loads(data))  # noqa: S301 - the process that started this one packed it
 
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)

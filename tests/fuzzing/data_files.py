@@ -17,10 +17,10 @@ from sim_validate.baselines.baseline import Baseline
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
+from sim_validate.datasets.build import UnitRecord
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.open_dataset import Listed, Manifest, left_out_from
 from sim_validate.datasets.units import given_from_json
-from sim_validate.datasets.workers import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches

@@ -47,6 +47,14 @@ def test_two_processes_work_at_the_same_time(other, names):
     assert len(set(did)) == 2
 
 
+def test_a_function_is_sent_once_with_all_that_it_holds(other):
+    one, two = tasks.Counter(), tasks.Counter()
+    assert [other.submit(one, n).result() for n in range(3)] == [1, 2, 3]
+    assert other.submit(two, 0).result() == 1
+    assert other.submit(one, 0).result() == 1
+    assert one.calls == two.calls == 0
+
+
 def test_an_error_is_raised_with_its_own_type_in_the_place_of_its_result(other):
     done = other.in_order(tasks.three_or_refusal, [2, 3, 4] * 20)
     assert next(done) == 4

@@ -2,7 +2,6 @@
 
 import io
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -11,7 +10,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.planning import plan_search
-from grasp_core.planning.plan_search import PlanSearch, found_elsewhere
+from grasp_core.planning.plan_search import PlanSearch
 from grasp_core.planning.result import PlanRequest
 from grasp_core.processes import receive, send, unpacked
 from scenes.example_objects import example_object
@@ -79,10 +78,10 @@ def test_parts_that_another_process_finds_are_the_same(name, monkeypatch):
         return unpacked(receive(pipe))
 
     def elsewhere(work, parts):
-        given = pickle.dumps((body, work.request))
+        other = sent(work)
         for part in parts:
             seen.append(part)
-            yield sent(found_elsewhere(given, sent(part)))
+            yield sent(other.found_elsewhere(sent(part)))
 
     here = gc.plan(body, 0.3)
     monkeypatch.setattr(PlanSearch, "each_found", elsewhere)

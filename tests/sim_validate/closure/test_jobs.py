@@ -6,7 +6,7 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate import Agenda, Setup
-from sim_validate.closure.validate import Job, prepared, verdict_of
+from sim_validate.closure.validate import Job
 from sim_validate.engine import gate as gate_module
 from sim_validate.engine.gate import measured_gate
 
@@ -14,30 +14,19 @@ FRICTION = 0.5
 SHORT = Agenda(critical_friction=False, controls=False)
 
 
-def jobs():
-    body = example_object("tetrahedron")
-    grasps = gc.plan(body, FRICTION, limit=2).grasps
-    return [Job(body, grasp, FRICTION, SHORT, Setup()) for grasp in grasps]
-
-
-def test_grasps_of_one_object_arrive_with_one_object():
-    first, second = (pickle.loads(pickle.dumps(job)) for job in jobs())  # noqa: S301
-    assert first.body is second.body
-    assert first.body.content_sha256 == jobs()[0].body.content_sha256
-    assert [first.grasp.id, second.grasp.id] == [job.grasp.id for job in jobs()]
-
-
 def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
-    job, _ = prepared(jobs(), 1)
-    assert job.gate is measured_gate(Setup(), FRICTION, job.body.radius)
+    body = example_object("tetrahedron")
+    (grasp,) = gc.plan(body, FRICTION, limit=1).grasps
+    job = Job(body, FRICTION, SHORT, Setup()).prepared(1, 1)
+    assert job.gate is measured_gate(Setup(), FRICTION, body.radius)
     arrived = pickle.loads(pickle.dumps(job))  # noqa: S301
 
     def fail(_):
         raise AssertionError("measured again")
 
     monkeypatch.setattr(gate_module, "measured", fail)
-    assert verdict_of(arrived).held
-    assert verdict_of(arrived).gate == job.gate
+    assert arrived(grasp).held
+    assert arrived(grasp).gate == job.gate
 
 
 def test_many_validations_are_those_of_single_ones_and_say_how_far_they_are():

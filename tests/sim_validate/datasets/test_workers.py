@@ -8,11 +8,10 @@ import pytest
 import trimesh
 
 from grasp_core.processes import local_processes
-from sim_validate.datasets import workers
-from sim_validate.datasets.build import build
+from sim_validate.datasets import build as workers
+from sim_validate.datasets.build import Staging, Task, build, do_task, do_unit, drive
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.units import WorkerError, provenance, units_of
-from sim_validate.datasets.workers import Staging, Task, do_task, do_unit, drive
 from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
 
@@ -134,4 +133,4 @@ def test_a_process_that_never_ends_is_ended(staging):
             assert failed is not None
         given = task(staging, do_unit)
         engine.submit(do_task, given).result()
-    assert staging.finished(given.unit)
+    assert staging.of(given.unit).is_dir()

@@ -1,14 +1,13 @@
 """Units in other processes: few and long ones too, and from any script and folder."""
 
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from sim_validate.kit.processes import Shared, each
+from sim_validate.kit.processes import each
 from tests.grasp_core.tasks_to_do import meet
 from tests.patience import HANGING_S
 
@@ -55,16 +54,3 @@ def test_a_script_needs_no_guard_and_no_working_folder(tmp_path):
         env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
     )  # fmt: skip
     assert (done.stdout, done.stderr) == ("begun\n3\n", "")
-
-
-def test_what_was_sent_twice_arrives_as_one():
-    value = frozenset({"a", "b"})
-    first, second = (pickle.loads(pickle.dumps(Shared(value))) for _ in range(2))  # noqa: S301
-    assert first.value == value
-    assert first.value is second.value
-    assert first.value is not value
-
-
-def test_another_value_arrives_as_another():
-    first, second = (pickle.loads(pickle.dumps(Shared(value))) for value in ("a", "b"))  # noqa: S301
-    assert (first.value, second.value) == ("a", "b")
