@@ -69,11 +69,8 @@ def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> 
     if not grip.stable or not len(loads):
         return np.zeros(len(loads))
     change = np.einsum("kij,mj->mki", grip.response, loads)
-    count, reach = len(loads), np.repeat([most_m, most_rad], 3)
-    slips = slip_steps(
-        np.tile(grip.local_squeeze, (count, 1)), change.reshape(-1, 3),
-        np.tile(grip.friction, count),
-    ).reshape(count, -1).min(axis=1)  # fmt: skip
+    reach = np.repeat([most_m, most_rad], 3)
+    slips = slip_steps(grip.local_squeeze, change, grip.friction).min(axis=1)
     with np.errstate(divide="ignore"):
         sticking = 1.0 / _moved(loads @ grip.compliance.T, reach)
     found = sticking.copy()

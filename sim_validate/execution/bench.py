@@ -389,8 +389,5 @@ def _under_full_load(forces: Array, shares: Array, friction: Array, begun: int) 
 
 def _extrapolated(forces: Array, shares: Array, friction: Array, begun: int, at: Indices) -> Array:
     """Return the multiple of the load at first slip as it is seen in samples `at`, (m,)."""
-    rest, count = forces[begun], len(at)
-    changes = (forces[at] - rest).reshape(-1, 3)
-    steps = slip_steps(np.tile(rest, (count, 1)), changes, np.tile(friction, count))
-    least = steps.reshape(count, -1).min(axis=1)
-    return np.multiply(shares[at], least, out=np.full(count, np.inf), where=np.isfinite(least))
+    least = slip_steps(forces[begun], forces[at] - forces[begun], friction).min(axis=1)
+    return np.multiply(shares[at], least, out=np.full(len(at), np.inf), where=np.isfinite(least))

@@ -136,9 +136,8 @@ class HeldDynamics:
             loads[place, : len(drive)], bases[place, : len(drive)] = self._load(drive)
         grip, found = self.grip, list[Expected]()
         for every, changes, count in zip(*self._responses(loads, bases), lengths, strict=True):
-            rest, friction = np.tile(grip.local_squeeze, (count, 1)), np.tile(grip.friction, count)
-            steps = slip_steps(rest, changes[:count].reshape(-1, 3), friction)
-            slips, motion = steps.reshape(count, -1).min(axis=1), every[:count]
+            motion = every[:count]
+            slips = slip_steps(grip.local_squeeze, changes[:count], grip.friction).min(axis=1)
             found.append(
                 Expected(
                     first_slip=float(slips.min()),
