@@ -149,10 +149,7 @@ class _Limits:
     motors: Motors
 
     def room(self, held: Held, load: Array) -> tuple[Array, Array]:
-        """Return what is left to the limits of pushes, then of torques by (2), and what load takes.
-
-        A torque grows towards the limit of the sign of its change, or falls to that of the other.
-        """
+        """Return what is left to limits of pushes and, by (2), of torques, and what load takes."""
         grip, back = held.grip, held.rotation  # rows times R are turned back to the object's axes
         change = grip.response @ load
         turned = np.einsum("kij,kj->ki", grip.frames, change) @ back
@@ -268,10 +265,7 @@ def _steps_to_cone(local: Array, change: Array, friction: Array) -> Array:
 
 
 def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
-    """Find how much the load grows to the next event, what that is, and its contact or joint.
-
-    The growth is negative where something is beyond its cone or limit already.
-    """
+    """Find how much the load grows to the next event, less than zero where it has passed it."""
     grip = held.grip
     slips = _steps_to_cone(grip.local_squeeze, grip.response @ load, grip.friction)
     room, rates = most.room(held, load)

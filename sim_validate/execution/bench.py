@@ -120,10 +120,7 @@ class HeldMotion(Rows):
 
     @cached_property
     def pushes(self) -> Array:
-        """Contact forces on the object, (n, k, 3) [N], in the frames of the contacts.
-
-        They turn with the object: normal, tangent, tangent.
-        """
+        """Contact forces on the object in its contacts' frames, which turn with it, (n, k, 3)."""
         along = np.einsum("kij,nkj->nki", self.layout.axes, self.forces)
         own = np.einsum("nji,nkj->nki", self.pressed, along)
         return np.einsum("kij,nki->nkj", self.layout.frames, own)

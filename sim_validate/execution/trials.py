@@ -109,11 +109,8 @@ def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: floa
 
 
 def _near(layout: HeldLayout, middles: Array, room: float) -> Indices:
-    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others.
-
-    If the surface is at a distance d from a middle, it is at most d + room from such a point, so
-    that a triangle farther than d + 2 room from the middle is not the nearest.
-    """
+    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others."""
+    # with the surface at d from a middle, one beyond d + 2 room from it is nowhere the nearest
     corners = layout.vertices[layout.triangles]
     nearest = nearest_on_surface(layout.vertices, layout.triangles, middles)
     reach = np.linalg.norm(nearest - middles, axis=1) + 2.0 * room + MET * layout.radius_m
@@ -348,14 +345,10 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
 
 
 def _sure(weaker: Grip, load: Array) -> float:
-    """Return the multiple of a load, at least one, that makes a weaker grip slip by analysis.
-
-    It is one where the grip slips at rest already, is unstable, never slips by analysis, or cannot
-    be followed; then nothing shows that the load suffices.
-    """
+    """Return the multiple of a load, at least one, that makes a weaker grip slip by analysis."""
     try:
         found = first_slip(weaker, load)
-    except (InputError, SolverError):
+    except (InputError, SolverError):  # nothing shows that the load suffices
         return 1.0
     return max(1.0, SURE * found.multiple) if np.isfinite(found.multiple) else 1.0
 
@@ -370,11 +363,7 @@ def idle(grip: Grip, finger: int, push: Array) -> Grip:
 
 
 def slipping_load(best: BestSqueeze) -> Array:
-    """Return the least load of a set that makes a contact slip, (6,) [N, N m].
-
-    It is larger than the worst certified load where a finger reaches its largest push before any
-    contact slips: the simulated fingers push as hard as their springs do.
-    """
+    """Return the least load of a set that makes a contact slip, (6,), whatever the largest push."""
     reactions = Reactions.of(best.grip, best.loads)
     angles, scales = reactions.worst_angles()
     contact = first_best(-scales)
