@@ -66,9 +66,8 @@ VANISHING = 1e-9
 one: roots move by as much, and (4) by its square."""
 FIRST_ANGLE = -0.1
 """Where angles are counted from, far from those of symmetric grasps [rad]."""
-GOLDEN_STEPS = 70
-"""Golden sections for a multiplier, each to 0.62 of the interval: down to rounding."""
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+HALVINGS = 50
+"""Halvings of the interval of a multiplier, down to rounding."""
 ROUNDING = 1e-12
 """Least eigenvalue of (5) that counts as none, relative to its largest entry: a thousand times
 what rounding leaves. Forces near the tip of a cone may leave it by its root, a millionth."""
@@ -202,10 +201,12 @@ class Reactions:
         """Find tau for `survives`, (k,) [N^2]: those with the largest least eigenvalue of (5)."""
         M, ball = self._certificates(scale)
         low, high = np.zeros(len(M)), np.maximum(M[:, 0, 0], 0.0)
-        for _ in range(GOLDEN_STEPS):
-            inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
-            left, right = np.linalg.eigvalsh(M - inner[..., None, None] * ball)[..., 0]
-            low, high = np.where(left < right, (inner[0], high), (low, inner[1]))
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            # the least eigenvalue changes by minus its vector's form of the ball
+            least = np.linalg.eigh(M - middle[:, None, None] * ball)[1][..., 0]
+            rising = np.einsum("ki,ij,kj->k", least, ball, least) < 0.0
+            low, high = np.where(rising, (middle, high), (low, middle))
         return 0.5 * (low + high)
 
     def _certificates(self, scale: float) -> tuple[Array, Array]:

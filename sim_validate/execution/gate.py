@@ -47,6 +47,7 @@ from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.kinds import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import areas_and_normals
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.fingertips import fitting_radius
@@ -516,6 +517,5 @@ def _centroid(corners: Array) -> tuple[Array, float]:
     triangles = np.array(
         [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
     )
-    crosses = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    areas = 0.5 * np.linalg.norm(crosses, axis=1)
+    areas, _ = areas_and_normals(triangles)
     return areas @ triangles.mean(axis=1) / areas.sum(), float(areas.sum())
