@@ -153,10 +153,11 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
         )
         own = [facet for facet in np.flatnonzero(alike) if facet in left]
         left -= set(own)
-        triangles = points[hull.simplices[own]]
-        # the origin, dropped along the normal, falls into one of the triangles
-        if any(_is_inside(corners, normals[first]) for corners in triangles):
-            angles = solid_angles(triangles.transpose(2, 1, 0), np.zeros((1, 3)))
+        # the origin, dropped along the normal, stays on the inner side of all other faces
+        foot = offsets[first] * normals[first]
+        if (alike | (normals @ foot <= offsets)).all():
+            corners = points[hull.simplices[own]].transpose(2, 1, 0)
+            angles = solid_angles(corners, np.zeros((1, 3)))
             share = float(np.abs(angles).sum() / (4.0 * np.pi))
             found.append(Rest(normals[first], float(offsets[first]) * body.radius, share))
     order = largest_first([rest.likelihood for rest in found])
@@ -169,11 +170,6 @@ def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
         if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:
             return rest
     return None
-
-
-def _is_inside(corners: Array, normal: Array) -> bool:
-    sides = np.cross(np.roll(corners, -1, axis=0) - corners, -corners) @ normal
-    return bool((sides >= 0.0).all() or (sides <= 0.0).all())
 
 
 AXES = ("x", "y", "z")
