@@ -60,20 +60,12 @@ it can be solved where everything slips."""
 
 
 def loss_multiples(grip: Grip, loads: Array, most_m: float, most_rad: float) -> Array:
-    """Find the multiples of loads, each of which comes once, at which the object is lost.
-
-    Takes `loads` (force, torque) or (m, 6) [N, N m]; `most_m` [m]; `most_rad` [rad]. Gives the
-    multiples, (m,): at most those at which the object without slip would be lost; zero if the grip
-    is unstable at rest, infinite for a load of zero.
-    """
+    """Find the multiples, (m,), at which loads, (m, 6), that come once each lose the object."""
     if not grip.stable or not len(loads):
         return np.zeros(len(loads))
     change = np.einsum("kij,mj->mki", grip.response, loads)
-    count, reach = len(loads), np.repeat([most_m, most_rad], 3)
-    slips = slip_steps(
-        np.tile(grip.local_squeeze, (count, 1)), change.reshape(-1, 3),
-        np.tile(grip.friction, count),
-    ).reshape(count, -1).min(axis=1)  # fmt: skip
+    reach = np.repeat([most_m, most_rad], 3)
+    slips = slip_steps(grip.local_squeeze, change, grip.friction).min(axis=1)
     with np.errstate(divide="ignore"):
         sticking = 1.0 / _moved(loads @ grip.compliance.T, reach)
     found = sticking.copy()
@@ -144,10 +136,7 @@ class _Followed:
     def _balanced(
         self, forces: Array, start: Array, loads: Array
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Solve (2) for loads, (m, 6), from known forces, (m, k, 3), and motions, (m, 6).
-
-        No step of Newton's method is longer than the reach: near the end of balance it would fly.
-        """
+        """Solve (2) for loads, (m, 6), from known forces, (m, k, 3), and motions, (m, 6)."""
         grip, count = self.grip, len(loads)
         scale, rest = np.repeat([1.0, 1.0 / grip.size], 3), grip.local_squeeze
         stiff, maps = grip.response @ grip.grasp_stiffness, grip.local_maps  # D_i and W_i F_i
@@ -169,6 +158,7 @@ class _Followed:
             tangent -= SINGULAR * size * np.eye(WRENCH)
             solved = np.asarray(np.linalg.solve(tangent, -(left * scale)[..., None]), dtype=float)
             step = np.where(found[:, None], 0.0, solved[..., 0] * scale)
+            # no step is longer than the reach: near the end of balance it would fly
             longest = np.abs(step / self.reach).max(axis=1, keepdims=True)
             motion = motion + step / np.maximum(longest, 1.0)
         return after, motion, found

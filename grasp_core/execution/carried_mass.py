@@ -15,10 +15,8 @@ contains zero, with f = 0. The mass m is held under d if (m d, d) is in C, and h
     m is held in every orientation if S(m) contains the unit ball.                      (3)
 
 *A mass that is held.* Points v of S(m), each with its forces, whose hull contains the unit ball
-prove (3). If triangles of points have the origin on their inner side, and every edge belongs to two
-of them in opposite directions, then the cones over them cover all directions, and the ball whose
-radius is the least distance of their planes is inside the points' hull. No hull is computed again
-to check this: sums, cross products and a look at the edges do.
+prove (3). Triangles between them show the ball, as simplices do in `ferrari_canny`: no hull is
+computed again to check this.
 
 *A mass that is not.* For any twist y and multipliers u of the joints,
 
@@ -98,12 +96,11 @@ from grasp_core.arrays import (
     Triangles,
     UnitVectors,
     cross,
-    is_array,
     of_order_one,
 )
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.declared import Declared, summary
+from grasp_core.declared import Declared, summary, trusted
 from grasp_core.errors import InputError
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Bounded, Grip, unsqueezed
@@ -111,14 +108,12 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.kinds import SMALLEST, Quantity, Range, number, value_of
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.quality.ferrari_canny import InnerPolytope
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.quality.wrench_limits import HELD, WrenchBody
 from grasp_core.solvers.ties import first_best, on_grid
 from grasp_core.values import Contact, Grasp
 
-UNITS_LOST = 16.0
-"""Rounding units by which the volume of a triangle's cone may be off, relative to the product of
-its sides and its distance: differences, products and sums lose about one each."""
 FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
 """Directions of the first rays, whose hull contains the origin."""
 ROUNDING = 1e-9
@@ -128,8 +123,8 @@ MOST_LEFT = 1e-4
 """What forces may lack of (1) at most, over the weight and the motors' limits: a tenth of the usual
 gap between the bounds."""
 LOST = 64.0 * float(np.finfo(np.float64).eps)
-"""Rounding of products in (5) and (6): sums in them have six components of a wrench, three of each
-contact or one of each joint, a few tens in all."""
+"""Rounding of heights of corners, and of products in (5) and (6): sums in them have six components
+of a wrench, three of each contact or one of each joint, a few tens in all."""
 GAP = 1e-3
 """Gap between the bounds, relative to the lower one, at which no more rays follow."""
 FINEST_GAP = 1e-4
@@ -157,44 +152,15 @@ def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
     return nearest[:3], -float(nearest[3]), np.asarray(hull.simplices, dtype=np.int64)
 
 
-def outward(points: Array, triangles: Indices) -> Indices:
-    """Turn triangles, (t, 3), so that the origin is on their inner side."""
-    turned = np.linalg.det(points[triangles]) < 0.0
-    return np.where(turned[:, None], triangles[:, ::-1], triangles)
-
-
-def least_distance(corners: Array) -> float:
-    """Return the least distance of the origin from planes of triangles, (t, 3, 3).
-
-    The distance is negative where a triangle has the origin on its outer side, and lower by what
-    rounding may add, which is much for corners that are nearly in line.
-    """
-    a, b, c = np.moveaxis(corners, 1, 0)
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1)
-    if not (lengths > 0.0).all():
+def ball_in(points: Array, triangles: Indices) -> float:
+    """Return the radius of the ball that triangles show to be in the hull of points, or -inf."""
+    if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points):
         return -np.inf
-    far = np.linalg.norm(corners, axis=2).max(axis=1)
-    # a cross product is off by some rounding units of the product of its factors
-    sides = np.linalg.norm(b - a, axis=1) * np.linalg.norm(c - a, axis=1)
-    lost = UNITS_LOST * np.finfo(np.float64).eps * far * sides
-    return float(((np.einsum("ti,ti->t", normals, a) - lost) / lengths).min())
-
-
-def ball_in(points: Array, triangles: Any) -> float:
-    """Return the radius of the ball that triangles show to be in a hull, or -inf."""
-    if not (is_array(triangles, None, 3, whole=True) and len(triangles)):
-        return -np.inf
-    if triangles.min() < 0 or triangles.max() >= len(points) or not _is_closed(triangles):
-        return -np.inf
-    return least_distance(points[triangles])
-
-
-def _is_closed(triangles: Indices) -> bool:
-    """Return whether every edge belongs to two triangles, in opposite directions."""
-    edges = [tuple(edge) for t in triangles.tolist() for edge in zip(t, t[1:] + t[:1], strict=True)]
-    known = set(edges)
-    return len(known) == len(edges) and all((b, a) in known for a, b in edges)
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    normals = cross(b - a, c - a)
+    normals *= np.where((normals * a).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    shown = trusted(InnerPolytope, forces=points, corners=triangles, normals=normals)
+    return shown.radius_between(points) - LOST * float(np.linalg.norm(points, axis=1).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -421,11 +387,9 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
             return _nothing_held(hand, weakest), weakest
         ends, shares = _ends(hand, rays, mass)
         normal, distance, triangles = nearest_facet(ends)
-        if distance >= 1.0:
-            triangles = outward(ends, triangles)
-            if ball_in(ends, triangles) >= 1.0 - ROUNDING:
-                forces = shares[:, None, None] * np.array([ray.forces for ray in rays])
-                return _held(hand, mass, weakest, ends, forces, triangles), weakest
+        if distance >= 1.0 and ball_in(ends, triangles) >= 1.0 - ROUNDING:
+            forces = shares[:, None, None] * np.array([ray.forces for ray in rays])
+            return _held(hand, mass, weakest, ends, forces, triangles), weakest
         if len(rays) < RAYS:
             rays.append(_ray(hand, mass, normal / np.linalg.norm(normal)))
             weakest = _weakest([weakest, rays[-1]])

@@ -60,8 +60,6 @@ STEP = 0.02
 """Largest motion of the object in one step, in arms' lengths or radians."""
 MET = 1e-9
 """How near the load of first slip is met, relative to it."""
-CORRECTIONS = 6
-"""Most steps back to a cone or limit; each squares the error."""
 MOST_STEPS = 1000
 SMALLEST_STEP = 1e-6
 """Part of a step at which the equilibrium ends, rather than that Newton's method fails."""
@@ -151,10 +149,7 @@ class _Limits:
     motors: Motors
 
     def room(self, held: Held, load: Array) -> tuple[Array, Array]:
-        """Return what is left to the limits of pushes, then of torques by (2), and what load takes.
-
-        A torque grows towards the limit of the sign of its change, or falls to that of the other.
-        """
+        """Return what is left to limits of pushes and, by (2), of torques, and what load takes."""
         grip, back = held.grip, held.rotation  # rows times R are turned back to the object's axes
         change = grip.response @ load
         turned = np.einsum("kij,kj->ki", grip.frames, change) @ back
@@ -211,6 +206,7 @@ def first_slip(
     if model == "finite":
         return _finite(rest, load, limits)
     multiple, event, place = _next_event(rest, load, limits)
+    multiple = max(multiple, 0.0)
     if event == "none":
         return _ended(rest, multiple, event, place)
     motion = multiple * grip.compliance @ load
@@ -245,18 +241,23 @@ def _check_rest(grip: Grip, max_push_n: float) -> None:
 
 
 def slip_steps(local: Array, change: Array, friction: Array) -> Array:
-    """Solve (1) for each contact: the least s >= 0 at which it slips, (k,); infinite if never."""
-    n, t, a, b = local[:, 0], local[:, 1:], change[:, 0], change[:, 1:]
-    # q2 s^2 + 2 q1 s + q0 is the squared cone less the squared tangential force, q0 >= 0
+    """Solve (1) for each contact: the least s >= 0 at which it slips, (..., k); else infinite."""
+    return np.maximum(_steps_to_cone(local, change, friction), 0.0)
+
+
+def _steps_to_cone(local: Array, change: Array, friction: Array) -> Array:
+    """Solve (1); a step is negative where a contact is beyond its cone and goes on outwards."""
+    (n, a), (t, b) = (local[..., 0], change[..., 0]), (local[..., 1:], change[..., 1:])
+    # q2 s^2 + 2 q1 s + q0 is the squared cone less the squared tangential force
     mu2 = friction**2
-    q2 = mu2 * a**2 - np.einsum("ki,ki->k", b, b)
-    q1 = mu2 * n * a - np.einsum("ki,ki->k", t, b)
-    q0 = np.maximum(mu2 * n**2 - np.einsum("ki,ki->k", t, t), 0.0)
+    q2 = mu2 * a**2 - (b * b).sum(axis=-1)
+    q1 = mu2 * n * a - (t * b).sum(axis=-1)
+    q0 = mu2 * n**2 - (t * t).sum(axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(np.maximum(q1**2 - q2 * q0, 0.0))
-        # the least positive root, in the form without cancellation
+        # the root that comes first, in the form without cancellation
         falls = np.where(q1 <= 0.0, q0 / (root - q1), np.where(q2 < 0.0, (-q1 - root) / q2, np.inf))
-        real = (q1**2 >= q2 * q0) & ~((q1 >= 0.0) & (q2 >= 0.0))
+        real = ((q1**2 >= q2 * q0) | (q0 < 0.0)) & ~((q1 >= 0.0) & (q2 >= 0.0))
         slips = np.where(real, falls, np.inf)
         # where the cone is left through its tip, no later
         lifts = np.where(a < 0.0, n / -a, np.inf)
@@ -264,12 +265,12 @@ def slip_steps(local: Array, change: Array, friction: Array) -> Array:
 
 
 def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, int]:
-    """Find how much further a load can grow, what happens there, and to which contact or joint."""
+    """Find how much the load grows to the next event, less than zero where it has passed it."""
     grip = held.grip
-    slips = slip_steps(grip.local_squeeze, grip.response @ load, grip.friction)
+    slips = _steps_to_cone(grip.local_squeeze, grip.response @ load, grip.friction)
     room, rates = most.room(held, load)
     steps = np.full(len(room), np.inf)
-    np.divide(np.maximum(room, 0.0), rates, out=steps, where=rates > 0.0)
+    np.divide(room, rates, out=steps, where=rates > 0.0)
     if steps.min() < slips.min():
         place, pushes = int(np.argmin(steps)), len(slips)
         limited = "push limit" if place < pushes else "torque limit"
@@ -280,54 +281,30 @@ def _next_event(held: Held, load: Array, most: _Limits) -> tuple[float, Event, i
 
 
 def _finite(held: Held, load: Array, most: _Limits) -> FirstSlip:
-    """Follow the equilibrium from rest until something happens."""
+    """Follow the equilibrium from rest until something happens, and back where it has happened."""
     reached, part = 0.0, 1.0
     farthest = FARTHEST * float(held.grip.local_squeeze[:, 0].max()) / float(np.abs(load).max())
     for _ in range(MOST_STEPS):
-        if not held.grip.stable or part < SMALLEST_STEP:
-            return _ended(held, reached, "unstable", -1)
         further, event, place = _next_event(held, load, most)
-        if further <= MET * reached:
+        further = max(further, -reached)
+        is_within = further >= -MET * reached
+        if part < SMALLEST_STEP or (is_within and not held.grip.stable):
+            return _ended(held, reached, "unstable", -1)
+        if is_within and further <= MET * reached:
             return _ended(held, reached, event, place)
         motion = held.grip.compliance @ load
         shift = float(np.linalg.norm(motion[:3])) / held.grip.size
-        pace = max(shift, float(np.linalg.norm(motion[3:])))
-        step = min(further, part * STEP / pace)
+        longest = part * STEP / max(shift, float(np.linalg.norm(motion[3:])))
+        step = max(min(further, longest), -longest)
         if reached + step > farthest:
             return _ended(held, math.inf, "none", -1)
         try:
-            moved, multiple = _followed(held, load, reached + step, most)
+            moved = held.under((reached + step) * load)
         except SolverError:  # where the equilibrium ends no step is short enough
             part *= 0.5
             continue
-        held, reached, part = moved, multiple, min(1.0, 2.0 * part)
+        held, reached, part = moved, reached + step, min(1.0, 2.0 * part)
     raise SolverError("the load of first slip was not met; the grip may be nearly unstable")
-
-
-def _followed(held: Held, load: Array, multiple: float, most: _Limits) -> tuple[Held, float]:
-    """Follow the equilibrium to a multiple of the load, or back to where a contact slips."""
-    held = held.under(multiple * load)
-    for _ in range(CORRECTIONS):  # the response grew on the way
-        over = _overshoot(held, load, most)
-        if over <= MET * multiple:
-            break
-        multiple -= over
-        held = held.under(multiple * load)
-    return held, multiple
-
-
-def _overshoot(held: Held, load: Array, most: _Limits) -> float:
-    """How much less load would bring all that is beyond its cone or limit back to it."""
-    local, change, friction = held.grip.local_squeeze, held.grip.response @ load, held.grip.friction
-    across = np.linalg.norm(local[:, 1:], axis=1)
-    room, rates = most.room(held, load)
-    out = np.append(across - friction * local[:, 0], -room)
-    sliding = np.einsum("ki,ki->k", local[:, 1:], change[:, 1:]) / np.where(
-        across > 0.0, across, 1.0
-    )
-    rates = np.append(sliding - friction * change[:, 0], rates)
-    beyond = (out > 0.0) & (rates > 0.0)
-    return float(np.max(out[beyond] / rates[beyond], initial=0.0))
 
 
 def _ended(held: Held, multiple: float, event: Event, place: int) -> FirstSlip:

@@ -22,10 +22,7 @@ and the largest scale up to which no load makes contact i slip is a minimum over
 
     s_i = min over phi of (mu n0 - u.t0) / |B'u - mu a|.                                  (4)
 
-The load that makes contact i slip there is z = (B'u - mu a) / |B'u - mu a|. With R the numerator
-and L the square of the denominator, a quadratic form in (mu, u), the derivative of (4) vanishes
-where 2 R'L - R L' does, a trigonometric polynomial of degree three, so that (4) has at most three
-minima. They are bracketed on a grid and met by Newton steps.
+The load that makes contact i slip there is z = (B'u - mu a) / |B'u - mu a|.
 
 Whether (3) holds at a scale has a certificate, too. With n0 >= s |a|, (3) says that the quadratic
 (mu n(z))^2 - |t(z)|^2 is not negative on the ball, which by the S-lemma (lossless for one
@@ -35,6 +32,14 @@ quadratic) holds if and only if some tau >= 0 makes
 
 positive semidefinite: a number per contact, and eigenvalues of a small matrix to check it. The
 push of contact i stays between 0 and N where n0 - s |a| >= 0 and n0 + s |a| <= N.
+
+With R the numerator and L the square of the denominator of (4), a quadratic form in (-mu, u), the
+derivative of (4) vanishes where 2 R'L - R L' does. In powers of e = exp(i phi), with coefficients
+r_j of R and l_j of L, that is i times
+
+    sum_m p_m e^m,   p_m = sum_j (3 j - m) r_j l_(m - j),   p_-m = -conj(p_m),            (6)
+
+of degree two only, as p_3 = 0. So (4) has at most two minima, at angles of roots of a quartic.
 
 Source of the S-lemma: Polik & Terlaky, "A survey of the S-lemma", SIAM Review (2007).
 """
@@ -56,15 +61,13 @@ from grasp_core.solvers.ties import first_best
 
 GRAVITY_M_PER_S2 = 9.80665
 """Standard gravity."""
-ANGLES = 96
-"""Directions of the grid on which minima of (4) are bracketed."""
-MINIMA = 3
-"""Most minima of (4) over the circle."""
-NEWTON_STEPS = 12
-"""Each halves the bracket at least; from a good start four reach rounding."""
-GOLDEN_STEPS = 70
-"""Golden sections for a multiplier, each to 0.62 of the interval: down to rounding."""
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+VANISHING = 1e-9
+"""Size of the first coefficient of (6), relative to the largest, that takes the place of a smaller
+one: roots move by as much, and (4) by its square."""
+FIRST_ANGLE = -0.1
+"""Where angles are counted from, far from those of symmetric grasps [rad]."""
+HALVINGS = 50
+"""Halvings of the interval of a multiplier, down to rounding."""
 ROUNDING = 1e-12
 """Least eigenvalue of (5) that counts as none, relative to its largest entry: a thousand times
 what rounding leaves. Forces near the tip of a cone may leave it by its root, a millionth."""
@@ -141,38 +144,44 @@ class Reactions:
         """How far each push changes at scale one, |a|, (k,) [N]."""
         return np.linalg.norm(self.change[:, 0], axis=1)
 
-    @cached_property
-    def _form(self) -> Array:
-        """L of (4) as a quadratic form in (mu, u), (k, 3, 3)."""
-        return self.change @ self.change.transpose(0, 2, 1)
-
-    def room(self, angles: Array) -> Array:
-        """Compute mu n0 - u.t0 of (3) at angles of each contact, (k, g) [N]."""
-        n, t = self.start[:, 0, None], self.start[:, 1:]
-        across = np.cos(angles) * t[:, :1] + np.sin(angles) * t[:, 1:]
-        return self.friction[:, None] * n - across
-
     def scales(self, angles: Array) -> Array:
         """Compute the scales of (4) at angles of each contact, (k, g)."""
-        room, L = self.room(angles), self._length(angles)[0]
+        mu = np.broadcast_to(self.friction[:, None], angles.shape)
+        weights = np.stack([-mu, np.cos(angles), np.sin(angles)], axis=2)
+        room = -np.einsum("kgi,ki->kg", weights, self.start)
+        length = np.linalg.norm(weights @ self.change, axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = room / np.sqrt(L)
-        return np.where(L > 0.0, found, np.where(room >= 0.0, np.inf, -np.inf))
+            found = room / length
+        return np.where(length > 0.0, found, np.where(room >= 0.0, np.inf, -np.inf))
 
     def worst_angles(self) -> tuple[Array, Array]:
         """Find an angle of the least scale (4) of each contact, (k,), by `ties`, and that scale."""
-        k, step = len(self.friction), 2.0 * np.pi / ANGLES
-        grid = np.tile(np.linspace(0.0, 2.0 * np.pi, ANGLES, endpoint=False), (k, 1))
-        values = self.scales(grid)
-        lowest = values <= np.minimum(np.roll(values, 1, axis=1), np.roll(values, -1, axis=1))
-        order = np.argsort(np.where(lowest, values, np.inf), axis=1, kind="stable")[:, :MINIMA]
-        starts = np.take_along_axis(grid, order, axis=1)
         # the worst where nothing changes
         across = np.arctan2(self.start[:, 2:], self.start[:, 1:2])
-        angles = np.hstack([across, self._polished(starts, step), starts])
+        angles = np.hstack([across, self._level_angles()])
         found = self.scales(angles)
         chosen = [first_best(-row) for row in found]
-        return angles[np.arange(k), chosen], found.min(axis=1)
+        return angles[np.arange(len(angles)), chosen], found.min(axis=1)
+
+    def _level_angles(self) -> Array:
+        """Find the angles of the roots of (6), ascending, (k, 4)."""
+        k, form = len(self.friction), self.change @ self.change.transpose(0, 2, 1)
+        # (-mu, u) is the middle, plus e times the turning part, plus the conjugate of that
+        middle, turning = np.outer(-self.friction, np.eye(3)[0]), np.array([0.0, 0.5, -0.5j])
+        r0, r1 = self.friction * self.start[:, 0], -self.start @ turning
+        l0 = np.einsum("ki,kij,kj->k", middle, form, middle)
+        l0 = l0 + 2.0 * (turning @ form @ turning.conj()).real
+        l1 = 2.0 * np.einsum("ki,kij,j->k", middle, form, turning)
+        l2 = turning @ form @ turning
+        p2, p1 = r1 * l1 - 2.0 * r0 * l2, 2.0 * r1 * l0 - r0 * l1 - 4.0 * r1.conj() * l2
+        p0 = 6j * (r1 * l1.conj()).imag
+        sizes = np.abs([p2, p1, p0]).max(axis=0)
+        least = VANISHING * np.where(sizes > 0.0, sizes, 1.0)
+        leading = np.where(np.abs(p2) > least, p2, least)
+        companion = np.tile(np.eye(4, k=-1, dtype=complex), (k, 1, 1))
+        companion[:, 0] = -np.stack([p1, p0, -p1.conj(), -p2.conj()], axis=1) / leading[:, None]
+        angles = np.asarray(np.angle(np.linalg.eigvals(companion)), dtype=np.float64)
+        return np.sort((angles - FIRST_ANGLE) % (2.0 * np.pi), axis=1) + FIRST_ANGLE
 
     def worst_of(self, contact: int, angle: float) -> Array:
         """Find the z at which a contact slips first in a direction, of unit length, (m,)."""
@@ -192,10 +201,12 @@ class Reactions:
         """Find tau for `survives`, (k,) [N^2]: those with the largest least eigenvalue of (5)."""
         M, ball = self._certificates(scale)
         low, high = np.zeros(len(M)), np.maximum(M[:, 0, 0], 0.0)
-        for _ in range(GOLDEN_STEPS):
-            inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
-            left, right = np.linalg.eigvalsh(M - inner[..., None, None] * ball)[..., 0]
-            low, high = np.where(left < right, (inner[0], high), (low, inner[1]))
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            # the least eigenvalue changes by minus its vector's form of the ball
+            least = np.linalg.eigh(M - middle[:, None, None] * ball)[1][..., 0]
+            rising = np.einsum("ki,ij,kj->k", least, ball, least) < 0.0
+            low, high = np.where(rising, (middle, high), (low, middle))
         return 0.5 * (low + high)
 
     def _certificates(self, scale: float) -> tuple[Array, Array]:
@@ -204,32 +215,3 @@ class Reactions:
         inside = self.friction[:, None, None] ** 2 * normal[:, :, None] * normal[:, None]
         ball = np.diag(np.append(1.0, -np.ones(rows.shape[2] - 1)))
         return inside - across.transpose(0, 2, 1) @ across, ball
-
-    def _length(self, angles: Array) -> tuple[Array, Array, Array]:
-        """Compute L of (4) and its two derivatives at angles of each contact, (k, g) each."""
-        Q, mu = self._form[:, None], self.friction[:, None]
-        c, s = np.cos(angles), np.sin(angles)
-        mean, half = 0.5 * (Q[..., 1, 1] + Q[..., 2, 2]), 0.5 * (Q[..., 1, 1] - Q[..., 2, 2])
-        c2, s2 = c * c - s * s, 2.0 * c * s
-        twist, p, q = Q[..., 1, 2], -2.0 * mu * Q[..., 0, 1], -2.0 * mu * Q[..., 0, 2]
-        L = mu**2 * Q[..., 0, 0] + mean + half * c2 + twist * s2 + p * c + q * s
-        first = 2.0 * (twist * c2 - half * s2) - p * s + q * c
-        second = -4.0 * (half * c2 + twist * s2) - p * c - q * s
-        return np.maximum(L, 0.0), first, second
-
-    def _polished(self, angles: Array, step: float) -> Array:
-        """Improve angles that are within a step of minima of (4), by bracketed Newton steps."""
-        low, high = angles - step, angles + step
-        slack = self.friction[:, None] * self.start[:, :1]
-        for _ in range(NEWTON_STEPS):
-            R = self.room(angles)
-            quarter = self.room(angles + 0.5 * np.pi)
-            R1, R2 = quarter - slack, slack - R
-            L, L1, L2 = self._length(angles)
-            slope, bend = 2.0 * R1 * L - R * L1, 2.0 * R2 * L + R1 * L1 - R * L2
-            high, low = np.where(slope > 0.0, angles, high), np.where(slope > 0.0, low, angles)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                newton = angles - slope / bend
-            inside = (newton >= low) & (newton <= high)  # nor if it is not a number
-            angles = np.where(inside, newton, 0.5 * (low + high))
-        return angles

@@ -123,15 +123,18 @@ class InnerPolytope(Declared):
 
     def proved_radius(self, wrenches: WrenchSet) -> float:
         """Return the radius if the simplices enclose zero, and minus infinity otherwise."""
+        return self.radius_between(self.forces @ wrenches.G.T)
+
+    def radius_between(self, points: Array) -> float:
+        """Return the radius that simplices between points prove, in any number of dimensions."""
         if not 0 < len(self.normals) == len(self.corners) or not self._even():
             return -np.inf
-        points = self.forces @ wrenches.G.T
         lowest, highest = self._heights(points)
         radius = float(lowest.min())
         farthest = float(np.linalg.norm(points, axis=1).max())
         if not radius > LOST * farthest:
             return -np.inf
-        for ray in _units(RAYS):
+        for ray in _units(RAYS[:, : points.shape[1]]):
             crossed = self._crossed(points, lowest, highest, ray)
             if crossed is not None:
                 return radius if crossed % 2 == 1 else -np.inf

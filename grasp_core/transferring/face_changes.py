@@ -153,10 +153,7 @@ def changes_in_words(
     added: Sequence[int] = (),
     numbers: Mapping[int, int] | None = None,
 ) -> str:
-    """Say in one line which faces moved, the farthest first, and count the other changes.
-
-    Faces are called by `numbers`, which are theirs on another part; None for their own.
-    """
+    """Say which faces moved, by numbers on another part if given, and count the other changes."""
     moved = sorted(
         (change for change in changes if change.moved),
         key=lambda change: (change.new is not None, -abs(change.distance), change.old),

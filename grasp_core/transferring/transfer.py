@@ -317,11 +317,7 @@ class _Judge:
 
 
 def judged(seated: Seated, friction: float, name: str) -> tuple[GraspFigures | None, Grasp | str]:
-    """Judge contacts on the faces of a part; make a grasp of them, or say why they make none.
-
-    The forces of a certificate may all meet, as at the face centres of a regular solid, so the
-    grasp gets balanced forces whose lines are skew. There are no figures if closure is undecided.
-    """
+    """Judge contacts on the faces of a part; make a grasp of them, or say why they make none."""
     try:
         found = grasp_of(seated, friction, name)
         if isinstance(found, ClosureCertificate):
@@ -341,6 +337,7 @@ def judged(seated: Seated, friction: float, name: str) -> tuple[GraspFigures | N
     ]
     positions, none = (found.positions - center) / size, np.empty((0, 3))
     plain = Placement(positions, found.witness.forces, none, np.zeros(FINGERS), 0.0)
+    # the forces of a certificate may all meet, as at the face centres of a regular solid
     for draw in range(DRAWS):
         skew = of_general_type(pieces, plain, friction, np.random.default_rng(draw))
         if skew is not None:
@@ -387,10 +384,7 @@ SAME_LENGTH = 1e-6
 
 
 def as_read(old: Polyhedron) -> dict[str, Any]:
-    """Return the keywords of `load_polyhedron` that read a changed part as the old one was read.
-
-    Faces are planar. A centre of mass that was given is kept; else it is that of uniform density.
-    """
+    """Return the keywords of `load_polyhedron` that read a changed part as the old one was read."""
     return {
         "faces": "planar",
         "largest_part": old.surface.dropped > SMALL,
@@ -423,10 +417,7 @@ def fitting_unit(
 def fitting_lengths(
     path: Path, body: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS
 ) -> tuple[str, float]:
-    """Find a unit and a scale at which a mesh file is as large as the body that was read from it.
-
-    Unless the scale is 1, the unit is the metre, and the scale has nine digits.
-    """
+    """Find a unit and a scale at which a mesh file is as large as the body read from it."""
     length = float(f"{1.0 / _times(path, body, limits):.9g}")
     for unit, metres in UNITS_M.items():
         if math.isclose(length, metres, rel_tol=SAME_LENGTH):

@@ -120,10 +120,7 @@ class HeldMotion(Rows):
 
     @cached_property
     def pushes(self) -> Array:
-        """Contact forces on the object, (n, k, 3) [N], in the frames of the contacts.
-
-        They turn with the object: normal, tangent, tangent.
-        """
+        """Contact forces on the object in its contacts' frames, which turn with it, (n, k, 3)."""
         along = np.einsum("kij,nkj->nki", self.layout.axes, self.forces)
         own = np.einsum("nji,nkj->nki", self.pressed, along)
         return np.einsum("kij,nki->nkj", self.layout.frames, own)
@@ -389,8 +386,5 @@ def _under_full_load(forces: Array, shares: Array, friction: Array, begun: int) 
 
 def _extrapolated(forces: Array, shares: Array, friction: Array, begun: int, at: Indices) -> Array:
     """Return the multiple of the load at first slip as it is seen in samples `at`, (m,)."""
-    rest, count = forces[begun], len(at)
-    changes = (forces[at] - rest).reshape(-1, 3)
-    steps = slip_steps(np.tile(rest, (count, 1)), changes, np.tile(friction, count))
-    least = steps.reshape(count, -1).min(axis=1)
-    return np.multiply(shares[at], least, out=np.full(count, np.inf), where=np.isfinite(least))
+    least = slip_steps(forces[begun], forces[at] - forces[begun], friction).min(axis=1)
+    return np.multiply(shares[at], least, out=np.full(len(at), np.inf), where=np.isfinite(least))

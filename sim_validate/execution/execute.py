@@ -80,15 +80,12 @@ def confirming_bench(bench: HeldBench) -> HeldBench | None:
 def run_again(
     bench: HeldBench, motions: Mapping[Trial, HeldMotion], settings: ExecutionSettings
 ) -> dict[Trial, HeldMotion]:
-    """Simulate trials with short steps from before their trouble on.
-
-    A trial that starts to move when its weight has come has its speed in later states; one that
-    goes on from before gets it at once, as uniform motion changes nothing.
-    """
+    """Simulate trials with short steps from before their trouble on."""
     begins = [_begin(trial, motion) for trial, motion in motions.items()]
     drives, starts = list[Drive](), list[Array]()
     for (trial, motion), begin in zip(motions.items(), begins, strict=True):
         rest = trial.drive.rows(slice(begin + 1, None))
+        # later states have the speed of a trial that starts to move when its weight has come
         velocity = rest.velocity if begin < trial.weighing else np.zeros(3)
         lost = _lost(motion, trial.begun, settings)
         drives.append(replace(rest, velocity=velocity, lost=lost))
@@ -101,11 +98,7 @@ def run_again(
 
 
 def _begin(trial: Trial, motion: HeldMotion) -> int:
-    """Return the sample after which a trial is run again.
-
-    It is the first where fingers that close do not come to hold the object, and where contacts slip
-    within samples only, so that nothing says when.
-    """
+    """Return the sample after which a trial is run again, zero if nothing says when it slips."""
     layout = motion.layout
     pushing = np.linalg.norm(layout.pushes, axis=1) > IDLE * float(np.abs(layout.pushes).max())
     if (motion.forces[trial.begun, pushing] == 0.0).all(axis=1).any():
@@ -115,10 +108,7 @@ def _begin(trial: Trial, motion: HeldMotion) -> int:
 
 
 def _lost(motion: HeldMotion, begun: int, settings: ExecutionSettings) -> tuple[float, float]:
-    """Return how far from its planned place an object surely is too far from where it was.
-
-    Gives a distance [m] and an angle [rad].
-    """
+    """Return how far from its planned place [m, rad] an object surely is lost."""
     (cosine,) = cosines(motion.turns[begun : begun + 1])
     angle = math.acos(min(max(float(cosine), -1.0), 1.0))
     away = float(np.linalg.norm(motion.shifts[begun]))
@@ -294,12 +284,7 @@ def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> dict[Trial, HeldMot
 def _with_first_slips(
     bench: HeldBench, judged: Mapping[Trial, ExecutionTrial]
 ) -> tuple[ExecutionTrial, ...]:
-    """Measure at which multiple of its load a contact first slips where all of it comes at once.
-
-    Its share of the load is one when a contact slips, however little of the load's peak that takes.
-    So the trial is followed again with contacts that stick: their forces, beside the cones of the
-    true friction, tell the multiple.
-    """
+    """Measure the first slip of loads that come at once, by contacts that stick (see `bench`)."""
     known, friction = dict(judged), bench.scene.layout.friction
     rough = {
         replace(trial, drive=replace(trial.drive, friction=STICKING * friction)): trial
@@ -418,10 +403,7 @@ VISIBLE_M = 1e-4
 
 
 def worth_seeing(found: Execution) -> tuple[ExecutionTrial, ...]:
-    """Choose the trials to film: the lift, the worst shake, and the worst slip that can be seen.
-
-    Shakes that slip before they differ are ordered by their predictions.
-    """
+    """Choose the trials to film: the lift, the worst shake, and the worst slip that can be seen."""
     shakes = sorted(
         found.of_kind("shake"),
         key=lambda each: (each.survived, each.simulated_first_slip, each.predicted_first_slip),

@@ -47,6 +47,7 @@ from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.kinds import SMALLEST
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.objects.surface import areas_and_normals
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.fingertips import fitting_radius
@@ -111,11 +112,8 @@ class HeldCase:
 
     @property
     def light_n(self) -> float:
-        """A load along each axis at once under which no fingertip slips or lifts off [N].
-
-        Each contact takes a quarter q of it along each axis, and slips if 2^.5 q >= mu (N - q).
-        """
-        mu = self.friction
+        """A load along each axis at once under which no fingertip slips or lifts off [N]."""
+        mu = self.friction  # a contact takes q, a quarter, and slips if 2^.5 q >= mu (N - q)
         return LIGHT * FINGERS * self.push * mu / (math.sqrt(2.0) + mu)
 
     @property
@@ -306,11 +304,7 @@ def _creep(case: HeldCase, motion: HeldMotion) -> Check:
 
 
 def _jumps(case: HeldCase, motion: HeldMotion) -> Check:
-    """Check the contact forces while a load comes and goes suddenly, sample by sample.
-
-    The simulator may be one step of h late: after each jump x'' changes by (1 + 2 zeta) w h of the
-    jump in a step.
-    """
+    """Check the contact forces while a load comes and goes suddenly, sample by sample."""
     load, w, zeta = JUMP_SHARE * case.light_n, case.frequency, case.damping_ratio
     share = case.object_kg / case.moving_kg
     linalg: Any = importlib.import_module("scipy.linalg")
@@ -326,6 +320,7 @@ def _jumps(case: HeldCase, motion: HeldMotion) -> Check:
     right = load * (applied - share * np.array(accelerations))
     carried = -np.einsum("kj,nkj->n", motion.layout.axes[:, 0], motion.forces)
     off = float(np.abs(carried - right).max()) / load
+    # the simulator may be one step late, in which x'' changes by (1 + 2 zeta) w h of the jump
     late = (1.0 + 2.0 * zeta) * w * held_physics(motion.layout).timestep * share
     name = "error of contact forces while a load comes and goes suddenly, over the load"
     return little(name, motion, off, late)
@@ -374,10 +369,8 @@ def _modes(case: HeldCase, inertia: Array) -> Array:
 
 
 def ring_frequency(points: Array, about: float, sample_s: float) -> float:
-    """Return the frequency of a decaying ring about an unknown middle [rad/s].
-
-    Points at equal times t obey x_2 = p x_1 - q x_0 + r with p = 2 sqrt(q) cos(w t).
-    """
+    """Return the frequency of a decaying ring about an unknown middle [rad/s]."""
+    # points at equal times t obey x_2 = p x_1 - q x_0 + r with p = 2 sqrt(q) cos(w t)
     stride = max(1, int(RADIANS / (about * sample_s)))
     first, second, third = points[: -2 * stride], points[stride:-stride], points[2 * stride :]
     scale = float(np.abs(points).max())
@@ -524,6 +517,5 @@ def _centroid(corners: Array) -> tuple[Array, float]:
     triangles = np.array(
         [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
     )
-    crosses = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    areas = 0.5 * np.linalg.norm(crosses, axis=1)
+    areas, _ = areas_and_normals(triangles)
     return areas @ triangles.mean(axis=1) / areas.sum(), float(areas.sum())

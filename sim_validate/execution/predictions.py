@@ -109,10 +109,7 @@ class HeldDynamics:
     def losses(
         self, trials: Sequence[Trial], settings: ExecutionSettings
     ) -> list[tuple[float, float]]:
-        """Return the multiples of each trial's load of the first slip, and of loss.
-
-        Both are zero where the grip is unstable at rest.
-        """
+        """Return the multiples of each trial's load of the first slip, and of loss."""
         if not trials or not self.grip.stable:
             return [(0.0, 0.0)] * len(trials)
         most_m, most_rad = settings.most_m, settings.most_rad
@@ -136,9 +133,8 @@ class HeldDynamics:
             loads[place, : len(drive)], bases[place, : len(drive)] = self._load(drive)
         grip, found = self.grip, list[Expected]()
         for every, changes, count in zip(*self._responses(loads, bases), lengths, strict=True):
-            rest, friction = np.tile(grip.local_squeeze, (count, 1)), np.tile(grip.friction, count)
-            steps = slip_steps(rest, changes[:count].reshape(-1, 3), friction)
-            slips, motion = steps.reshape(count, -1).min(axis=1), every[:count]
+            motion = every[:count]
+            slips = slip_steps(grip.local_squeeze, changes[:count], grip.friction).min(axis=1)
             found.append(
                 Expected(
                     first_slip=float(slips.min()),
@@ -150,12 +146,10 @@ class HeldDynamics:
         return found
 
     def _load(self, drive: Drive) -> tuple[Array, Array]:
-        """Return w of (2), (n, 6), and the accelerations b_i, (n, k, 3), in the palm's axes.
-
-        A table carries the object until its share of the load is one.
-        """
+        """Return w of (2), (n, 6), and the accelerations b_i, (n, k, 3), in the palm's axes."""
         layout, turning = self.layout, drive.accelerations[:, 3:]
         angles = SAMPLE_S * np.cumsum(SAMPLE_S * np.cumsum(turning, axis=0), axis=0)
+        # a table carries the object until its share of the load is one
         share = drive.shares if drive.table is not None else np.ones(len(drive))
         load = drive.wrenches.copy()
         # the palm's angles are about one axis at a time
@@ -244,11 +238,7 @@ class Holder(ABC):
         """Build the scene in which a squeeze is executed."""
 
     def squeeze(self, settings: ExecutionSettings, loads: LoadSet | None = None) -> BestSqueeze:
-        """Choose the squeeze that carries the most of the weight in any direction.
-
-        With loads it is the one of the least push that survives them, however hard fingers may
-        push.
-        """
+        """Choose the squeeze of most weight in any direction, or of least push for given loads."""
         start, motors = self.loose(settings)
         most = settings.push_n if loads is None else None
         best = searched(start, loads or any_direction(settings.object_kg), most, motors)
@@ -312,12 +302,7 @@ def found_enough(holder: Holder, settings: ExecutionSettings) -> Enough:
 
 
 def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
-    """Compute the largest acceleration of each kind of trial [9.80665 m/s^2].
-
-    It is the palm's, at the object's radius where the palm turns. That of shakes is the one asked
-    for, which samples of the sinusoid miss by up to some per cent. For a knock it is that of the
-    object if nothing held it.
-    """
+    """Compute the largest acceleration of each kind of trial, in units of gravity."""
     gravity, way = gravity_of(settings), np.array([1.0, 0.0, 0.0])
     stop = paths.stop(gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
     lift, _ = paths.lift(way, settings.lift_m, settings.lift_s)
@@ -327,6 +312,7 @@ def accelerations_g(settings: ExecutionSettings) -> dict[str, float]:
         **dict.fromkeys(("shake along", "shake about"), settings.shake_g),
         "lift": _largest(lift.accelerations),
         "stop": _largest(stop.accelerations),
+        # of an object that nothing holds
         "knock": _largest(knock.wrenches) / settings.object_kg,
     }
 

@@ -109,11 +109,8 @@ def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: floa
 
 
 def _near(layout: HeldLayout, middles: Array, room: float) -> Indices:
-    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others.
-
-    If the surface is at a distance d from a middle, it is at most d + room from such a point, so
-    that a triangle farther than d + 2 room from the middle is not the nearest.
-    """
+    """Return the triangles, (t, 3), that can be the nearest to a point within `room` of others."""
+    # with the surface at d from a middle, one beyond d + 2 room from it is nowhere the nearest
     corners = layout.vertices[layout.triangles]
     nearest = nearest_on_surface(layout.vertices, layout.triangles, middles)
     reach = np.linalg.norm(nearest - middles, axis=1) + 2.0 * room + MET * layout.radius_m
@@ -156,10 +153,11 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
         )
         own = [facet for facet in np.flatnonzero(alike) if facet in left]
         left -= set(own)
-        triangles = points[hull.simplices[own]]
-        # the origin, dropped along the normal, falls into one of the triangles
-        if any(_is_inside(corners, normals[first]) for corners in triangles):
-            angles = solid_angles(triangles.transpose(2, 1, 0), np.zeros((1, 3)))
+        # the origin, dropped along the normal, stays on the inner side of all other faces
+        foot = offsets[first] * normals[first]
+        if (alike | (normals @ foot <= offsets)).all():
+            corners = points[hull.simplices[own]].transpose(2, 1, 0)
+            angles = solid_angles(corners, np.zeros((1, 3)))
             share = float(np.abs(angles).sum() / (4.0 * np.pi))
             found.append(Rest(normals[first], float(offsets[first]) * body.radius, share))
     order = largest_first([rest.likelihood for rest in found])
@@ -172,11 +170,6 @@ def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
         if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:
             return rest
     return None
-
-
-def _is_inside(corners: Array, normal: Array) -> bool:
-    sides = np.cross(np.roll(corners, -1, axis=0) - corners, -corners) @ normal
-    return bool((sides >= 0.0).all() or (sides <= 0.0).all())
 
 
 AXES = ("x", "y", "z")
@@ -348,14 +341,10 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
 
 
 def _sure(weaker: Grip, load: Array) -> float:
-    """Return the multiple of a load, at least one, that makes a weaker grip slip by analysis.
-
-    It is one where the grip slips at rest already, is unstable, never slips by analysis, or cannot
-    be followed; then nothing shows that the load suffices.
-    """
+    """Return the multiple of a load, at least one, that makes a weaker grip slip by analysis."""
     try:
         found = first_slip(weaker, load)
-    except (InputError, SolverError):
+    except (InputError, SolverError):  # nothing shows that the load suffices
         return 1.0
     return max(1.0, SURE * found.multiple) if np.isfinite(found.multiple) else 1.0
 
@@ -370,11 +359,7 @@ def idle(grip: Grip, finger: int, push: Array) -> Grip:
 
 
 def slipping_load(best: BestSqueeze) -> Array:
-    """Return the least load of a set that makes a contact slip, (6,) [N, N m].
-
-    It is larger than the worst certified load where a finger reaches its largest push before any
-    contact slips: the simulated fingers push as hard as their springs do.
-    """
+    """Return the least load of a set that makes a contact slip, (6,), whatever the largest push."""
     reactions = Reactions.of(best.grip, best.loads)
     angles, scales = reactions.worst_angles()
     contact = first_best(-scales)

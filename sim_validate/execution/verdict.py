@@ -366,11 +366,7 @@ def load_executions(path: str | Path) -> Executions:
 
 
 def best_executed(grasps: Iterable[ExecutedGrasp]) -> ExecutedGrasp | None:
-    """Return the grasp with the largest of the least predicted losses among those that survived.
-
-    A grasp whose negative control held does not count. Of equal ones the first is taken; None if
-    no grasp survived.
-    """
+    """Return the grasp with the largest least predicted loss of those that survived, if any."""
     kept = [grasp for grasp in grasps if grasp.survived and grasp.controls_let_go]
     losses = [grasp.least_predicted_loss for grasp in kept]
     return kept[first_best(losses)] if kept else None

@@ -166,9 +166,6 @@ def _show(found: Reaches, reporter: Reporter) -> None:
 
 def carried(hand: Hand, body: Polyhedron, reach: HandReach, friction: float) -> CarriedMass | None:
     """Find the mass held in any orientation; None if the hand is not known well enough or weak."""
-    unknown = any(link.mass_kg is None or link.center_of_mass is None for link in hand.links)
-    if unknown or any(joint.torque_limit_n_m is None for joint in hand.free_joints):
-        return None
     with suppress(InputError, SolverError):  # a figure beside the pose, which is there without it
         return CarriedMass.of(hand_payload(hand, body, reach, friction, max_push_n=MOST_PUSH_N))
     return None

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from grasp_core.execution.carried_mass import ball_in, nearest_facet, outward
+from grasp_core.execution.carried_mass import ball_in, nearest_facet
 
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
 INSIDE = 1.0 / np.sqrt(3.0)
@@ -11,8 +11,7 @@ INSIDE = 1.0 / np.sqrt(3.0)
 
 
 def faces():
-    _, _, triangles = nearest_facet(OCTAHEDRON)
-    return outward(OCTAHEDRON, triangles)
+    return nearest_facet(OCTAHEDRON)[2]
 
 
 def test_the_ball_in_an_octahedron_touches_its_faces():
@@ -31,8 +30,7 @@ def test_the_ball_is_in_the_hull_of_random_points():
         _, distance, triangles = nearest_facet(points)
         if distance <= 0.0:
             continue
-        turned = outward(points, triangles)
-        assert ball_in(points, turned) == pytest.approx(distance, rel=1e-9)
+        assert ball_in(points, triangles) == pytest.approx(distance, rel=1e-9)
         normals = rng.normal(size=(1000, 3))
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         assert (points @ normals.T).max(axis=0).min() >= distance
@@ -46,10 +44,9 @@ def test_triangles_that_are_not_closed_around_the_origin_show_no_ball():
     twice = np.vstack([good, good])
     flat = OCTAHEDRON * np.array([1.0, 1.0, 0.0])
     for points, triangles in (
-        (OCTAHEDRON, good[1:]), (OCTAHEDRON, good[:, ::-1]), (OCTAHEDRON, twice),
-        (OCTAHEDRON, good + 1), (OCTAHEDRON, good - 1), (OCTAHEDRON, good[:0]), (far, good),
-        (flat, good), (OCTAHEDRON, None), (OCTAHEDRON, good.astype(float)),
-        (OCTAHEDRON, np.vstack([good[:1, ::-1], good[1:]])),
+        (OCTAHEDRON, good[1:]), (OCTAHEDRON, twice), (OCTAHEDRON, good + 1),
+        (OCTAHEDRON, good - 1), (OCTAHEDRON, good[:0]), (far, good), (flat, good),
+        (OCTAHEDRON, np.vstack([good[:1], good[1:, ::-1], good[:1, ::-1]])),
     ):  # fmt: skip
         assert not ball_in(points, triangles) > 0.0
 
