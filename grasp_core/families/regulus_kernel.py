@@ -164,7 +164,7 @@ def pair_frames(fingers: Fingers) -> PairFrames:
     return frames
 
 
-@loop()
+@loop(once=True)
 def _facets_along(fingers: Fingers, pair: int, frames: PairFrames) -> Array:
     """Compute normals of the facets of a pair's pyramids along u, v, N, (2, facets, 3)."""
     found = np.empty((2, len(TURNS), 3))
@@ -178,7 +178,7 @@ def _facets_along(fingers: Fingers, pair: int, frames: PairFrames) -> Array:
     return found
 
 
-@loop()
+@loop(once=True)
 def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool:
     """Find the rows alpha x + beta z >= 0 that bound z / |x|, for x on the resultant's side."""
     lower, upper = -np.inf, np.inf
@@ -266,7 +266,7 @@ def take(
     placed.ends[a], placed.merits[a] = PLACED, merit
 
 
-@loop()
+@loop(once=True)
 def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[float, int]:
     """Solve the programs for p > gap and p < -gap; return the better bound and its side."""
     either = _bounded(rows, worth, vertex)
@@ -328,7 +328,7 @@ def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tupl
     return rows, LEAST_GAP / steepest
 
 
-@loop()
+@loop(once=True)
 def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
     edge, frame, E = np.empty(3), fingers.frames[i], fingers.E[i]
@@ -341,7 +341,7 @@ def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> i
     return row
 
 
-@loop()
+@loop(once=True)
 def _offset_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (5), which make t the largest offset from the middle of the face."""
     along = np.empty(3)

@@ -193,7 +193,7 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
     return place == len(deeds)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _is_division(nodes: Nodes, deed: int) -> bool:
     """Return whether a deed divides a finger's pieces, or its polygon where it is on one piece."""
     if BY_PIECES <= deed < BY_PIECES + FINGERS:
@@ -203,7 +203,7 @@ def _is_division(nodes: Nodes, deed: int) -> bool:
     return (nodes.counts[nodes.top[0] - 1, deed - BY_LINE] > 0).sum() <= 1
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _answered(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
     """Put one node for each named finger in the last node's place; return False if it is wrong."""
     corners, counts = nodes.corners, nodes.counts
@@ -221,7 +221,7 @@ def _answered(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bo
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _do_others(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
     """Return whether a finger of the last node may answer for which no named one stands."""
     corners, counts, fresh = nodes.corners, nodes.counts, nodes.fresh
@@ -258,7 +258,7 @@ def _support(pieces: Pieces, p: int, a: float, b: float, y: Array) -> float:
     return n[0] * u0 + n[1] * u1 + n[2] * u2 + slide
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _cut(pieces: Pieces, p: int, corners: Array, count: int, y: Array, t: float) -> int:
     """Cut a polygon to where a contact answers, in its place; return how many corners are left."""
     heights, reached = np.empty(ROOM), 0

@@ -92,7 +92,7 @@ def answer_to(search: Search, k: int) -> float:
     return search.t * search.pool.demands[k] - search.spare
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def is_full(stack: Nodes, tree: Tree) -> bool:
     """Return whether there is no room for what one more node may need."""
     return (
@@ -138,7 +138,7 @@ def divide(search: Search) -> bool:
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _largest(stack: Nodes, node: int) -> tuple[int, int, float]:
     """Return the finger that has most room, on how many pieces it is, and how large they are."""
     largest, chosen, several, ends = 0.0, 0, 1, np.empty(2, np.int64)
@@ -154,7 +154,7 @@ def _largest(stack: Nodes, node: int) -> tuple[int, int, float]:
     return chosen, several, largest
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _bisect(stack: Nodes, node: int, i: int, line: Array) -> None:
     """Fill in the line across the longest diagonal of a finger's polygon."""
     ends = np.empty(2, np.int64)
@@ -168,7 +168,7 @@ def _bisect(stack: Nodes, node: int, i: int, line: Array) -> None:
                 line[2] += 0.5 * line[j] * (one + two)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def look_again(search: Search, node: int) -> None:
     """Fill in what has changed about the fingers of a node since the last one."""
     stack, work, size = search.stack, search.work, search.pool.size[0]
@@ -368,7 +368,7 @@ def run(search: Search, budget: int, part_depth: int) -> int:
     return PAUSED
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _visit(search: Search, node: int, now: int) -> bool:
     """Replace a node by children; False if its middle may reach t, or it is tiny (on[0] < 0)."""
     look_again(search, node)
@@ -389,7 +389,7 @@ def _visit(search: Search, node: int, now: int) -> bool:
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _is_single(search: Search, node: int) -> bool:
     """Return whether each finger is on one piece, and fill in on which."""
     for i in range(FINGERS):
@@ -402,7 +402,7 @@ def _is_single(search: Search, node: int) -> bool:
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
     """Lower what all corners of a node resist; return it, and the new twist or -1."""
     work, stack, pieces = search.work, search.stack, search.pieces
@@ -428,7 +428,7 @@ def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
     return _descended(search, node, points[:m], on, (first, least), STEPS, now)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
     """Lower what contacts in a node's middle resist; return it, and the new twist or -1."""
     pieces, pool, work = search.pieces, search.pool, search.work
