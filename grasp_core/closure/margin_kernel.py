@@ -41,9 +41,9 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.compiled import loop
-from grasp_core.geometry.vectors_kernel import copy
 
 MOST_STEPS = 40
 """Most Newton steps; ten are usual."""

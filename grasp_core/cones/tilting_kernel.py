@@ -3,9 +3,10 @@
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.cones.spanning_kernel import span_sine
-from grasp_core.geometry.vectors_kernel import copy, cross, dotted
+from grasp_core.geometry.vectors_kernel import cross, dotted
 from grasp_core.values import FINGERS
 
 CAPS = (0.3, 0.5, 0.7, 0.9)

@@ -46,6 +46,7 @@ Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is thi
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import (
     TURNS,
@@ -59,7 +60,7 @@ from grasp_core.families.discs_kernel import (
 )
 from grasp_core.families.placements import Attempts, FaceTable, Fingers, Footprints, Placed
 from grasp_core.geometry.polygons import ON_LINE
-from grasp_core.geometry.vectors_kernel import copy, dotted
+from grasp_core.geometry.vectors_kernel import dotted
 from grasp_core.values import FINGERS
 
 Y, RADII, VARIABLES = 3, 11, 15

@@ -255,13 +255,18 @@ def take(
     placed.foci[a] = 0.0
     for finger in range(FINGERS):
         line, n = _line(frames, choice[:2], finger), fingers.normals[finger]
-        passing = x[:3] + x[K] * line.k + x[P] * line.p
-        ways[finger] = x[X + line.pair] * line.x + x[Z + line.pair] * line.z
-        contact = passing - ways[finger]
+        contact, way = placed.positions[a, finger], ways[finger]
+        for d in range(3):
+            passing = x[d] + x[K] * line.k[d] + x[P] * line.p[d]
+            way[d] = x[X + line.pair] * line.x[d] + x[Z + line.pair] * line.z[d]
+            contact[d] = passing - way[d]
+            placed.foci[a, line.pair, d] += 0.5 * passing
         # takes away what the program's answer may be off the plane
-        off = dotted(n, contact - fingers.origins[finger])
-        placed.positions[a, finger] = contact - off * n
-        placed.foci[a, line.pair] += 0.5 * passing
+        off = 0.0
+        for d in range(3):
+            off += n[d] * (contact[d] - fingers.origins[finger, d])
+        for d in range(3):
+            contact[d] -= off * n[d]
     balance(ways, fingers.normals, placed.forces[a])
     placed.ends[a], placed.merits[a] = PLACED, merit
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
 from grasp_core.optimizing.replay_kernel import BY_LINE, BY_PIECES, Nodes, Pieces, branch, split
@@ -177,8 +178,8 @@ def look_again(search: Search, node: int) -> None:
         if changed not in (ALL, i):
             continue
         if stack.fresh[node, i] and twin >= 0:
-            work.reach[i, :size] = work.reach[twin, :size]
-            work.left[i, :size] = work.left[twin, :size]
+            copy(work.reach[twin, :size], work.reach[i])
+            copy(work.left[twin, :size], work.left[i])
             work.whole[i] = work.whole[twin]
             continue
         look(search, node, i, 0, size)
@@ -327,7 +328,7 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
     answering = _answering(search, node, k)
     if pool.names[k] < 0:
         pool.names[k] = tree.sizes[1]
-        tree.twists[tree.sizes[1]] = pool.twists[k]
+        copy(pool.twists[k], tree.twists[tree.sizes[1]])
         tree.sizes[1] += 1
     pool.used[k] = now
     note(tree, answering, pool.names[k])
@@ -346,7 +347,7 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
                 at, corners = pool.asked[p, :, k], stack.corners[place, i, p]
                 kept = cut(corners, count, at, pieces.friction, t, rest)
                 stack.counts[place, i, p] = kept
-                corners[:kept] = rest[:kept]
+                copy(rest[:kept], corners)
 
 
 @loop("numpy", beside=True)
@@ -421,7 +422,8 @@ def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
         count = stack.counts[node, i, p]
         work.middle[i] = 0.0
         for v in range(count):
-            work.middle[i] += stack.corners[node, i, p, v] / count
+            for d in range(2):
+                work.middle[i, d] += stack.corners[node, i, p, v, d] / count
             _place(pieces, p, stack.corners[node, i, p, v], points[m])
             on[m] = p
             m += 1
@@ -466,5 +468,6 @@ def _descended(
 
 @loop("numpy")
 def _place(pieces: Pieces, p: int, at: Array, point: Array) -> None:
-    frame = pieces.frames[p]
-    point[:] = pieces.origins[p] + frame[:, 0] * at[0] + frame[:, 1] * at[1]
+    origin, frame = pieces.origins[p], pieces.frames[p]
+    for d in range(3):
+        point[d] = origin[d] + frame[d, 0] * at[0] + frame[d, 1] * at[1]

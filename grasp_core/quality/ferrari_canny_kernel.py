@@ -19,13 +19,13 @@ simplices. A corner is found by the sums of corners, which are exact. Functions 
 the hull once: in loops that would cost more than the arithmetic.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy, longer
 from grasp_core.compiled import loop
-from grasp_core.geometry.vectors_kernel import copy
 
 D = 6
 """Number of coordinates of each point of the hull."""
@@ -210,18 +210,11 @@ def larger(hull: Hull) -> Hull:
     """Copy a hull with room for twice as many simplices and for all that one point can add."""
     room = 2 * len(hull.offsets) + D * hull.counts[0]
     return Hull(
-        _longer(hull.normals, room), _longer(hull.offsets, room), _longer(hull.corners, room),
-        _longer(hull.neighbors, room), _longer(hull.sums, room), _longer(hull.heights, room),
-        _longer(hull.rounds, room), _longer(hull.made, room), _longer(hull.seen, room),
-        _longer(hull.free, room), hull.counts,
+        longer(hull.normals, room), longer(hull.offsets, room), longer(hull.corners, room),
+        longer(hull.neighbors, room), longer(hull.sums, room), longer(hull.heights, room),
+        longer(hull.rounds, room), longer(hull.made, room), longer(hull.seen, room),
+        longer(hull.free, room), hull.counts,
     )  # fmt: skip
-
-
-@loop()
-def _longer(old: Any, room: int) -> Any:
-    new = np.empty((room, *old.shape[1:]), old.dtype)
-    copy(old, new[: len(old)])
-    return new
 
 
 @loop(once=True)

@@ -334,7 +334,8 @@ def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> t
             edge, a, b = edge_to_cut(cones[done], rays, weights)
             tree.codes[done] = edge
             # (4): the sum of the ends cuts the edge
-            rays[made] = rays[a] + rays[b]
+            for d in range(rays.shape[1]):
+                rays[made, d] = rays[a, d] + rays[b, d]
             fill_motions(made, rays, sites, axes, motions)
             bad[:] = 0.0
             for place in range(RAYS):

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
-from grasp_core.geometry.vectors_kernel import copy
 
 BOX = 1e3
 """Half the side of the box in which the search begins: data are of order one, and a program whose
