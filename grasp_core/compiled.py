@@ -50,9 +50,12 @@ KERNEL = "_kernel"
 
 
 def loop(
-    division: Literal["python", "numpy"] = "python", *, beside: bool = False
+    division: Literal["python", "numpy"] = "python", *, beside: bool = False, once: bool = False
 ) -> Callable[[Loop], Loop]:
-    """Declare a function that numba compiles on first use and keeps for later processes."""
+    """Declare a function that numba compiles on first use and keeps for later processes.
+
+    What is called at `once` place only is compiled there, and not by itself as well.
+    """
     numba: Any = importlib.import_module("numba")
     # what Python runs stays where debuggers look for it, and numba keeps no unoptimized code
     keeps = not numba.config.DISABLE_JIT and int(numba.config.OPT) > 0
@@ -62,7 +65,14 @@ def loop(
         copy = copy_of(function.__module__, code.co_filename) if keeps else None
         if copy is not None:
             function.__code__ = code.replace(co_filename=str(copy))
-        return numba.njit(function, error_model=division, nogil=beside, cache=copy is not None)
+        return numba.njit(
+            function,
+            error_model=division,
+            nogil=beside,
+            cache=copy is not None,
+            inline="always" if once else "never",
+            no_cfunc_wrapper=True,  # nobody calls a loop from C
+        )
 
     return declared
 

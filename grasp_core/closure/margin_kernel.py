@@ -41,6 +41,7 @@ import math
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.compiled import loop
 
@@ -79,7 +80,7 @@ def _depth_in_cone(v: Array, i: int) -> float:
     return (v[i, 0] - across) * (v[i, 0] + across) if v[i, 0] > 0.0 else -1.0
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def scale_to_middle(pair: Array, W: Array, middle: Array) -> bool:
     """Fill in W_i and their inverses, W_i z_i = inverse(W_i) s_i; False outside the cones."""
     s, z = pair[0], pair[1]
@@ -109,7 +110,7 @@ def scale_to_middle(pair: Array, W: Array, middle: Array) -> bool:
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def towards_the_middle(middle: Array, ahead: Array, product: float, wanted: Array) -> None:
     """Aim where the products become `product` e, given those of the step ahead."""
     s, z = ahead[0], ahead[1]
@@ -146,7 +147,7 @@ def longest_step(middle: Array, step: Array) -> float:
     return longest
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def take_step(pair: Array, W: Array, step: Array, share: float) -> None:
     """Move s and z by a share of a scaled step, which the maps W take back to their coordinates."""
     for side in range(2):
@@ -183,7 +184,8 @@ def least_cone_sum(
         # Mehrotra's predictor aims at the border, where all products are zero; how far it gets says
         # how far to aim at the middle
         for i in range(k):
-            wanted[i] = -middle[i]
+            for j in range(3):
+                wanted[i, j] = -middle[i, j]
         _direct(V, R, missing, wanted, step, turn)
         reach = min(1.0, longest_step(middle, step))
         towards_the_middle(middle, step, (1.0 - reach) ** 3 * gap / k, wanted)
@@ -195,7 +197,7 @@ def least_cone_sum(
     return primal, dual
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
     primal = dual = gap = 0.0
     for i in range(pair.shape[1]):
@@ -207,7 +209,7 @@ def _values(mean: Array, pair: Array, y: Array) -> tuple[float, float, float]:
     return primal, dual, gap
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
     """Fill in the wrench that the forces lack to balance; return its largest component."""
     for w in range(WRENCH):
@@ -222,7 +224,7 @@ def _missing(columns: Array, mean: Array, pair: Array, missing: Array) -> float:
     return largest
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _factor(columns: Array, W: Array, V: Array, R: Array) -> bool:
     """Find reflections 1 - v v' that make columns A_i W_i triangular; False if they do not span."""
     for w in range(WRENCH):
@@ -315,13 +317,13 @@ def search(
                 _in_space(pair, primal, friction, axes, forces[g])
             if dual > 1.0 + NEAR_ONE and friction > lower:
                 lower = friction
-                twists[g] = y
-            twist[:] = y
+                copy(y, twists[g])
+            copy(y, twist)
             # the twist of any program separates up to some friction once contacts are put to rest
             separates = _separates(rows, pair[1], span, twist)
             if separates > lower:
                 lower = separates
-                twists[g] = twist
+                copy(twist, twists[g])
             if upper - lower <= width * lower:
                 break
             friction = _next(pair, 0.5 * (primal + dual), friction, lower, upper, width)
@@ -344,7 +346,7 @@ def deepest(
         _at_friction(rows, mean, frictions[g], columns)
         primal, dual = least_cone_sum(columns, mean, share, pair, y)
         values[g, 0], values[g, 1] = primal, dual
-        twists[g] = y
+        copy(y, twists[g])
         _in_space(pair, primal, frictions[g], axes, forces[g])
 
 
@@ -363,7 +365,7 @@ def _set_up(arms: Array, normals: Array, axes: Array, rows: Array, mean: Array) 
             mean[w] += rows[i, 0, w] / len(arms)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _orthonormal(normal: Array, axes: Array) -> None:
     far = 0
     for j in range(3):
@@ -385,7 +387,7 @@ def _at_friction(rows: Array, mean: Array, friction: float, columns: Array) -> N
             columns[i, 1, w], columns[i, 2, w] = friction * rows[i, 1, w], friction * rows[i, 2, w]
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _needed(pair: Array, primal: float, friction: float) -> float:
     """Return the largest friction that any of the forces needs; infinite if a force pulls."""
     share, needed = (1.0 - primal) / pair.shape[1], 0.0
@@ -407,7 +409,7 @@ def _in_space(pair: Array, primal: float, friction: float, axes: Array, forces: 
             )
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
     """Return the friction up to which a twist refutes closure, with slow contacts at rest."""
     still = 0.0
@@ -423,7 +425,7 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
     return _least_ratio(rows, z, still, twist) if spanned < WRENCH else 0.0
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
     least = MOST_FRICTION
     for i in range(len(rows)):
@@ -437,13 +439,13 @@ def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
     return least
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _add(row: Array, span: Array, spanned: int) -> int:
     """Add a row to an orthonormal basis unless the basis spans it already; return the new size."""
     if spanned == WRENCH:
         return spanned
     fresh, before = span[spanned], math.sqrt(_inner(row, row))
-    fresh[:] = row
+    copy(row, fresh)
     for _ in range(2):  # once more for what rounding leaves
         for a in range(spanned):
             _take_off(fresh, span[a])
@@ -470,7 +472,7 @@ def _inner(a: Array, b: Array) -> float:
     return total
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _next(
     pair: Array, value: float, friction: float, lower: float, upper: float, width: float
 ) -> float:

@@ -90,7 +90,7 @@ def _completed(
     return count
 
 
-@loop()
+@loop(once=True)
 def _place(bit: np.uint64) -> int:
     place, size = 0, 32
     while size:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.cones.spanning_kernel import span_sine
 from grasp_core.geometry.vectors_kernel import cross, dotted
@@ -67,7 +68,7 @@ def balance(cones: tuple[Array, Array], normals: Array, thetas: Array) -> None:
     for q in range(len(normals)):
         for cap in CAPS:
             cosines, sines = np.cos(cap * thetas[q]), np.sin(cap * thetas[q])
-            turned[:] = normals[q]
+            copy(normals[q], turned)
             for _ in range(SWEEPS):
                 for finger in range(FINGERS):
                     for d in range(3):
@@ -79,7 +80,8 @@ def balance(cones: tuple[Array, Array], normals: Array, thetas: Array) -> None:
             floor = reached[q] + SLIGHT
             now = _half_angle(turned, normals[q], thetas[q], floor)
             if now > floor:
-                axes[q], reached[q] = turned, now
+                reached[q] = now
+                copy(turned, axes[q])
 
 
 @loop()
@@ -96,7 +98,8 @@ def bend(cones: tuple[Array, Array], normals: Array, thetas: Array, across: Arra
                 floor = reached[q] + SLIGHT
                 now = _half_angle(bent, normals[q], thetas[q], floor)
                 if now > floor:
-                    axes[q], reached[q] = bent, now
+                    reached[q] = now
+                    copy(bent, axes[q])
 
 
 @loop()
@@ -137,7 +140,8 @@ def improve(
             floor = reached[q] + SLIGHT
             now = _half_angle(moved, normals[q], thetas[q], floor)
             if now > floor:
-                axes[q], reached[q] = moved, now
+                reached[q] = now
+                copy(moved, axes[q])
                 step *= GROWTH
             else:
                 step *= DECAY

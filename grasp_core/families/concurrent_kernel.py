@@ -46,6 +46,7 @@ Source: Sudsang & Ponce 1995, section 3.1 and Proposition 5; the far side is thi
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import (
     TURNS,
@@ -69,7 +70,7 @@ FEWEST = 3
 """Fewest corners of a polygon."""
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def concurrent_program(fingers: Fingers, sides: Array) -> Program:
     """Build the program of one attempt for given sides (4) of its fingers."""
     each, (E, limits) = len(TURNS), (fingers.E, fingers.b)
@@ -107,11 +108,11 @@ def _aim_rows(
         b[m] = -dotted(G[m], o) - fingers.depths[i] * abs(dotted(G[m], n))
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def take_concurrent(fingers: Fingers, a: int, sides: Array, x: Array, placed: Placed) -> None:
     """Fill in contacts, forces and the focus from the program's variables."""
     ways = np.empty((FINGERS, 3))
-    placed.foci[a, 0] = x[:Y]
+    copy(x[:Y], placed.foci[a, 0])
     for i in range(FINGERS):
         o, y, z = fingers.origins[i], x[Y + 2 * i], x[Y + 2 * i + 1]
         for j in range(3):
@@ -139,7 +140,7 @@ def footprints(
             side = 1.0 if dotted(fingers.axes[finger], way) > 0.0 else -1.0
             _aim_rows(fingers, finger, side, (3, 5), (A, b))
             count = int(fingers.edges[finger])
-            flat[0, :count] = faces.flat[attempts.faces[a, finger], :count]
+            copy(faces.flat[attempts.faces[a, finger], :count], flat[0, :count])
             for m in range(len(A)):
                 row = A[m, 3], A[m, 4], b[m] - dotted(A[m], foci[a])
                 count = _clip(flat, heights, count, row)
@@ -151,7 +152,7 @@ def footprints(
                     )
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _clip(flat: Array, heights: Array, count: int, row: tuple[float, float, float]) -> int:
     """Cut a convex polygon by one row, as `clip` of `geometry.polygons`; return its corners."""
     largest, kept, fresh = 0.0, 0, flat[1]
@@ -176,7 +177,7 @@ def _clip(flat: Array, heights: Array, count: int, row: tuple[float, float, floa
     return kept
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _inscribed_radius(polygon: Array, count: int) -> float:
     """Compute the radius of the largest disc in a convex polygon; not finite where it is left."""
     if count < FEWEST:

@@ -103,7 +103,8 @@ def of_equal_radii(program: Program) -> Rows:
     A, b, count, radii, excess = program
     rows = empty_rows(radii + 1, count)
     for j in range(radii):
-        rows.At[j] = A[:count, j]
+        for k in range(count):
+            rows.At[j, k] = A[k, j]
     for k in range(count):
         for j in range(radii, A.shape[1]):
             rows.At[radii, k] += A[k, j]
@@ -146,7 +147,7 @@ def measure(rows: Rows) -> None:
         rows.norms[k] = np.sqrt(rows.norms[k])
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]:
     """Find the largest four equal discs, then enlarge each; return the end and the radius."""
     first = largest_last(of_equal_radii(program), least)

@@ -61,7 +61,7 @@ ONE = 4
 """Place of the constant in functions of (x0, k)."""
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def pencil_program(fingers: Fingers, signs: Array) -> Program:
     """Build the program of one attempt for one order of the foci, by signs of k u as in (4).
 
@@ -110,7 +110,7 @@ def _heights(d: Array, turned: Array, o: Array, found: Array) -> None:
     found[K], found[ONE] = dotted(d, turned), -dotted(d, o)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _disc_rows(fingers: Fingers, centers: tuple[Array, Array], A: Array, b: Array) -> int:
     """Fill in, from row 1 on, the rows (2) and those that keep discs in faces; return the next."""
     (s, y), psi, row = centers, fingers.half_angle, 1
@@ -132,7 +132,7 @@ def _disc_rows(fingers: Fingers, centers: tuple[Array, Array], A: Array, b: Arra
     return row
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _near_rows(fingers: Fingers, u: Array, s: Array, rows: tuple[Array, Array], row: int) -> int:
     """Fill in the rows (5), which keep the foci of cell B near each other; return the next row."""
     A, b = rows
@@ -151,7 +151,7 @@ def _near_rows(fingers: Fingers, u: Array, s: Array, rows: tuple[Array, Array], 
     return row
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def take_pencil(fingers: Fingers, a: int, signs: Array, x: Array, placed: Placed) -> None:
     """Fill in contacts, forces along the axes and foci from the program's variables."""
     u = focus_direction(fingers.axes)
@@ -165,5 +165,6 @@ def take_pencil(fingers: Fingers, a: int, signs: Array, x: Array, placed: Placed
             T = fingers.frames[i, j]
             placed.positions[a, i, j] = fingers.origins[i, j] + T[0] * first + T[1] * second
     for pair in range(2):
-        placed.foci[a, pair] = x[:3] + signs[2 * pair] * x[K] * u
+        for j in range(3):
+            placed.foci[a, pair, j] = x[j] + signs[2 * pair] * x[K] * u[j]
     balance(fingers.axes, fingers.normals, placed.forces[a])

@@ -150,7 +150,7 @@ def _reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, floa
     return before, behind
 
 
-@loop()
+@loop(once=True)
 def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
     """Bound the sum of two contacts' distances s_i and s_j from a common focus, by (2)."""
     (i, j), apart = pair, np.empty(3)
@@ -162,7 +162,7 @@ def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int])
     return (_extent(corners, faces[j], apart)[1] - _extent(corners, faces[i], apart)[0]) / share
 
 
-@loop()
+@loop(once=True)
 def _across(
     corners: Corners, normals: Array, faces: Indices, axes: Array,
     places: tuple[int, int, int, int], half: float,

@@ -164,7 +164,7 @@ def pair_frames(fingers: Fingers) -> PairFrames:
     return frames
 
 
-@loop()
+@loop(once=True)
 def _facets_along(fingers: Fingers, pair: int, frames: PairFrames) -> Array:
     """Compute normals of the facets of a pair's pyramids along u, v, N, (2, facets, 3)."""
     found = np.empty((2, len(TURNS), 3))
@@ -178,7 +178,7 @@ def _facets_along(fingers: Fingers, pair: int, frames: PairFrames) -> Array:
     return found
 
 
-@loop()
+@loop(once=True)
 def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool:
     """Find the rows alpha x + beta z >= 0 that bound z / |x|, for x on the resultant's side."""
     lower, upper = -np.inf, np.inf
@@ -255,18 +255,23 @@ def take(
     placed.foci[a] = 0.0
     for finger in range(FINGERS):
         line, n = _line(frames, choice[:2], finger), fingers.normals[finger]
-        passing = x[:3] + x[K] * line.k + x[P] * line.p
-        ways[finger] = x[X + line.pair] * line.x + x[Z + line.pair] * line.z
-        contact = passing - ways[finger]
+        contact, way = placed.positions[a, finger], ways[finger]
+        for d in range(3):
+            passing = x[d] + x[K] * line.k[d] + x[P] * line.p[d]
+            way[d] = x[X + line.pair] * line.x[d] + x[Z + line.pair] * line.z[d]
+            contact[d] = passing - way[d]
+            placed.foci[a, line.pair, d] += 0.5 * passing
         # takes away what the program's answer may be off the plane
-        off = dotted(n, contact - fingers.origins[finger])
-        placed.positions[a, finger] = contact - off * n
-        placed.foci[a, line.pair] += 0.5 * passing
+        off = 0.0
+        for d in range(3):
+            off += n[d] * (contact[d] - fingers.origins[finger, d])
+        for d in range(3):
+            contact[d] -= off * n[d]
     balance(ways, fingers.normals, placed.forces[a])
     placed.ends[a], placed.merits[a] = PLACED, merit
 
 
-@loop()
+@loop(once=True)
 def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[float, int]:
     """Solve the programs for p > gap and p < -gap; return the better bound and its side."""
     either = _bounded(rows, worth, vertex)
@@ -328,7 +333,7 @@ def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tupl
     return rows, LEAST_GAP / steepest
 
 
-@loop()
+@loop(once=True)
 def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
     edge, frame, E = np.empty(3), fingers.frames[i], fingers.E[i]
@@ -341,7 +346,7 @@ def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> i
     return row
 
 
-@loop()
+@loop(once=True)
 def _offset_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (5), which make t the largest offset from the middle of the face."""
     along = np.empty(3)

@@ -102,7 +102,7 @@ def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) ->
     return reach >= 0.0 and squared(middles[i], middles[j]) <= reach * reach
 
 
-@loop()
+@loop(once=True)
 def _apart_by_faces(hand: HandArrays, turned: Array, middles: Array, i: int, j: int) -> float:
     """Return how far the boxes of two shapes are apart at least, along the axes of either."""
     widest = -np.inf
@@ -139,7 +139,7 @@ def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, f
     return corners, float(hand.tip_roundings[hand.shape_tips[s]])
 
 
-@loop()
+@loop(once=True)
 def _from_block(
     hand: HandArrays, turned: Array, middles: Array, block: int, s: int, limit: float, way: Array,
     point: Array,

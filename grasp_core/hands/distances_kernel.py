@@ -75,7 +75,7 @@ def point_triangle(p: Array, T: Array, near: Array, weights: Array) -> float:
     return squared(p, near)
 
 
-@loop()
+@loop(once=True)
 def segment_segment(a: Array, u: Array, b: Array, v: Array, between: Array, end: Array) -> float:
     """Return the squared distance of the segments a + s u and b + t v, s and t from 0 to 1.
 
@@ -175,7 +175,7 @@ def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) 
     return widest
 
 
-@loop()
+@loop(once=True)
 def box_box(
     h: Array, g: Array, R: Array, middle: Array, limit: float, way: Array, point: Array
 ) -> float:  # fmt: skip
@@ -204,7 +204,7 @@ def box_box(
     return _nearest_features(h, g, R, middle, others, way, point)
 
 
-@loop()
+@loop(once=True)
 def _nearest_features(
     h: Array, g: Array, R: Array, middle: Array, others: Array, way: Array, point: Array
 ) -> float:  # fmt: skip
@@ -254,7 +254,7 @@ def _reaching(points: Array, way: Array, sign: float) -> int:
     return best
 
 
-@loop()
+@loop(once=True)
 def _holds_origin(S: Array, w: Array) -> bool:
     """Return whether the origin is within the tetrahedron of a triangle S and a point w."""
     way, turns = np.empty(3), np.empty(4)
@@ -266,7 +266,7 @@ def _holds_origin(S: Array, w: Array) -> bool:
     return bool((turns > 0.0).all() or (turns < 0.0).all())
 
 
-@loop()
+@loop(once=True)
 def _nearer(S: Array, w: Array, at: Array) -> int:
     """Fill in the nearest point of S with w; return the corner that w replaces, -1 for none."""
     tried, zero, chosen, least = np.empty((3, 3)), np.zeros(3), -1, dotted(at, at)

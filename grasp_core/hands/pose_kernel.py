@@ -68,7 +68,7 @@ def place(hand: HandArrays, targets: Targets, pose: Pose) -> None:
         moved(pose.R[last], pose.p[last], point, pose.tips[k])
 
 
-@loop()
+@loop(once=True)
 def _ahead(
     hand: HandArrays, R: Array, targets: Targets, k: int, point: Array, roll: Array
 ) -> int:  # fmt: skip
@@ -162,7 +162,7 @@ def _tip(
     _add(sums, TOUCH, weight * off * MM)
 
 
-@loop()
+@loop(once=True)
 def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
     """Add the residuals of fingertips: their planes, contacts and regions."""
     for k in range(len(targets.fingers)):
@@ -192,7 +192,7 @@ def _touching(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, su
             _tip(hand, pose, sums, link, k, -targets.edge_inward[e], EQUAL, short)
 
 
-@loop()
+@loop(once=True)
 def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> float:
     """Return the signed distance of a point from a surface, and fill in the way out."""
     near, square = np.empty(3), squared(center, tree.middles[0])
@@ -227,7 +227,7 @@ def _keep_off(
     _add(sums, OVERLAP, short * MM)
 
 
-@loop()
+@loop(once=True)
 def _balls(
     hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
 ) -> None:  # fmt: skip
@@ -248,7 +248,7 @@ def _balls(
             _keep_off(hand, pose, sums, link, x, along, -1.0, short)
 
 
-@loop()
+@loop(once=True)
 def _links(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums) -> None:
     """Add the residuals of links that are too near to each other."""
     x, along = np.empty(3), np.empty(3)
@@ -285,7 +285,7 @@ def _farthest(
     return farthest
 
 
-@loop()
+@loop(once=True)
 def _last_links(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums) -> None:
     """Add residuals of last links behind their tips' planes, and of tips over the table."""
     x, down, zero = np.empty(3), -targets.up, np.zeros(3)
@@ -312,7 +312,7 @@ def _last_links(hand: HandArrays, targets: Targets, wanted: Wanted, pose: Pose, 
                     _keep_off(hand, pose, sums, last, x, down, 1.0, short)
 
 
-@loop()
+@loop(once=True)
 def residuals(
     hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
 ) -> None:  # fmt: skip
@@ -349,7 +349,7 @@ def empty_sums(hand: HandArrays, targets: Targets) -> Sums:
     return Sums(np.empty((n, n)), np.empty(n), np.zeros(n), pivot, np.empty(3))
 
 
-@loop()
+@loop(once=True)
 def _solved(H: Array, g: Array, step: Array) -> bool:
     """Solve H step = -g by Cholesky's factors, from and into the lower half of H."""
     n = len(g)
@@ -377,7 +377,7 @@ def _solved(H: Array, g: Array, step: Array) -> bool:
     return True
 
 
-@loop()
+@loop(once=True)
 def _step(
     hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums, damping: float, A: Array, step: Array
 ) -> bool:  # fmt: skip
@@ -405,7 +405,7 @@ def _step(
     return True
 
 
-@loop()
+@loop(once=True)
 def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose) -> None:
     """Fill in palm and joints of the pose after a step, within ranges and as they are coupled."""
     about, turned = np.empty((3, 3)), step[3:MOVES]

@@ -9,11 +9,12 @@ says what contacts answer: here supports are computed in space, from the definit
 followed by halving. From which support on a contact answers a twist is given.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy, longer
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
 from grasp_core.values import FINGERS
@@ -57,28 +58,23 @@ def vacant(deep: int, pieces: int) -> Nodes:
 @loop("numpy")
 def doubled(nodes: Nodes) -> Nodes:
     """Return the same nodes with room for twice as many."""
+    room = 2 * len(nodes.corners)
     return Nodes(
-        _longer(nodes.corners), _longer(nodes.counts), _longer(nodes.fresh), _longer(nodes.above),
-        nodes.top,
+        longer(nodes.corners, room), longer(nodes.counts, room), longer(nodes.fresh, room),
+        longer(nodes.above, room), nodes.top,
     )  # fmt: skip
-
-
-@loop("numpy")
-def _longer(old: Any) -> Any:
-    new = np.zeros((2 * len(old), *old.shape[1:]), old.dtype)
-    new[: len(old)] = old
-    return new
 
 
 @loop("numpy")
 def _copy(nodes: Nodes, source: int, place: int) -> None:
     corners, counts = nodes.corners, nodes.counts  # once: in loops that would take longer
-    counts[place], nodes.fresh[place] = counts[source], nodes.fresh[source]
+    copy(counts[source], counts[place])
+    copy(nodes.fresh[source], nodes.fresh[place])
     nodes.above[place] = nodes.above[source]
     for i in range(FINGERS):
         for p in range(counts.shape[2]):
             count = counts[source, i, p]
-            corners[place, i, p, :count] = corners[source, i, p, :count]
+            copy(corners[source, i, p, :count], corners[place, i, p])
 
 
 @loop("numpy")
@@ -129,9 +125,11 @@ def clip(corners: Array, count: int, line: Array, side: float) -> int:
         after = (k + 1) % count
         if (heights[k] >= 0.0) != (heights[after] >= 0.0):
             share = heights[k] / (heights[k] - heights[after])
-            crossings[k] = corners[k] + share * (corners[after] - corners[k])
+            for d in range(2):
+                along = corners[after, d] - corners[k, d]
+                crossings[k, d] = corners[k, d] + share * along
     kept = outline(corners, count, heights, 0.0, crossings, out)
-    corners[:kept] = out[:kept]
+    copy(out[:kept], corners)
     return kept
 
 
@@ -148,7 +146,7 @@ def outline(
         reached = heights[k] >= t
         crossed = reached != (heights[(k + 1) % count] >= t)
         if kept + reached + crossed > ROOM:
-            out[:count] = corners[:count]
+            copy(corners[:count], out)
             return count
         if reached:
             out[kept, 0], out[kept, 1] = corners[k, 0], corners[k, 1]
@@ -170,8 +168,10 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
     """
     nodes, place = vacant(AT_FIRST, len(pieces.normals)), 0
     for case in range(len(first)):
-        nodes.corners[0], nodes.counts[0] = first[case], first_counts[case]
-        nodes.fresh[0], nodes.above[0], nodes.top[0] = first_fresh[case], 0, 1
+        copy(first[case], nodes.corners[0])
+        copy(first_counts[case], nodes.counts[0])
+        copy(first_fresh[case], nodes.fresh[0])
+        nodes.above[0], nodes.top[0] = 0, 1
         while nodes.top[0] > 0:
             node = nodes.top[0] - 1
             if place >= len(deeds) or nodes.above[node] >= most_cuts:
@@ -193,7 +193,7 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
     return place == len(deeds)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _is_division(nodes: Nodes, deed: int) -> bool:
     """Return whether a deed divides a finger's pieces, or its polygon where it is on one piece."""
     if BY_PIECES <= deed < BY_PIECES + FINGERS:
@@ -203,7 +203,7 @@ def _is_division(nodes: Nodes, deed: int) -> bool:
     return (nodes.counts[nodes.top[0] - 1, deed - BY_LINE] > 0).sum() <= 1
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _answered(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
     """Put one node for each named finger in the last node's place; return False if it is wrong."""
     corners, counts = nodes.corners, nodes.counts
@@ -221,7 +221,7 @@ def _answered(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bo
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _do_others(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
     """Return whether a finger of the last node may answer for which no named one stands."""
     corners, counts, fresh = nodes.corners, nodes.counts, nodes.fresh
@@ -258,7 +258,7 @@ def _support(pieces: Pieces, p: int, a: float, b: float, y: Array) -> float:
     return n[0] * u0 + n[1] * u1 + n[2] * u2 + slide
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _cut(pieces: Pieces, p: int, corners: Array, count: int, y: Array, t: float) -> int:
     """Cut a polygon to where a contact answers, in its place; return how many corners are left."""
     heights, reached = np.empty(ROOM), 0
@@ -275,7 +275,7 @@ def _cut(pieces: Pieces, p: int, corners: Array, count: int, y: Array, t: float)
         elif (heights[after] >= t) and not heights[k] >= t:
             _follow(pieces, p, corners[k], corners[after], y, t, crossings[k])
     kept = outline(corners, count, heights, t, crossings, out)
-    corners[:kept] = out[:kept]
+    copy(out[:kept], corners)
     return kept
 
 

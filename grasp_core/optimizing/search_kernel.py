@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
 from grasp_core.optimizing.replay_kernel import BY_LINE, BY_PIECES, Nodes, Pieces, branch, split
@@ -92,7 +93,7 @@ def answer_to(search: Search, k: int) -> float:
     return search.t * search.pool.demands[k] - search.spare
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def is_full(stack: Nodes, tree: Tree) -> bool:
     """Return whether there is no room for what one more node may need."""
     return (
@@ -138,7 +139,7 @@ def divide(search: Search) -> bool:
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _largest(stack: Nodes, node: int) -> tuple[int, int, float]:
     """Return the finger that has most room, on how many pieces it is, and how large they are."""
     largest, chosen, several, ends = 0.0, 0, 1, np.empty(2, np.int64)
@@ -154,7 +155,7 @@ def _largest(stack: Nodes, node: int) -> tuple[int, int, float]:
     return chosen, several, largest
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _bisect(stack: Nodes, node: int, i: int, line: Array) -> None:
     """Fill in the line across the longest diagonal of a finger's polygon."""
     ends = np.empty(2, np.int64)
@@ -168,7 +169,7 @@ def _bisect(stack: Nodes, node: int, i: int, line: Array) -> None:
                 line[2] += 0.5 * line[j] * (one + two)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def look_again(search: Search, node: int) -> None:
     """Fill in what has changed about the fingers of a node since the last one."""
     stack, work, size = search.stack, search.work, search.pool.size[0]
@@ -177,8 +178,8 @@ def look_again(search: Search, node: int) -> None:
         if changed not in (ALL, i):
             continue
         if stack.fresh[node, i] and twin >= 0:
-            work.reach[i, :size] = work.reach[twin, :size]
-            work.left[i, :size] = work.left[twin, :size]
+            copy(work.reach[twin, :size], work.reach[i])
+            copy(work.left[twin, :size], work.left[i])
             work.whole[i] = work.whole[twin]
             continue
         look(search, node, i, 0, size)
@@ -327,7 +328,7 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
     answering = _answering(search, node, k)
     if pool.names[k] < 0:
         pool.names[k] = tree.sizes[1]
-        tree.twists[tree.sizes[1]] = pool.twists[k]
+        copy(pool.twists[k], tree.twists[tree.sizes[1]])
         tree.sizes[1] += 1
     pool.used[k] = now
     note(tree, answering, pool.names[k])
@@ -346,7 +347,7 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
                 at, corners = pool.asked[p, :, k], stack.corners[place, i, p]
                 kept = cut(corners, count, at, pieces.friction, t, rest)
                 stack.counts[place, i, p] = kept
-                corners[:kept] = rest[:kept]
+                copy(rest[:kept], corners)
 
 
 @loop("numpy", beside=True)
@@ -368,7 +369,7 @@ def run(search: Search, budget: int, part_depth: int) -> int:
     return PAUSED
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _visit(search: Search, node: int, now: int) -> bool:
     """Replace a node by children; False if its middle may reach t, or it is tiny (on[0] < 0)."""
     look_again(search, node)
@@ -389,7 +390,7 @@ def _visit(search: Search, node: int, now: int) -> bool:
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _is_single(search: Search, node: int) -> bool:
     """Return whether each finger is on one piece, and fill in on which."""
     for i in range(FINGERS):
@@ -402,7 +403,7 @@ def _is_single(search: Search, node: int) -> bool:
     return True
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
     """Lower what all corners of a node resist; return it, and the new twist or -1."""
     work, stack, pieces = search.work, search.stack, search.pieces
@@ -421,14 +422,15 @@ def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
         count = stack.counts[node, i, p]
         work.middle[i] = 0.0
         for v in range(count):
-            work.middle[i] += stack.corners[node, i, p, v] / count
+            for d in range(2):
+                work.middle[i, d] += stack.corners[node, i, p, v, d] / count
             _place(pieces, p, stack.corners[node, i, p, v], points[m])
             on[m] = p
             m += 1
     return _descended(search, node, points[:m], on, (first, least), STEPS, now)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
     """Lower what contacts in a node's middle resist; return it, and the new twist or -1."""
     pieces, pool, work = search.pieces, search.pool, search.work
@@ -466,5 +468,6 @@ def _descended(
 
 @loop("numpy")
 def _place(pieces: Pieces, p: int, at: Array, point: Array) -> None:
-    frame = pieces.frames[p]
-    point[:] = pieces.origins[p] + frame[:, 0] * at[0] + frame[:, 1] * at[1]
+    origin, frame = pieces.origins[p], pieces.frames[p]
+    for d in range(3):
+        point[d] = origin[d] + frame[d, 0] * at[0] + frame[d, 1] * at[1]

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
 from grasp_core.optimizing.replay_kernel import Pieces, outline
@@ -171,12 +172,13 @@ def learn(pool: Pool, pieces: Pieces, demand: Demand, y: Array, now: int) -> int
     for j in range(TWIST):
         length += y[j] * y[j]
     length = np.sqrt(length)
-    pool.twists[place] = y / length * OVER
+    for j in range(TWIST):
+        pool.twists[place, j] = y[j] / length * OVER
     pool.demands[place] = demanded(demand, pool.twists[place], np.empty(TWIST))
     at = np.empty(SLOPES)
     for p in range(len(pieces.normals)):
         slopes(pieces, p, pool.twists[place], at)
-        pool.asked[p, :, place] = at
+        copy(at, pool.asked[p, :, place])
     pool.used[place], pool.names[place] = now, -1
     return place
 
@@ -271,12 +273,12 @@ def descend(
         if found < best:
             idle = 0 if found < best - 0.25 * aim * abs(best) else idle + 1
             best = found
-            y[:] = at
+            copy(at, y)
         else:
             idle += 1
         if idle >= SETTLING:
             aim, idle = 0.4 * aim, 0
-            at[:] = y
+            copy(y, at)
             if aim < LAST_AIM:
                 break
             found = _steepest(pieces, demand, points, on, at, slope, hardest)

@@ -19,11 +19,12 @@ simplices. A corner is found by the sums of corners, which are exact. Functions 
 the hull once: in loops that would cost more than the arithmetic.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy, longer
 from grasp_core.compiled import loop
 
 D = 6
@@ -94,7 +95,7 @@ def grow(
     return status, forces[:count].copy(), hull.corners[live], hull.normals[live], weakest
 
 
-@loop()
+@loop(once=True)
 def _support(cones: Cones, y: Array, force: Array) -> float:
     """Return the support of the set in direction y, and fill in the local forces that attain it."""
     total, best, at = 0.0, -np.inf, np.zeros(4)
@@ -132,7 +133,7 @@ def _wrench(G: Array, force: Array, point: Array) -> None:
                 point[row] += G[row, i] * force[i]
 
 
-@loop()
+@loop(once=True)
 def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
     """Choose seven points, each farthest from the hull of others; return the slack, -1 if flat."""
     wrenches, mean = np.empty((len(edges), D)), np.zeros(D)
@@ -147,16 +148,19 @@ def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
         farthest = np.argmax(squares)
         if squares[farthest] <= flat:
             return -1.0
-        forces[step], points[step] = edges[farthest], wrenches[farthest]
+        copy(edges[farthest], forces[step])
+        copy(wrenches[farthest], points[step])
         if step == 0:
             rest = wrenches - points[0]
             flat = (FLATNESS * np.abs(rest).max()) ** 2
         else:
-            unit, along = rest[farthest] / np.sqrt(squares[farthest]), np.zeros(len(rest))
-            for j in range(D):
-                along += rest[:, j] * unit[j]
-            for j in range(D):
-                rest[:, j] -= along * unit[j]
+            unit = rest[farthest] / np.sqrt(squares[farthest])
+            for i in range(len(rest)):
+                along = 0.0
+                for j in range(D):
+                    along += rest[i, j] * unit[j]
+                for j in range(D):
+                    rest[i, j] -= along * unit[j]
     # the extent of the seven points along the axis on which it is largest
     extent = 0.0
     for j in range(D):
@@ -190,7 +194,7 @@ class Hull(NamedTuple):
     """Number of simplices ever made, and number of free places, (2,)."""
 
 
-@loop()
+@loop(once=True)
 def vacant_hull(room: int) -> Hull:
     """Make an empty hull with room for `room` simplices."""
     return Hull(
@@ -201,26 +205,19 @@ def vacant_hull(room: int) -> Hull:
     )  # fmt: skip
 
 
-@loop()
+@loop(once=True)
 def larger(hull: Hull) -> Hull:
     """Copy a hull with room for twice as many simplices and for all that one point can add."""
     room = 2 * len(hull.offsets) + D * hull.counts[0]
     return Hull(
-        _longer(hull.normals, room), _longer(hull.offsets, room), _longer(hull.corners, room),
-        _longer(hull.neighbors, room), _longer(hull.sums, room), _longer(hull.heights, room),
-        _longer(hull.rounds, room), _longer(hull.made, room), _longer(hull.seen, room),
-        _longer(hull.free, room), hull.counts,
+        longer(hull.normals, room), longer(hull.offsets, room), longer(hull.corners, room),
+        longer(hull.neighbors, room), longer(hull.sums, room), longer(hull.heights, room),
+        longer(hull.rounds, room), longer(hull.made, room), longer(hull.seen, room),
+        longer(hull.free, room), hull.counts,
     )  # fmt: skip
 
 
-@loop()
-def _longer(old: Any, room: int) -> Any:
-    new = np.empty((room, *old.shape[1:]), old.dtype)
-    new[: len(old)] = old
-    return new
-
-
-@loop()
+@loop(once=True)
 def enclose(hull: Hull, points: Array) -> bool:
     """Make the seven simplices around the first points; return False if these are nearly flat.
 
@@ -246,7 +243,7 @@ def enclose(hull: Hull, points: Array) -> bool:
     return True
 
 
-@loop()
+@loop(once=True)
 def _eliminate(A: Array) -> bool:
     """Turn (A, 1) into (1, inv(A)); return False if A is nearly singular."""
     for i in range(len(A)):
@@ -264,7 +261,7 @@ def _eliminate(A: Array) -> bool:
     return True
 
 
-@loop()
+@loop(once=True)
 def _clear(A: Array, i: int) -> None:
     """Subtract multiples of row i from the others, so that column i is zero there."""
     for k in range(len(A)):
@@ -327,7 +324,7 @@ def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
     return joined
 
 
-@loop()
+@loop(once=True)
 def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
     """Make a new simplex wherever a seen simplex has a neighbour that is not seen."""
     normals, offsets, corners, neighbors = hull.normals, hull.offsets, hull.corners, hull.neighbors
@@ -352,7 +349,7 @@ def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
             corners[new, j], hull.rounds[new] = point, 0
 
 
-@loop()
+@loop(once=True)
 def _vacant(free: Indices, counts: Indices) -> int:
     """Return the place for a new simplex: that of a removed one, or one at the end."""
     if counts[1] > 0:
@@ -373,7 +370,7 @@ def _normalize(normals: Array, offsets: Array, i: int) -> None:
     offsets[i] *= shrink
 
 
-@loop()
+@loop(once=True)
 def _join(hull: Hull, seen: Indices, slack: float) -> bool:
     """Connect new simplices with their neighbours; return False if one has no neighbour."""
     corners, neighbors, made = hull.corners, hull.neighbors, hull.made
@@ -401,7 +398,7 @@ def _join(hull: Hull, seen: Indices, slack: float) -> bool:
     return True
 
 
-@loop()
+@loop(once=True)
 def _bury(hull: Hull, seen: Indices) -> None:
     """Free the places of the removed simplices for new ones."""
     for f in seen:

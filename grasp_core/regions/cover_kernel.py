@@ -95,7 +95,7 @@ def holds(sites: Sites, i: int, x: float, y: float) -> bool:
     return sides > 0
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
     """Return whether a contact resists a twist wherever it is; `shift` is a place where it may not.
 
@@ -149,7 +149,7 @@ class Tree(NamedTuple):
     shifts: Array
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> tuple[float, float]:
     """Compute a tangential force, as friction allows, along the mean twist's axis.
 
@@ -165,7 +165,7 @@ def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> 
     return longest(f * along, g * along, most)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def answer(
     ids: Indices, weights: Array, motions: Array, sites: Sites, i: int
 ) -> tuple[float, float, float]:
@@ -195,7 +195,7 @@ def answer(
     return best, best_f, best_g
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: Array) -> bool:
     """Return whether forces together have positive power on all rays of a cone: h > 0 in (2)."""
     least, needed = np.inf, 0.0
@@ -221,7 +221,7 @@ def dot(u: Array, v: Array) -> float:
     return total
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
     """Move weight to rays by the power they have lacked so far; the last round counts twice."""
     mean, total = dot(weights, powers), 0.0
@@ -235,7 +235,7 @@ def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
         weights /= total
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def find_forces(
     ids: Indices, motions: Array, sites: Sites, clear: Array, forces: Array, weights: Array
 ) -> bool:
@@ -287,7 +287,7 @@ def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Arra
             motions[ray, i, 3 + (c + 2) % 3] = turning  # tangents first
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, int]:
     """Return number and ends of the edge to divide: a long one between rays of large weight."""
     longest, chosen, number, first, last = -1.0, 0, 0, 0, 0
@@ -334,7 +334,8 @@ def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> t
             edge, a, b = edge_to_cut(cones[done], rays, weights)
             tree.codes[done] = edge
             # (4): the sum of the ends cuts the edge
-            rays[made] = rays[a] + rays[b]
+            for d in range(rays.shape[1]):
+                rays[made, d] = rays[a, d] + rays[b, d]
             fill_motions(made, rays, sites, axes, motions)
             bad[:] = 0.0
             for place in range(RAYS):

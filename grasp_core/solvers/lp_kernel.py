@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 
 BOX = 1e3
@@ -89,7 +90,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
         _combined(rows, entering, inverse, alpha)
         leaving = _leaving(y, alpha, basis, rows)
         if leaving < 0:
-            y[:] = alpha
+            copy(alpha, y)
             return INFEASIBLE, entering
         drop = max(y[leaving] / alpha[leaving], 0.0)
         idle = idle + 1 if drop * beyond < UNCHANGED else 0
@@ -121,7 +122,7 @@ def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float
     return bound if proved else np.inf
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> bool:
     """Return whether a row and a basis it contradicts exclude all |x|_1 up to `farthest`.
 
@@ -147,7 +148,7 @@ def _may_weigh(share: float, k: int, rows: Rows) -> bool:
     return k < count and (share > 0.0 or k >= count - rows.equalities)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
     """Return the inverse basis of the box's corner on the side of c, and its value c.x."""
     n = len(c)
@@ -160,7 +161,7 @@ def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
     return inverse, value
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
     leans = False
     for j in range(len(y)):
@@ -168,7 +169,7 @@ def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
     return leans
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
     """Fill in by how much x violates each row."""
     for k in range(len(excess)):
@@ -179,7 +180,7 @@ def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
             excess[k] += column[k] * at
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
     """Return the row that is violated most, or the first violated row; -1 if none is violated."""
     worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
@@ -192,7 +193,7 @@ def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool)
     return found
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _turn(rows: Rows, k: int) -> None:
     """Change the sign of an equality, so that points below it violate it."""
     rows.b[k] = -rows.b[k]
@@ -200,7 +201,7 @@ def _turn(rows: Rows, k: int) -> None:
         rows.At[i, k] = -rows.At[i, k]
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
     """Write a row as a combination of the rows of the basis."""
     alpha[:] = 0.0
@@ -235,7 +236,7 @@ def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
         left[i] -= share * rows.At[i, k]
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
     """Return the place in the basis with the least y / alpha, -1 if no alpha is positive.
 
@@ -252,7 +253,7 @@ def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
     return found
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def _exchange(inverse: Array, x: Array, alpha: Array, leaving: int, excess: float) -> None:
     """Put a row in the place of another in the basis: the point moves onto it along the others."""
     n = len(x)

@@ -91,7 +91,7 @@ def nearest(C: Array, d: Array, x: Array) -> tuple[float, float]:
     return unmet / largest, excess * size
 
 
-@loop()
+@loop(once=True)
 def _active_at(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
     """Find the rows that are active at the nearest point; return their number, or -1."""
     count = 0
@@ -106,7 +106,7 @@ def _active_at(C: Array, d: Array, norms: Array, active: Active, x: Array) -> in
     return -1
 
 
-@loop()
+@loop(once=True)
 def _unmet(C: Array, d: Array, x: Array, u: Array) -> tuple[float, float]:
     """Return by how much x and u miss the conditions of a nearest point, and a row C x <= d."""
     unmet, excess, every = 0.0, -np.inf, 0.0
@@ -125,7 +125,7 @@ def _unmet(C: Array, d: Array, x: Array, u: Array) -> tuple[float, float]:
     return (unmet if abs(every) < np.inf else np.inf), excess
 
 
-@loop()
+@loop(once=True)
 def _enter(C: Array, active: Active, count: int, excess: float, least: float, x: Array) -> int:
     """Step until the entering row is active; return the number of active rows, -1 on failure."""
     entering, z = active.rows[count], active.z
@@ -149,7 +149,7 @@ def _enter(C: Array, active: Active, count: int, excess: float, least: float, x:
     return -1
 
 
-@loop()
+@loop(once=True)
 def _violated(
     C: Array, d: Array, norms: Array, inside: NDArray[np.bool_], x: Array
 ) -> tuple[int, float]:
@@ -192,7 +192,7 @@ def _append(active: Active, count: int, square: float) -> None:
         active.Q[count, j] = active.z[j] / length
 
 
-@loop()
+@loop(once=True)
 def _leaving(active: Active, count: int) -> tuple[int, float]:
     """Return the active row whose multiplier vanishes first, and after which step; fill in r."""
     R, r, u, found, least = active.R, active.r, active.u, -1, np.inf
@@ -207,7 +207,7 @@ def _leaving(active: Active, count: int) -> tuple[int, float]:
     return found, least
 
 
-@loop()
+@loop(once=True)
 def _move(active: Active, count: int, step: float) -> None:
     """Change the multipliers of the active rows and of the entering row by one step."""
     for j in range(count):
@@ -215,7 +215,7 @@ def _move(active: Active, count: int, step: float) -> None:
     active.u[count] += step
 
 
-@loop()
+@loop(once=True)
 def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
     """Remove a row from the active rows; return how many are left."""
     active.inside[active.rows[leaving]] = False
@@ -226,7 +226,7 @@ def _drop(C: Array, active: Active, count: int, leaving: int) -> int:
     return count - 1
 
 
-@loop()
+@loop(once=True)
 def _recompute(d: Array, active: Active, count: int, x: Array) -> None:
     """Compute the point at which the active rows hold with equality: Q'y, R'y = d, R u = -y."""
     rows, Q, R, u = active.rows, active.Q, active.R, active.u

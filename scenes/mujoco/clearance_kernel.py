@@ -48,7 +48,7 @@ def clear_depth(
     return depth
 
 
-@loop()
+@loop(once=True)
 def _is_beside(middle: Array, inward: Array, depth: float, triangle: Array, slack: float) -> bool:
     """Return whether a triangle lies above the base or below the apex."""
     low, high = np.inf, -np.inf
@@ -60,7 +60,7 @@ def _is_beside(middle: Array, inward: Array, depth: float, triangle: Array, slac
     return high <= slack or low >= depth
 
 
-@loop()
+@loop(once=True)
 def _separated(solid: Array, along: Array, triangle: Array, slack: float) -> bool:
     """Return whether an axis separates a pyramid (n + 1, 3), with edges (2 n, 3), and a triangle.
 
