@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import dotted
 from grasp_core.hands.distances_kernel import (
@@ -237,7 +238,7 @@ def tip_surface(
     if is_block(hand, s):
         corners, _ = core_in(hand, turned[s], middles[s], s)
         return hull_surface(corners, np.inf, tree, near, other)
-    near[:] = middles[s]
+    copy(middles[s], near)
     nearest(near, np.inf, tree, other)
     return np.sqrt(squared(other, near))
 
@@ -253,7 +254,8 @@ def deepest(corners: Array, tree: SurfaceTree, near: Array, other: Array) -> flo
             away = -away
         if away < best:
             best = away
-            near[:], other[:] = corners[c], at
+            copy(corners[c], near)
+            copy(at, other)
     return best
 
 

@@ -18,6 +18,7 @@ between complex objects in three-dimensional space, 1988.
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
 from grasp_core.hands.hand_arrays import SurfaceTree
@@ -199,7 +200,7 @@ def box_box(
             height = dotted(way, others[k])
             if height < lowest:
                 lowest = height
-                point[:] = others[k]
+                copy(others[k], point)
         return widest
     return _nearest_features(h, g, R, middle, others, way, point)
 
@@ -215,7 +216,7 @@ def _nearest_features(
         square = point_box(others[k], h)
         if square < best:
             best = square
-            point[:] = others[k]
+            copy(others[k], point)
             for j in range(3):
                 way[j] = others[k, j] - min(max(others[k, j], -h[j]), h[j])
         into_frame(R, middle, corners[k], local)
@@ -236,7 +237,8 @@ def _nearest_features(
             square = segment_segment(starts[e], along[e], froms[k], ways[k], between, end)
             if square < best:
                 best = square
-                way[:], point[:] = between, end
+                copy(between, way)
+                copy(end, point)
     distance = np.sqrt(best)
     for j in range(3):
         way[j] /= max(distance, 1e-300)
@@ -278,12 +280,12 @@ def _nearer(S: Array, w: Array, at: Array) -> int:
         at[:] = 0.0
         return 0
     for n in range(3):
-        tried[:] = S
-        tried[n] = w
+        copy(S, tried)
+        copy(w, tried[n])
         square = point_triangle(zero, tried, near, weights)
         if square < least:
             least, chosen = square, n
-            at[:] = near
+            copy(near, at)
     return chosen
 
 
@@ -295,14 +297,15 @@ def hull_hull(
     at, S, w, zero = corners[0] - others[0], np.empty((3, 3)), np.empty(3), np.zeros(3)
     pairs, weights, apart = np.zeros((3, 2), np.int64), np.empty(2), 0.0
     for n in range(3):
-        S[n] = at
+        copy(at, S[n])
     for step in range(MOST_STEPS):
         square = dotted(at, at)
         if square == 0.0:
             apart = 0.0
             break
         i, j = _reaching(corners, at, -1.0), _reaching(others, at, 1.0)
-        w[:] = corners[i] - others[j]
+        for k in range(3):
+            w[k] = corners[i, k] - others[j, k]
         ahead = dotted(at, w)
         apart = max(apart, ahead / np.sqrt(square))
         if apart > limit:
@@ -314,9 +317,11 @@ def hull_hull(
             place = _nearer(S, w, at)
             if place < 0:
                 break
-        S[place], pairs[place, 0], pairs[place, 1] = w, i, j
+        copy(w, S[place])
+        pairs[place, 0], pairs[place, 1] = i, j
         if step == 0:  # a segment, whose second end counts twice
-            S[2], pairs[2] = w, pairs[1]
+            copy(w, S[2])
+            copy(pairs[1], pairs[2])
             point_triangle(zero, S, at, weights)
     point_triangle(zero, S, w, weights)
     for j in range(3):
@@ -346,11 +351,12 @@ def hull_surface(
                 away = hull_hull(hull, tree.corners[t], best, p, s)
                 if away <= best and away < found:
                     best = found = away
-                    near[:], other[:] = p, s
+                    copy(p, near)
+                    copy(s, other)
             continue
         for side in range(2):
             child = tree.links[node, side]
-            middle[0] = tree.middles[child]
+            copy(tree.middles[child], middle[0])
             radius = float(tree.radii[child])
             gap2[side] = hull_hull(hull, middle, best + radius, p, s) - radius
         far = 0 if gap2[0] > gap2[1] else 1
@@ -377,7 +383,7 @@ def nearest(p: Array, within: float, tree: SurfaceTree, near: Array) -> int:
                 square = point_triangle(p, tree.corners[t], at, weights)
                 if square < best:
                     best, found = square, t
-                    near[:] = at
+                    copy(at, near)
             continue
         for side in range(2):
             child = tree.links[node, side]

@@ -17,6 +17,7 @@ limit and would go beyond are held there for the step.
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
 from grasp_core.hands.collisions_kernel import (
@@ -91,7 +92,7 @@ def _ahead(
         heights[c] = dotted(way, hand.tip_corners[first + c])
     front = int(np.argmax(heights))
     if count == 1:
-        point[:] = hand.tip_corners[first]
+        copy(hand.tip_corners[first], point)
     if not np.isnan(point[0]):
         return int(first + front)
     weights = np.exp((heights - heights[front]) / targets.soft)
@@ -213,7 +214,7 @@ def _outward(center: Array, need: float, tree: SurfaceTree, along: Array) -> flo
         for j in range(3):
             along[j] /= distance
     else:
-        along[:] = tree.normals[t]
+        copy(tree.normals[t], along)
     return distance
 
 
@@ -281,7 +282,7 @@ def _farthest(
             height += (corners[c, j] - origin[j]) * way[j]
         if squared(corners[c], left_out) > AT_TIP * AT_TIP and height > farthest:
             farthest = height
-            x[:] = corners[c]
+            copy(corners[c], x)
     return farthest
 
 
@@ -383,7 +384,7 @@ def _step(
 ) -> bool:  # fmt: skip
     """Fill in the damped step from a pose, no longer than the largest; whether there is one."""
     n, g = len(step), sums.g.copy()
-    A[:] = sums.H
+    copy(sums.H, A)
     for i in range(n):
         A[i, i] += damping * (SCALE_MOVE if i < MOVES // 2 else SCALE_TURN)
         if i < MOVES:
@@ -413,13 +414,22 @@ def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose)
     turn(turned / angle if angle > 0.0 else np.zeros(3), angle, about)
     product(about, pose.palm, new.palm)
     moved(about, pivot, pose.origin - pivot, new.origin)
-    new.origin[:] = new.origin + step[:3]
+    for j in range(3):
+        new.origin[j] += step[j]
     for k in range(len(pose.q)):
         angle = pose.q[k] + step[MOVES + k]
         new.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
     for k in range(len(pose.q)):  # the angles of free joints stay as they are
         angle = hand.offsets[k] + hand.ratios[k] * new.q[hand.drivers[k]]
         new.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
+
+
+@loop()
+def _take(source: Pose, target: Pose) -> None:
+    """Fill in where a hand is from another pose."""
+    copy(source.palm, target.palm)
+    copy(source.origin, target.origin)
+    copy(source.q, target.q)
 
 
 @loop()
@@ -430,14 +440,16 @@ def settle(
     """Move a hand until it touches and overlaps no more, or is given up."""
     A, step, new = np.empty_like(sums.H), np.empty_like(sums.g), empty_pose(hand, len(pose.tips))
     tried = empty_sums(hand, targets)
-    new.palm[:], new.origin[:], new.q[:] = pose.palm, pose.origin, pose.q
+    _take(pose, new)
     damping, stalled, before, steps = FIRST_DAMPING, 0, np.inf, 0
     while True:
         residuals(hand, tree, targets, wanted, new, tried)
         after = tried.parts[TOUCH] + tried.parts[OVERLAP]
         if after < before:
-            pose.palm[:], pose.origin[:], pose.q[:] = new.palm, new.origin, new.q
-            sums.H[:], sums.g[:], sums.parts[:] = tried.H, tried.g, tried.parts
+            _take(new, pose)
+            copy(tried.H, sums.H)
+            copy(tried.g, sums.g)
+            copy(tried.parts, sums.parts)
             damping = max(damping * SHRINKING, LEAST_DAMPING)
             stalled = stalled + 1 if after > (1.0 - STALLED) * before else 0
             before = after

@@ -13,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-ASIDE = re.compile(r"(^|\.)versions\.|seconds|\.mujoco$|^(files\.\*\.(sha256|bytes)|\w+_sha256)$")
+ASIDE = re.compile(
+    r"(^|\.)versions\.|seconds|\.mujoco$|proof\.sha256$|^(files\.\*\.(sha256|bytes)|\w+_sha256)$"
+)
 """Fields that tell of the machine, the moment, or of code; what is hashed is all here."""
 
 NAMED_AFTER_GRASPS = re.compile(r"^([0-9a-f]{16}-[\d.]+-)?[cprfbs]-[\w-]+$")
