@@ -54,7 +54,7 @@ def loop(
 ) -> Callable[[Loop], Loop]:
     """Declare a function that numba compiles on first use and keeps for later processes.
 
-    What is called at `once` place only is compiled there, and not by itself as well.
+    What other loops call in one place only, `once`, is compiled there, and divides as they do.
     """
     numba: Any = importlib.import_module("numba")
     # what Python runs stays where debuggers look for it, and numba keeps no unoptimized code

@@ -333,7 +333,7 @@ def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tupl
     return rows, LEAST_GAP / steepest
 
 
-@loop(once=True)
+@loop()
 def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
     edge, frame, E = np.empty(3), fingers.frames[i], fingers.E[i]
@@ -346,7 +346,7 @@ def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> i
     return row
 
 
-@loop(once=True)
+@loop()
 def _offset_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
     """Fill in the rows (5), which make t the largest offset from the middle of the face."""
     along = np.empty(3)

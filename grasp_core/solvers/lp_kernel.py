@@ -122,7 +122,7 @@ def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float
     return bound if proved else np.inf
 
 
-@loop("numpy", once=True)
+@loop("numpy")
 def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> bool:
     """Return whether a row and a basis it contradicts exclude all |x|_1 up to `farthest`.
 

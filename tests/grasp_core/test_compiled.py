@@ -1,5 +1,6 @@
 """How inner loops are declared, kept, and loaded where numba is as it should be, and where not."""
 
+import ast
 import os
 import shutil
 import subprocess
@@ -184,3 +185,23 @@ def test_folders_that_others_remove_meanwhile_do_not_matter(monkeypatch, tmp_pat
     assert not is_kept(KERNEL)
     (copy.parent / "own.py.nbi").touch()
     assert is_kept(KERNEL)
+
+
+def test_loops_that_are_compiled_where_they_are_called_are_called_once_and_divide_alike():
+    declared, calls = {}, []
+    for path in sorted(ROOT.glob("[gs]*/**/*_kernel.py")):
+        module, tree = ".".join(path.relative_to(ROOT).with_suffix("").parts), path.read_text()
+        functions = [n for n in ast.parse(tree).body if isinstance(n, ast.FunctionDef)]
+        imports = [n for n in ast.parse(tree).body if isinstance(n, ast.ImportFrom)]
+        known = {a.name: f"{n.module}.{a.name}" for n in imports for a in n.names}
+        known |= {n.name: f"{module}.{n.name}" for n in functions}
+        for function in functions:
+            declared[known[function.name]] = " ".join(map(ast.unparse, function.decorator_list))
+            called = [n.func.id for n in ast.walk(function) if isinstance(n, ast.Call)
+                      and isinstance(n.func, ast.Name) and n.func.id in known]  # fmt: skip
+            calls += [(known[name], known[function.name]) for name in called]
+    once = {name: how for name, how in declared.items() if "once=True" in how}
+    assert len(once) > 50
+    for name, how in once.items():
+        (caller,) = [caller for called, caller in calls if called == name]
+        assert ("numpy" in how) == ("numpy" in declared[caller]), (name, caller)
