@@ -182,6 +182,8 @@ RandomWrenches = Annotated[int, Range(least=0, most=10_000)]
 Repeats = Annotated[int, Range(least=0, most=100_000)]
 Count = Annotated[int, Range(least=1, most=MOST_COUNT)]
 Number = Annotated[int, Range(least=0, most=MOST_COUNT)]
+FaceSets = Annotated[int, Range(least=0, most=10**18)]
+"""Number of sets of faces, of which 400 faces have more than a thousand million."""
 """A number of things, of which there may be none."""
 Seed = Annotated[int, Range(least=0, most=MOST_SEED)]
 Vector = tuple[float, float, float]

@@ -16,6 +16,7 @@ from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import (
     METHODS,
     SMALLEST,
+    FaceSets,
     Family,
     Friction,
     Method,
@@ -133,28 +134,28 @@ class MethodCounts(Declared):
     them. Tried candidates end in one of the last six counts.
     """
 
-    tried: Number = 0
+    tried: FaceSets = 0
     """Candidates whose programs were set up."""
-    pruned: Number = 0
+    pruned: FaceSets = 0
     """Candidates skipped because a bound shows that their discs are too small, their pairs are too
     far from symmetric for a regulus, the free method is not needed on them, or they cannot enter
     the best `limit`."""
-    solved: Number = 0
+    solved: FaceSets = 0
     """Choices of one convex piece per face that were considered."""
-    infeasible: Number = 0
+    infeasible: FaceSets = 0
     """Candidates without a placement that has discs of the least radius at the planned angle, would
     enter the best if there is a limit, and exists on the surface of curved patches; for the free
     method, candidates proved to have no grasp at all."""
-    undecided: Number = 0
+    undecided: FaceSets = 0
     """Candidates with neither a grasp nor a proof of absence (free method), or with an unsolved
     program (other methods)."""
-    duplicates: Number = 0
+    duplicates: FaceSets = 0
     """Grasps found again at the same contacts, with another pairing of the fingers."""
-    found: Number = 0
+    found: FaceSets = 0
     """Grasps whose witness is of the method's family and which exact force closure certified."""
-    unreachable: Number = 0
+    unreachable: FaceSets = 0
     """Certified grasps that fingers of the given size cannot reach."""
-    rejected: Number = 0
+    rejected: FaceSets = 0
     """Placements that the witness or the exact closure test did not confirm: not 0 means a bug."""
 
 
@@ -166,13 +167,13 @@ Tally: TypeAlias = Counter[str]
 class Outcomes(Declared):
     """Counts of an object's sets of four faces: with a grasp, without, open, out of reach."""
 
-    held: Number
+    held: FaceSets
     """Sets of four faces with a certified grasp."""
-    absent: Number
+    absent: FaceSets
     """Sets of four faces proved to hold no grasp, or with a face too small for a contact."""
-    open: Number
+    open: FaceSets
     """Sets of four faces with neither a grasp nor a proof: undecided or, with a limit, untried."""
-    out_of_reach: Number = 0
+    out_of_reach: FaceSets = 0
     """Sets of four faces with certified grasps that fingers of the given size cannot reach."""
 
 
@@ -199,9 +200,9 @@ class PlanCounts(Declared):
     """Counts of what the planner tried on one object."""
 
     faces: Number
-    quadruples: Number
+    quadruples: FaceSets
     """Number of sets of four faces; with `share_faces_m` also of sets with two halves of a face."""
-    spanning: Number | None
+    spanning: FaceSets | None
     """Sets whose normals positively span at the least planned angle (P3); None where they were not
     counted, as above 200 faces."""
     families: Mapping[Method, MethodCounts] = field(default_factory=dict[Method, MethodCounts])
