@@ -52,7 +52,6 @@ from grasp_core.families.discs_kernel import (
     TURNS,
     Program,
     balance,
-    empty_rows,
     facets,
     fingers_of,
     largest_last,
@@ -61,6 +60,7 @@ from grasp_core.families.discs_kernel import (
 from grasp_core.families.placements import Attempts, FaceTable, Fingers, Footprints, Placed
 from grasp_core.geometry.polygons import ON_LINE
 from grasp_core.geometry.vectors_kernel import dotted
+from grasp_core.solvers.lp_kernel import empty_rows
 from grasp_core.values import FINGERS
 
 Y, RADII, VARIABLES = 3, 11, 15
@@ -182,7 +182,7 @@ def _inscribed_radius(polygon: Array, count: int) -> float:
     """Compute the radius of the largest disc in a convex polygon; not finite where it is left."""
     if count < FEWEST:
         return np.inf
-    rows = empty_rows(3, count)
+    rows = empty_rows(3, count, 0)
     for k in range(count):
         after = (k + 1) % count
         u, v = polygon[after, 0] - polygon[k, 0], polygon[after, 1] - polygon[k, 1]

@@ -32,7 +32,7 @@ it makes the left side of (3) larger by
 found.
 
 Programs. An attempt is four faces in the order of the fingers, with a force cone each. Where a
-construction has discs, the bound is the value of the first program of `largest_discs`, which
+construction has discs, the bound is the value of the first program of `discs_kernel`, which
 maximises the smallest radius, on the convex hulls of the faces: no choice of their pieces offers
 more. For reguli the bound only says whether any slopes are feasible on the hulls.
 """
@@ -53,7 +53,7 @@ from grasp_core.families.placements import (
     FaceTable,
     face_table,
 )
-from grasp_core.families.placing import KERNEL, Construction, regulus_bounds
+from grasp_core.families.placing import KERNEL, REGULUS, Construction
 from grasp_core.objects.face_pieces import Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.lp import RESIDUAL
@@ -152,13 +152,12 @@ class AttemptBounds:
         For reguli the bounds are infinite or, where no slopes are feasible, minus infinity.
         """
         attempts = Attempts._make(map(np.ascontiguousarray, attempts))
-        if construction.patterns is None:
-            merits, _ = regulus_bounds(self._table, attempts, any_choice=True)
-            # merits are no radii: only a proof that excludes all slopes tells anything
-            return np.where(merits == -np.inf, -np.inf, np.inf)
         # hulls stand for faces of several pieces: they offer no less than any piece
-        bounds, pencil = np.empty(len(attempts.faces)), construction.family == "pencil"
-        kernel = compiled(KERNEL)
+        bounds = np.empty(len(attempts.faces))
+        if construction.patterns is None:
+            compiled(REGULUS).regulus_bounds(self._table, attempts, bounds)
+            return bounds
+        pencil, kernel = construction.family == "pencil", compiled(KERNEL)
         kernel.bounds(pencil, self._table, attempts, construction.patterns, least, bounds)
         # a proved bound may be off by what the check of multipliers allows
         return bounds + RESIDUAL

@@ -8,8 +8,8 @@ small enough one, so the multipliers alone, checked here, bound every radius.
 A second program keeps the smallest radius, but for a share, and maximises the sum of the four, so
 that contacts whose discs have room do not end up against an arbitrary edge. Among its optima the
 point nearest to the origin of the variables is taken (see `ties`). Every answer is checked here by
-its residuals, with the limits of `solvers.lp`, `solvers.qp` and `solvers.ties`. Nothing is claimed
-where a check fails: such a program is left to these modules, see `placing`.
+its residuals, with the limits of `solvers.lp` and `solvers.ties`. Where a check fails, nothing is
+claimed, and the attempt is undecided.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,8 @@ from grasp_core.compiled import loop
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
 from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, Attempts, FaceTable, Fingers
 from grasp_core.geometry.vectors_kernel import across, balancing_weights, dotted
-from grasp_core.solvers.lp_kernel import LOST, Rows, Vertex, proved_bound, solve
+from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.solvers.lp_kernel import Rows, bounded, empty_rows, vertex_of
 from grasp_core.solvers.nearest_point_kernel import nearest
 from grasp_core.solvers.ties import FEASIBLE, FOUND, SAME_VALUE
 from grasp_core.values import FINGERS
@@ -30,9 +31,9 @@ TURNS = facet_turns(PYRAMID_SIDES)
 """Directions in which the facets of a pyramid lean, (facets, 2)."""
 SPARE = FINGERS + 1
 """Number of rows that the second program adds."""
-ACCURACY = 1e-12
+ACCURACY = 1e-11
 """Error up to which multipliers give the objective: even if a focus is a thousand object radii
-away, the bound changes by less than the accuracy of a program's answer."""
+away, the bound changes by no more than the accuracy of a program's answer."""
 
 
 class Program(NamedTuple):
@@ -92,16 +93,10 @@ def balance(ways: Array, normals: Array, forces: Array) -> None:
 
 
 @loop("numpy")
-def empty_rows(n: int, count: int) -> Rows:
-    """Make rows of zeros for a program of n variables."""
-    return Rows(np.zeros((n, count)), np.empty(count), np.empty(count), 0)
-
-
-@loop("numpy")
 def of_equal_radii(program: Program) -> Rows:
     """Write a program over one common radius, the last variable."""
     A, b, count, radii, excess = program
-    rows = empty_rows(radii + 1, count)
+    rows = empty_rows(radii + 1, count, 0)
     for j in range(radii):
         for k in range(count):
             rows.At[j, k] = A[k, j]
@@ -114,37 +109,10 @@ def of_equal_radii(program: Program) -> Rows:
 
 @loop("numpy")
 def largest_last(rows: Rows, least: float) -> float:
-    """Bound the last variable from above, see `bounded`."""
+    """Bound the last variable from above; above `least` the bound is the tightest one."""
     c = np.zeros(len(rows.At))
     c[-1] = 1.0
-    return bounded(c, rows, least)
-
-
-@loop("numpy")
-def bounded(c: Array, rows: Rows, least: float) -> float:
-    """Compute an upper bound on c.x; above `least` it is the tightest one."""
-    vertex = vertex_of(len(c))
-    measure(rows)
-    status, _ = solve(c, rows, least, vertex)
-    # checked here: a wrong answer of the solver costs tightness, never correctness
-    return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
-
-
-@loop("numpy")
-def vertex_of(n: int) -> Vertex:
-    """Make an empty vertex of a program with n variables."""
-    return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
-
-
-@loop("numpy")
-def measure(rows: Rows) -> None:
-    """Compute the norm of each row of a linear program; the solver divides violations by it."""
-    rows.norms[:] = 0.0
-    for i in range(len(rows.At)):
-        for k in range(len(rows.norms)):
-            rows.norms[k] += rows.At[i, k] * rows.At[i, k]
-    for k in range(len(rows.norms)):
-        rows.norms[k] = np.sqrt(rows.norms[k])
+    return bounded(c, rows, least, ACCURACY, vertex_of(len(c)))
 
 
 @loop("numpy", once=True)
@@ -161,15 +129,16 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
         c[r] = 1.0
         A[count + finger, r], b[count + finger] = -1.0, -first * (1.0 - KEPT)
         A[-1, r] = -1.0
-    rows = empty_rows(n, len(b) - 1)
+    rows = empty_rows(n, len(b) - 1, 0)
     for k in range(len(b) - 1):
         rows.b[k] = b[k]
         for j in range(n):
             rows.At[j, k] = A[k, j]
-    second = bounded(c, rows, -np.inf)
+    # multipliers are large here, and how large the sum can be is needed to few digits
+    second = bounded(c, rows, -np.inf, RESIDUAL, vertex_of(n))
+    if not abs(second) < np.inf:
+        return LEFT, first
     b[-1] = -(second - SAME_VALUE * (1.0 + abs(second)))
     # that there is such a point shows that both bounds are reached
-    if not second < np.inf:
-        return LEFT, first
     unmet, excess = nearest(A, b, x)
     return (PLACED if unmet <= FOUND and excess <= FEASIBLE else LEFT), first

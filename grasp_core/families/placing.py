@@ -1,8 +1,8 @@
 """Places contacts for many attempts of one construction, with the regions of the fingers.
 
 The paper's three constructions have one interface here, `Construction`, which the planner uses.
-Compiled code solves their programs and checks its answers by their residuals; programs that it
-leaves are solved by HiGHS. Of several choices of cones and pieces the best contacts count.
+Compiled code solves their programs and checks its answers by their residuals; an attempt whose
+answers fail the check is undecided. Of several choices of cones and pieces the best contacts count.
 
 Contacts on curved patches move from the planes of the patches to the true surface.
 
@@ -16,22 +16,21 @@ triangles. Either way the contacts are on the surface, and are certified with th
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.declared import trusted
 from grasp_core.errors import SolverError
 from grasp_core.families.placements import (
-    KEPT,
     LEAST_RADIUS,
     LEFT,
     NONE,
@@ -54,15 +53,7 @@ from grasp_core.objects.face_pieces import (
     inscribed_radius,
     piece_of,
 )
-from grasp_core.solvers.lp import (
-    RESIDUAL,
-    Infeasible,
-    LinearProgram,
-    Optimum,
-    maximize,
-    maximize_above,
-)
-from grasp_core.solvers.ties import graded, nearest_optimum, surpassing
+from grasp_core.solvers.ties import graded, surpassing
 from grasp_core.values import (
     FINGERS,
     ContactRegion,
@@ -83,12 +74,6 @@ MIXED_SIDES = np.array([s for s in product((1.0, -1.0), repeat=FINGERS) if abs(s
 """
 CELL_A, CELL_B = np.array([-1.0, -1.0, 1.0, 1.0]), np.array([1.0, 1.0, -1.0, -1.0])
 """Patterns of a pencil: signs of k u in the foci of the fingers, see `pencil_kernel`."""
-GIVEN_UP = 1e-9
-"""Offset given up in favour of the least variables: giving up less makes the contacts of two
-pairings differ from each other's."""
-Choice: TypeAlias = tuple[int, int, int]
-"""A choice for reguli: indices of the two pairs' slopes, and of the side of the focus line."""
-CHOICES: tuple[Choice, ...] = tuple(product(range(3), range(3), range(2)))
 DISC_CORNERS = 64
 """Number of points that are listed on the border of a disc."""
 MOST_CHOICES = 8
@@ -135,20 +120,10 @@ class Construction:
         """Place contacts for each attempt, with merits of at least `least`, (a,)."""
         placed = room_for(len(least))
         if self.patterns is None:
-            place_reguli(table, attempts, placed)
-            return placed
-        pencil, kernel = self.family == "pencil", compiled(KERNEL)
-        kernel.place(pencil, table, attempts, self.patterns, least, placed)
-        for a in np.flatnonzero(placed.ends == LEFT).tolist():
-            worth, placed.ends[a] = float(least[a]), NONE
-            try:
-                fingers = kernel.fingers_of(table, attempts, a)
-                for pattern in self.patterns:
-                    if discs := largest_discs(kernel.program_of(pencil, fingers, pattern), worth):
-                        kernel.take(pencil, fingers, a, pattern, *discs, placed)
-                        worth = surpassing(float(placed.merits[a]))
-            except SolverError:
-                placed.ends[a] = LEFT
+            compiled(REGULUS).place(table, attempts, placed)
+        else:
+            pencil = self.family == "pencil"
+            compiled(KERNEL).place(pencil, table, attempts, self.patterns, least, placed)
         return placed
 
     def one_of(self, placed: Placed, a: int) -> Placement | None:
@@ -196,84 +171,6 @@ def attempts_of(asked: Sequence[tuple[FaceQuadruple, Sequence[ForceCone]]]) -> A
         np.array([[cone.axis for cone in cones] for _, cones in asked]),
         np.array([min(cone.half_angle for cone in cones) for _, cones in asked]),
     )
-
-
-def largest_discs(program: Any, least: float) -> tuple[Array, float] | None:
-    """Find discs like `discs_kernel`, by HiGHS too: variables and radius; None if it is less."""
-    rows = compiled(DISCS).of_equal_radii(program)
-    objective = np.eye(len(rows.At))[-1]
-    first = maximize_above(LinearProgram(objective, np.array(rows.At.T), rows.b), least)
-    if isinstance(first, Infeasible):
-        raise SolverError(
-            "the solver called a disc program infeasible, though small discs always fit"
-        )
-    if not isinstance(first, Optimum) or first.value < least:
-        return None
-    n, count = program.A.shape[1], len(program.b) - FINGERS - 1
-    radii = np.eye(n)[-FINGERS:]
-    kept = LinearProgram(
-        radii.sum(axis=0),
-        np.vstack([program.A[:count], -radii]),
-        np.append(program.b[:count], np.full(FINGERS, -first.value * (1.0 - KEPT))),
-    )
-    try:
-        second = maximize(kept)
-    except SolverError:
-        second = first  # within rounding of infeasible where discs are tiny
-    if isinstance(second, Optimum) and second is not first:
-        return nearest_optimum(kept, second), first.value
-    x = np.append(first.x[:-1], np.full(n - program.radii, first.value))
-    x[program.radii] += program.excess
-    return x, first.value
-
-
-def regulus_bounds(
-    table: FaceTable, attempts: Attempts, *, any_choice: bool = False
-) -> tuple[Array, Indices]:
-    """Bound the merits of regulus grasps, minus the largest offsets, for many attempts.
-
-    Gives the merits of the best choices, or of any choices, (a,): minus infinity where a proof
-    excludes every choice, infinity where a choice was not decided. Then these choices, (a, 3), -1
-    where there is none.
-    """
-    bounds = np.empty(len(attempts.faces))
-    chosen = np.empty((len(bounds), 3), dtype=np.int64)
-    compiled(REGULUS).regulus_bounds(table, attempts, any_choice, bounds, chosen)
-    return bounds, chosen
-
-
-def place_reguli(table: FaceTable, attempts: Attempts, placed: Placed) -> None:
-    """Place contacts on the lines of one regulus each; the merit is minus the largest offset."""
-    merits, chosen = regulus_bounds(table, attempts)
-    for a, (merit, choice) in enumerate(zip(merits.tolist(), chosen.tolist(), strict=True)):
-        try:
-            best = place_best(table, attempts, a, [tuple(choice)] if choice[0] >= 0 else [], placed)
-            # the program, solved again, has to confirm what compiled code chose
-            if not (best == merit or abs(best - merit) <= RESIDUAL):
-                place_best(table, attempts, a, CHOICES, placed)
-        except SolverError:
-            placed.ends[a] = LEFT
-
-
-def place_best(
-    table: FaceTable, attempts: Attempts, a: int, choices: Iterable[Choice], placed: Placed
-) -> float:
-    """Enter the best placement of one attempt over given choices, and return its merit."""
-    kernel, best, placed.ends[a] = compiled(REGULUS), -math.inf, NONE
-    fingers = kernel.fingers_of(table, attempts, a)
-    for choice in choices:
-        usable, rows = kernel.regulus_program(fingers, choice)
-        if not usable:
-            continue
-        A, equal = rows.At.T, len(rows.b) - rows.equalities
-        c = -np.eye(A.shape[1])[kernel.T]
-        program = LinearProgram(c, A[:equal], rows.b[:equal], A[equal:], rows.b[equal:])
-        found = maximize(program)
-        # ties go to the first choice: rounding must not decide between equal ones
-        if isinstance(found, Optimum) and found.value > best + kernel.SAME_OFFSET:
-            x, best = nearest_optimum(program, found, GIVEN_UP), found.value
-            kernel.take(fingers, a, choice, x, best, placed)
-    return best
 
 
 def point_regions(placement: Placement) -> Regions:

@@ -48,7 +48,7 @@ def program_of(pencil: bool, fingers: Fingers, pattern: Array) -> Program:
     return pencil_program(fingers, pattern) if pencil else concurrent_program(fingers, pattern)
 
 
-@loop("numpy")
+@loop("numpy", once=True)
 def take(
     pencil: bool, fingers: Fingers, a: int, pattern: Array, x: Array, radius: float, placed: Placed
 ) -> None:

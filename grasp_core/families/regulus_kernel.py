@@ -35,8 +35,9 @@ program is linear:
                             p beyond a least gap, on either side.                        (8)
 
 The last two keep out the zero force, and lines that meet: those are pencils. The program is solved
-for some slopes of both pairs, on either side of the focus line: compiled code chooses the ones
-whose contacts are nearest to the faces' middles, and `placing` solves its program again.
+for some slopes of both pairs, on either side of the focus line. Those count whose contacts are
+nearest to the faces' middles. Of their best contacts the ones with the least variables are taken
+(see `ties`), which meet every row: that they are there shows that the bound is reached.
 
 A program is first solved without its gap: if p stays beyond the gap anyway, that side was the
 better one. As the cones span (P3), x_i is on the side of its pair's resultant; there the rows (6)
@@ -50,28 +51,28 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Array, Indices
+from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import (
+    ACCURACY,
     TURNS,
     balance,
-    empty_rows,
     facets,
     fingers_of,
-    measure,
-    vertex_of,
 )
-from grasp_core.families.placements import PLACED, Attempts, FaceTable, Fingers, Placed
+from grasp_core.families.placements import (
+    LEFT,
+    NONE,
+    PLACED,
+    Attempts,
+    FaceTable,
+    Fingers,
+    Placed,
+)
 from grasp_core.geometry.vectors_kernel import angle_between, cross, dotted, focus_direction
-from grasp_core.solvers.lp_kernel import (
-    INFEASIBLE,
-    LOST,
-    Rows,
-    Vertex,
-    proved_bound,
-    proved_empty,
-    solve,
-)
+from grasp_core.solvers.lp_kernel import Rows, Vertex, bounded, empty_rows, vertex_of
+from grasp_core.solvers.nearest_point_kernel import nearest
+from grasp_core.solvers.ties import FEASIBLE, FOUND
 from grasp_core.values import FINGERS
 
 LEAST_DEPTH = 0.02
@@ -89,11 +90,9 @@ SAME_OFFSET = 1e-9
 FLAT = 1e-12
 """Size of a facet's component along N below which the facet does not bound z / x: it allows every
 value or none."""
-ACCURACY, FARTHEST = 1e-11, 1e4
-"""Error up to which multipliers give the objective, and the size |x|_1 of the variables up to which
-a proof of infeasibility must hold."""
-NONE, PLUS, MINUS = -1, 0, 1
-"""Codes of the side: no slopes are feasible, p > 0, p < 0."""
+GIVEN_UP = 1e-9
+"""Offset given up in favour of the least variables: giving up less makes the contacts of two
+pairings differ from each other's."""
 
 
 class PairFrames(NamedTuple):
@@ -215,46 +214,79 @@ class _Line(NamedTuple):
 
 
 @loop()
-def regulus_bounds(
-    faces: FaceTable, attempts: Attempts, any_choice: bool, bounds: Array, chosen: Indices
-) -> None:
-    """Bound minus the largest offset over slopes, until none is better, or any is feasible."""
-    slopes, vertex = len(SLOPES), vertex_of(VARIABLES)
-    enough = -np.inf if any_choice else -SAME_OFFSET
+def regulus_bounds(faces: FaceTable, attempts: Attempts, bounds: Array) -> None:
+    """Fill in minus infinity where no slopes are feasible, and infinity where some may be, (a,)."""
     for a in range(len(bounds)):
         fingers = fingers_of(faces, attempts, a)
+        best, _, _ = _best_choice(fingers, pair_frames(fingers), -np.inf)
+        bounds[a] = best if best == -np.inf else np.inf
+
+
+@loop()
+def place(faces: FaceTable, attempts: Attempts, placed: Placed) -> None:
+    """Place contacts for each attempt on the lines of its best regulus.
+
+    The merit is minus the largest offset from the middles of the faces.
+    """
+    x = np.empty(VARIABLES)
+    for a in range(len(placed.ends)):
+        fingers = fingers_of(faces, attempts, a)
         frames = pair_frames(fingers)
-        bounds[a], chosen[a] = -np.inf, NONE
-        for i in range(slopes):
-            for j in range(slopes):
-                if not (frames.usable[0, i] and frames.usable[1, j]) or bounds[a] > enough:
-                    continue
+        best, slopes, side = _best_choice(fingers, frames, -SAME_OFFSET)
+        placed.ends[a] = NONE if best == -np.inf else LEFT
+        if abs(best) < np.inf and _nearest_optimum(fingers, frames, slopes, side, best, x):
+            _take(fingers, frames, slopes, a, x, placed)
+            placed.ends[a], placed.merits[a] = PLACED, best
+
+
+@loop()
+def _best_choice(
+    fingers: Fingers, frames: PairFrames, enough: float
+) -> tuple[float, tuple[int, int], float]:
+    """Find the slopes and the side of p with the largest bound, until one is above `enough`."""
+    best, slopes, side, vertex = -np.inf, (0, 0), 1.0, vertex_of(VARIABLES)
+    for i in range(len(SLOPES)):
+        for j in range(len(SLOPES)):
+            if frames.usable[0, i] and frames.usable[1, j] and best <= enough:
+                # ties go to the first choice: rounding must not decide between equal ones
+                worth = best + SAME_OFFSET
                 rows, gap = _rows(fingers, frames, (i, j))
-                worth = bounds[a] + SAME_OFFSET
-                best, side = _best_side(rows, gap, worth, vertex)
-                if best > worth:
-                    bounds[a] = best
-                    chosen[a, 0], chosen[a, 1], chosen[a, 2] = i, j, side
+                found, sign = _best_side(rows, gap, worth, vertex)
+                if found > worth:
+                    best, slopes, side = found, (i, j), sign
+    return best, slopes, side
 
 
-@loop()
-def regulus_program(fingers: Fingers, choice: tuple[int, int, int]) -> tuple[bool, Rows]:
-    """Build the program for given slopes and side; return also whether the slopes are usable."""
-    frames, (i, j, side) = pair_frames(fingers), choice
-    rows, gap = _rows(fingers, frames, (i, j))
-    rows.At[P, 0], rows.b[0] = (-1.0 if side == PLUS else 1.0), -gap
-    return frames.usable[0, i] and frames.usable[1, j], rows
+@loop(once=True)
+def _nearest_optimum(
+    fingers: Fingers, frames: PairFrames, slopes: tuple[int, int], side: float, best: float,
+    x: Array,
+) -> bool:  # fmt: skip
+    """Fill in the optimum with the least variables; return whether it meets every row."""
+    rows, gap = _rows(fingers, frames, slopes)
+    rows.At[P, 0], rows.b[0] = -side, -gap
+    count, room = len(rows.b), len(rows.b) + rows.equalities + 1
+    A, b = np.zeros((room, VARIABLES)), np.empty(room)
+    for k in range(room - 1):
+        # equalities hold from both sides
+        sign, row = (1.0, k) if k < count else (-1.0, k - rows.equalities)
+        b[k] = sign * rows.b[row]
+        for j in range(VARIABLES):
+            A[k, j] = sign * rows.At[j, row]
+    A[-1, T], b[-1] = 1.0, GIVEN_UP * (1.0 + abs(best)) - best
+    unmet, excess = nearest(A, b, x)
+    return unmet <= FOUND and excess <= FEASIBLE
 
 
-@loop()
-def take(
-    fingers: Fingers, a: int, choice: tuple[int, int, int], x: Array, merit: float, placed: Placed
+@loop(once=True)
+def _take(
+    fingers: Fingers, frames: PairFrames, slopes: tuple[int, int], a: int, x: Array, placed: Placed
 ) -> None:
     """Fill in contacts, forces and foci from the variables of a program."""
-    frames, ways = pair_frames(fingers), np.empty((FINGERS, 3))
+    ways = np.empty((FINGERS, 3))
     placed.foci[a] = 0.0
     for finger in range(FINGERS):
-        line, n = _line(frames, choice[:2], finger), fingers.normals[finger]
+        line, n = _line(frames, slopes, finger), fingers.normals[finger]
         contact, way = placed.positions[a, finger], ways[finger]
         for d in range(3):
             passing = x[d] + x[K] * line.k[d] + x[P] * line.p[d]
@@ -268,48 +300,41 @@ def take(
         for d in range(3):
             contact[d] -= off * n[d]
     balance(ways, fingers.normals, placed.forces[a])
-    placed.ends[a], placed.merits[a] = PLACED, merit
 
 
 @loop(once=True)
-def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[float, int]:
-    """Solve the programs for p > gap and p < -gap; return the better bound and its side."""
+def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[float, float]:
+    """Solve the programs for p > gap and p < -gap; return the better bound and the sign of p."""
     either = _bounded(rows, worth, vertex)
     p = vertex.x[P]  # anything where `either` is infinite: the sides decide then, or nothing does
     if either <= worth or p >= gap:
-        return either, PLUS
+        return either, 1.0
     rows.At[P, 0], rows.b[0] = -1.0, -gap
     plus = _bounded(rows, worth, vertex)
     if plus >= either - SAME_OFFSET:
-        return plus, PLUS
+        return plus, 1.0
     if p <= -gap:
-        return either, MINUS
+        return either, -1.0
     worth = max(worth, plus + SAME_OFFSET)
     rows.At[P, 0] = 1.0
     minus = _bounded(rows, worth, vertex)
-    return (minus, MINUS) if minus > worth else (plus, PLUS)
+    return (minus, -1.0) if minus > worth else (plus, 1.0)
 
 
 @loop()
 def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
-    """Bound a program from above: minus infinity if infeasible, infinity if undecided."""
+    """Bound minus the offset from above."""
     c = np.zeros(VARIABLES)
     c[T] = -1.0
-    measure(rows)
-    status, against = solve(c, rows, worth, vertex)
-    if status == INFEASIBLE:
-        return -np.inf if proved_empty(rows, vertex, against, FARTHEST) else np.inf
-    return np.inf if status == LOST else proved_bound(c, rows, vertex, ACCURACY)
+    return bounded(c, rows, worth, ACCURACY, vertex)
 
 
 @loop("numpy")
 def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tuple[Rows, float]:
     """Build the rows, the first left for the gap (8) and equalities last; return also the gap."""
     count = 1 + FINGERS * (4 + 1 + 1) + 4 + fingers.edges.sum()
-    rows = empty_rows(VARIABLES, count)
-    rows = Rows(rows.At, rows.b, rows.norms, FINGERS)
+    rows = empty_rows(VARIABLES, count, FINGERS)
     row, equality = 1, count - FINGERS
-    rows.b[0] = 0.0
     for finger in range(FINGERS):
         line, n = _line(frames, slopes, finger), fingers.normals[finger]
         row = _edge_rows(fingers, finger, line, rows, row)
@@ -326,7 +351,6 @@ def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tupl
             # (6), as bounds on z / x
             tight = frames.tight[pair, slopes[pair], bound]
             rows.At[X + pair, row], rows.At[Z + pair, row] = -tight[0], -tight[1]
-            rows.b[row] = 0.0
             row += 1
     # (8) for both pairs: l_i is p times the slope of the other
     steepest = min(abs(frames.tau[0, slopes[0]]), abs(frames.tau[1, slopes[1]]))

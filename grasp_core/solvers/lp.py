@@ -70,29 +70,10 @@ class Infeasible:
     multipliers: Array  # multipliers y, then z, of the combination, (rows + equalities,)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Below:
-    """A proof, by multipliers as for an optimum, that no feasible value reaches the cutoff."""
-
-    bound: float  # upper bound on all feasible values that the multipliers prove, b.y + b_eq.z
-    multipliers: Array
-    """Multipliers y, then z, (rows + equalities,); the first `rows` are non-negative."""
-
-
 def maximize(program: LinearProgram) -> Optimum | Infeasible:
     """Solve a linear program, or prove that it has no feasible point."""
-    found = maximize_above(program, -math.inf)
-    if isinstance(found, Below):
-        raise SolverError(
-            "the simplex method stopped at a cutoff, though no cutoff was given; please report this"
-        )
-    return found
-
-
-def maximize_above(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
-    """Solve a linear program like `maximize`, but stop once a bound below a cutoff is proved."""
     try:
-        return _by_simplex(program, cutoff)
+        return _by_simplex(program)
     except (SolverError, np.linalg.LinAlgError):
         return _by_highs(program)
 
@@ -107,14 +88,14 @@ def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
     raise failure
 
 
-def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible | Below:
+def _by_simplex(program: LinearProgram) -> Optimum | Infeasible:
     G, h = program.stacked()
     count, n = G.shape
-    kernel, basis = compiled(KERNEL), np.empty(n, dtype=np.int64)
-    ended = kernel.Vertex(basis, np.empty(n), np.empty(n))
-    norms = np.maximum(np.sqrt(np.einsum("ki,ki->k", G, G)), RESIDUAL)
-    rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), norms, count - len(program.b))
-    status, against = kernel.solve(program.c, rows, cutoff, ended)
+    kernel = compiled(KERNEL)
+    ended = kernel.vertex_of(n)
+    basis = ended.basis
+    rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), count - len(program.b))
+    status, against = kernel.solve(program.c, rows, -math.inf, ended)
     if status == kernel.LOST:
         raise SolverError("the simplex method reached its limit of steps without an answer")
     basis.sort()
@@ -131,15 +112,6 @@ def _by_simplex(program: LinearProgram, cutoff: float) -> Optimum | Infeasible |
             )
         return _checked_ray(program, multipliers[:count])
     multipliers[basis] = np.linalg.solve(vertex.T, program.c)
-    if status == kernel.BELOW:
-        proof = multipliers[:count]
-        proof[: len(program.b)] = np.maximum(proof[: len(program.b)], 0.0)
-        off, bound = float(np.abs(program.c - G.T @ proof).max()), float(h @ proof)
-        if not (off <= RESIDUAL and bound <= cutoff):  # nor if one is not a number
-            raise SolverError(
-                f"the simplex method put the optimum below {cutoff:.3g}, but proved {bound:.3g}"
-            )
-        return Below(bound, proof)
     if basis[-1] >= count:
         raise SolverError(
             "the simplex method reached its largest numbers; the program may be unbounded"

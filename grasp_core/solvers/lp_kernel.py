@@ -3,7 +3,8 @@
     maximise c.x  subject to  a_k.x <= b_k (or = b_k).
 
 Solved: which n rows hold with equality at a best vertex, or with which of them another row is in
-contradiction. `lp` solves for the vertex and the multipliers afresh and checks them.
+contradiction. `lp` solves for the vertex and the multipliers afresh and checks them; loops that
+only ask for a bound have it proved here, from the multipliers alone.
 
 Method. Any n independent rows, the basis, meet in a point x and give c = y_1 a_1 + .. + y_n a_n. As
 long as y >= 0 (of any sign for equalities), c.x is at least the optimum. The corner on the side of
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
+from grasp_core.solvers.lp import FARTHEST
 
 BOX = 1e3
 """Half the side of the box in which the search begins: data are of order one, and a program whose
@@ -38,20 +40,18 @@ PATIENCE, MOST = 3, 60
 """Steps without progress until the first violated row is chosen, and largest number of steps, both
 per variable."""
 REFINEMENTS = 3
-NEGLIGIBLE = 1e-12
-"""Size up to which a multiplier counts as zero."""
+SHORTEST = 1e-8
+"""Least length of a row that violations are divided by."""
 OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
 
 
 class Rows(NamedTuple):
-    """The rows of a program; equalities come last, and their signs may be changed."""
+    """The rows of a program; equalities come last, and the search may change their signs."""
 
     At: Array
     """Transpose of the matrix A of rows, (n, rows): loops over rows then read adjacent memory."""
     b: Array
     """Right-hand sides, (rows,)."""
-    norms: Array
-    """Lengths of the rows, (rows,)."""
     equalities: int
 
 
@@ -69,18 +69,43 @@ class Vertex(NamedTuple):
 
 
 @loop("numpy")
+def empty_rows(n: int, count: int, equalities: int) -> Rows:
+    """Make rows of zeros for a program of n variables."""
+    return Rows(np.zeros((n, count)), np.zeros(count), equalities)
+
+
+@loop("numpy")
+def vertex_of(n: int) -> Vertex:
+    """Make an empty vertex of a program with n variables."""
+    return Vertex(np.empty(n, dtype=np.int64), np.empty(n), np.empty(n))
+
+
+@loop("numpy")
+def bounded(c: Array, rows: Rows, cutoff: float, accuracy: float, vertex: Vertex) -> float:
+    """Prove an upper bound on c.x that is the tightest one if it is above the cutoff.
+
+    It is minus infinity where nothing is feasible, and infinite where nothing is proved.
+    """
+    status, against = solve(c, rows, cutoff, vertex)
+    if status == INFEASIBLE:
+        return -np.inf if proved_empty(rows, vertex, against, FARTHEST) else np.inf
+    # a wrong answer of the search costs tightness, never correctness
+    return np.inf if status == LOST else proved_bound(c, rows, vertex, accuracy)
+
+
+@loop("numpy")
 def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int]:
     """Find a best vertex: how that ended, and the row that contradicts the basis, if one does."""
     n, count, idle = len(c), len(rows.b), 0
     basis, y, x = vertex
-    inverse, value = _corner(c, count, vertex)
+    inverse, value, norms = *_corner(c, count, vertex), _lengths(rows)
     alpha, excess, inside = np.empty(n), np.empty(count), np.zeros(count, dtype=np.bool_)
     for _ in range(MOST * n):
         if value < cutoff and not _leans_on_box(y, basis, count):
             _refine(c, rows, basis, inverse, y)
             return BELOW, -1
         _exceeded(x, rows, excess)
-        entering = _violated(excess, rows, inside, idle > PATIENCE * n)
+        entering = _violated(excess, rows, norms, inside, idle > PATIENCE * n)
         if entering < 0:
             _refine(c, rows, basis, inverse, y)
             return OPTIMAL, -1
@@ -112,10 +137,8 @@ def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float
     bound, left = 0.0, c.copy()
     for j in range(len(c)):
         share = vertex.y[j]
-        if abs(share) <= NEGLIGIBLE:
-            continue
         if not _may_weigh(share, vertex.basis[j], rows):
-            return np.inf
+            continue  # left out, it shows in what is left
         bound += share * rows.b[vertex.basis[j]]
         _subtract(left, share, rows, vertex.basis[j])
     proved = np.abs(left).max() <= accuracy and bound < np.inf  # which no bound is that is none
@@ -133,9 +156,7 @@ def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> b
     for j in range(len(left)):
         share = vertex.y[j]
         if not _may_weigh(-share, vertex.basis[j], rows):
-            if abs(share) > POSITIVE:
-                return False
-            continue  # left out, it shows in what is left
+            continue
         gap += share * rows.b[vertex.basis[j]]
         _subtract(left, share, rows, vertex.basis[j])
     return gap > farthest * np.abs(left).max() + VIOLATED
@@ -162,6 +183,18 @@ def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
 
 
 @loop("numpy", once=True)
+def _lengths(rows: Rows) -> Array:
+    """Return the length of each row, or `SHORTEST`."""
+    norms = np.zeros(len(rows.b))
+    for i in range(len(rows.At)):
+        for k in range(len(norms)):
+            norms[k] += rows.At[i, k] * rows.At[i, k]
+    for k in range(len(norms)):
+        norms[k] = max(np.sqrt(norms[k]), SHORTEST)
+    return norms
+
+
+@loop("numpy", once=True)
 def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
     leans = False
     for j in range(len(y)):
@@ -181,13 +214,15 @@ def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
 
 
 @loop("numpy", once=True)
-def _violated(excess: Array, rows: Rows, inside: NDArray[np.bool_], first: bool) -> int:
+def _violated(
+    excess: Array, rows: Rows, norms: Array, inside: NDArray[np.bool_], first: bool
+) -> int:
     """Return the row that is violated most, or the first violated row; -1 if none is violated."""
     worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
     for k in range(len(excess)):
         beyond = excess[k] if k < inequalities else abs(excess[k])
-        if beyond > worst * rows.norms[k] and not inside[k]:
-            worst, found = beyond / rows.norms[k], k
+        if beyond > worst * norms[k] and not inside[k]:
+            worst, found = beyond / norms[k], k
             if first:
                 break
     return found

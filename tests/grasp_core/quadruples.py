@@ -41,5 +41,5 @@ def tilted_side_cones(pieces, tilt, half_angle):
 
 
 def leave_all(monkeypatch):
-    """Have compiled code leave all attempts to place discs, which come to HiGHS then."""
+    """Have compiled code solve no program of discs."""
     monkeypatch.setattr(placing_kernel, "place", lambda *given: given[-1].ends.fill(LEFT))

@@ -1,10 +1,9 @@
-"""Contacts placed for many attempts at once, in compiled code and by HiGHS."""
+"""Contacts placed for many attempts at once."""
 
 import numpy as np
 import pytest
 
 from grasp_core.errors import SolverError
-from grasp_core.families import placing
 from grasp_core.families.placements import LEAST_RADIUS, face_table
 from grasp_core.families.placing import CONSTRUCTIONS, MIXED, attempts_of, regions_of
 from grasp_core.objects.face_pieces import edge_rows, face_shapes, inscribed_radius
@@ -73,23 +72,6 @@ def test_discs_are_the_largest_that_plain_rows_allow(case, friction):
     assert ends[False] >= (10 if case == "mixed" else 0)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_highs_places_what_compiled_code_leaves_in_the_same_way(case, monkeypatch):
-    construction, tested = CASES[case], 0
-    for name in OBJECTS:
-        pieces, listed = attempts(example_object(name), 0.4, construction.orders)
-        quick = placed(construction, pieces, listed)
-        with monkeypatch.context() as patch:
-            leave_all(patch)
-            slow = placed(construction, pieces, listed)
-        for one, other in zip(quick, slow, strict=True):
-            assert (one is None) is (other is None)
-            if one is not None:
-                agrees(one, other)
-                tested += 1
-    assert tested >= (20 if case == "mixed" else 100)
-
-
 def agrees(one, other):
     for name in ("positions", "forces", "foci", "radii"):
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0.0, atol=SAME)
@@ -145,12 +127,8 @@ def test_of_cones_with_different_widths_the_narrowest_counts():
     agrees(one, other)
 
 
-def test_a_program_that_nobody_solves_is_said_to_fail(monkeypatch):
-    def failing(*_):
-        raise SolverError("no answer")
-
+def test_a_program_that_is_not_solved_is_said_to_fail(monkeypatch):
     pieces, listed = attempts(example_object("random-12-1"), 0.4, ((0, 1, 2, 3),))
     leave_all(monkeypatch)
-    monkeypatch.setattr(placing, "maximize_above", failing)
     with pytest.raises(SolverError, match="neither solved nor proved"):
         placed(CONSTRUCTIONS["concurrent"], pieces, listed[:1])

@@ -6,18 +6,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
-from grasp_core.families import placing
-from grasp_core.families.placements import face_table, room_for
-from grasp_core.families.placing import (
-    AS_LISTED,
-    CHOICES,
-    CONSTRUCTIONS,
-    attempts_of,
-    nearly_symmetric,
-    place_best,
-    regulus_bounds,
-)
-from grasp_core.families.regulus_kernel import LEAST_DEPTH
+from grasp_core.families.placing import CONSTRUCTIONS, nearly_symmetric
+from grasp_core.families.regulus_kernel import GIVEN_UP, LEAST_DEPTH
 from tests.grasp_core.families import reference_programs as programs
 from tests.grasp_core.quadruples import paired_quadruples
 
@@ -28,13 +18,6 @@ OBJECTS = ("random-30-1", "icosahedron", "dodecahedron", "chamfered-box", "doubl
 
 def place_regulus(quad, cones):
     return CONSTRUCTIONS["regulus"].place(quad, cones)
-
-
-def best_of_all(quad, cones):
-    """The placement over all slopes and sides, whatever compiled code would choose."""
-    placed, attempts = room_for(1), attempts_of([(AS_LISTED[0], cones)])
-    place_best(face_table(quad), attempts, 0, CHOICES, placed)
-    return CONSTRUCTIONS["regulus"].one_of(placed, 0)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +60,7 @@ def test_contacts_lie_on_their_faces_within_the_stated_offset(reguli):
         for piece, at in zip(quad, placed.positions, strict=True):
             flat = piece.frame.T @ (at - piece.origin)
             assert (piece.E @ flat <= piece.b + TOLERANCE).all()
-            given_up = placing.GIVEN_UP * (1.0 - placed.merit)
+            given_up = GIVEN_UP * (1.0 - placed.merit)
             assert np.abs(flat).max() <= -placed.merit + given_up + TOLERANCE
 
 
@@ -132,54 +115,12 @@ def test_pairings_that_are_dropped_unseen_have_no_regulus():
     assert dropped >= 100
 
 
-def test_compiled_code_chooses_the_slopes_that_all_programs_choose():
-    tried = Counter()
-    for name in OBJECTS:
-        for quad, cones in paired_quadruples(name, math.radians(10.0), 30):
-            attempts = attempts_of([(AS_LISTED[0], cones)])
-            (merit,), _ = regulus_bounds(face_table(quad), attempts)
-            quick, slow = place_regulus(quad, cones), best_of_all(quad, cones)
-            assert (quick is None) is (slow is None)
-            if slow is None:
-                assert merit == -math.inf
-            else:
-                assert merit == pytest.approx(slow.merit, abs=1e-8)
-                np.testing.assert_allclose(quick.positions, slow.positions, atol=1e-9)
-            tried[slow is None] += 1
-    assert tried[False] >= 60
-    assert tried[True] >= 10
-
-
 def test_the_merit_is_the_optimum_of_plain_rows():
     tried = Counter()
     for name in OBJECTS:
-        for quad, cones in paired_quadruples(name, math.radians(10.0), 6):
+        for quad, cones in paired_quadruples(name, math.radians(10.0), 30):
             placed, best = place_regulus(quad, cones), programs.regulus(quad, cones)
             assert (placed.merit if placed else -math.inf) == pytest.approx(best, abs=1e-8)
             tried[placed is None] += 1
-    assert tried[False] >= 12
-    assert tried[True] >= 3
-
-
-@pytest.mark.parametrize("lie", ["better", "worse", "none", "other slopes"])
-def test_what_compiled_code_gets_wrong_is_found_by_all_programs(monkeypatch, lie):
-    def lying(table, attempts):
-        merits, chosen = honest(table, attempts)
-        if lie == "other slopes":
-            return merits, np.where(chosen[:, :1] >= 0, 2 - chosen, chosen) % (3, 3, 2)
-        if lie == "none":
-            return np.full_like(merits, np.inf), np.full_like(chosen, -1)
-        return merits + (0.1 if lie == "better" else -0.1), chosen
-
-    pairs = list(paired_quadruples("random-30-1", math.radians(10.0), 12))
-    right = [best_of_all(*pair) for pair in pairs]
-    honest = placing.regulus_bounds
-    monkeypatch.setattr(placing, "regulus_bounds", lying)
-    placed = 0
-    for pair, expected in zip(pairs, right, strict=True):
-        found = place_regulus(*pair)
-        assert (found is None) is (expected is None)
-        if found is not None:
-            assert found.merit == pytest.approx(expected.merit, abs=1e-8)
-            placed += 1
-    assert placed >= 4
+    assert tried[False] >= 60
+    assert tried[True] >= 10
