@@ -3,7 +3,7 @@
 A kernel, `NAME_kernel.py` beside the module `NAME.py`, is plain arithmetic on arrays of programs,
 directions or contacts. Kernels are loaded on first use, since numba takes half a second to import.
 A result that makes a claim, such as a placement, a closure or a quality, is checked by the module
-that asks for it; what fails the check goes to a solver such as HiGHS or Clarabel. Results that only
+that asks for it; what fails the check is decided by Clarabel or by nobody. Results that only
 say where to search are not checked: spanning quadruples, tilted cones, and bounds on discs, whose
 multipliers are checked in compiled code. Tests compare these with reference implementations.
 

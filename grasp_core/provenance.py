@@ -15,7 +15,7 @@ import numpy as np
 from grasp_core.compiled import compiled, state_of
 
 PACKAGES = (
-    "graspproof", "mujoco", "numpy", "scipy", "manifold3d", "highspy", "numba",
+    "graspproof", "mujoco", "numpy", "scipy", "manifold3d", "numba",
     "clarabel", "qpsolvers", "proxsuite",
 )  # fmt: skip
 

@@ -17,13 +17,13 @@ ROOT = Path(__file__).parent.parent
 
 
 HEAVY = (
-    "numpy", "scipy", "numba", "highspy", "clarabel", "qpsolvers", "manifold3d", "trimesh",
+    "numpy", "scipy", "numba", "clarabel", "qpsolvers", "manifold3d", "trimesh",
     "mujoco", "resvg_py",
 )  # fmt: skip
 NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "scipy.spatial", "scipy.optimize")
 
 NOT_TO_PLAN_AGAIN = (
-    *NOT_TO_PLAN, "highspy", "clarabel", "resvg_py", "PIL", "pyarrow", "jinja2",
+    *NOT_TO_PLAN, "clarabel", "resvg_py", "PIL", "pyarrow", "jinja2",
     "scipy.sparse", "scipy.stats", "grasp_core.regions",
     "grasp_core.optimizing", "sim_validate.engine", "sim_validate.report",
 )  # fmt: skip

@@ -59,14 +59,23 @@ def minimize(program: ConicProgram) -> ConicSolution:
     """Solve a conic program that is feasible and bounded."""
     failure = SolverError("Clarabel was not called with any settings")
     for change in WAYS:
+        solution, status = answered(program, change)
         try:
-            return _solved(program, change)
+            _check(program, solution, status)
         except SolverError as error:
             failure = error
+        else:
+            return solution
     raise failure
 
 
-def _solved(program: ConicProgram, change: tuple[str, float] | None) -> ConicSolution:
+def answered(
+    program: ConicProgram, change: tuple[str, float] | None = None
+) -> tuple[ConicSolution, str]:
+    """Return what Clarabel answers, not checked, and what it says of it.
+
+    Where it finds no feasible point, the dual variable is a proof: A'z = 0 and b.z < 0.
+    """
     kinds = list(_kinds(program.zeros, program.nonnegatives, program.cones))
     solver = _clarabel().DefaultSolver(
         _no_squares(len(program.q)), program.q, _columns(program.A), program.b, kinds,
@@ -74,9 +83,7 @@ def _solved(program: ConicProgram, change: tuple[str, float] | None) -> ConicSol
     )  # fmt: skip
     answer = solver.solve()
     x = np.array(answer.x)
-    solution = ConicSolution(x, np.array(answer.z), float(program.q @ x))
-    _check(program, solution, str(answer.status))
-    return solution
+    return ConicSolution(x, np.array(answer.z), float(program.q @ x)), str(answer.status)
 
 
 @lru_cache(maxsize=256)

@@ -1,39 +1,34 @@
-"""Solves linear programs and proves every answer; only this module calls HiGHS.
+"""Solves linear programs and proves every answer.
 
     maximise c.x  subject to  A x <= b,  A_eq x = b_eq,  x free.
 
 An optimum comes with multipliers y >= 0, z such that c = A'y + A_eq'z, which bound every
 feasible value by b.y + b_eq.z. An infeasible program comes with y >= 0, z such that
 A'y + A_eq'z = 0 and b.y + b_eq.z < 0, which no feasible x survives. Both are checked in
-plain arithmetic before they are returned; the solver's status is not believed.
+plain arithmetic before they are returned; no solver's status is believed.
 
 Programs go to a compiled dual simplex method first; it names the rows of a best vertex, and the
-vertex and its multipliers are solved for afresh. HiGHS solves the programs that it leaves or gets
-wrong.
+vertex and its multipliers are solved for afresh. Programs that it leaves or gets wrong are solved
+as conic programs without second-order cones.
 """
 
-import importlib
 import math
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
+from grasp_core.solvers.conic import ConicProgram, answered
 
 RESIDUAL = 1e-8
 """Largest accepted violation, for programs whose data are of order one (the planner scales objects
-to unit size): ten times the tolerance that HiGHS is asked for."""
+to unit size)."""
 FARTHEST = 1e4
 """Largest |x|_1 that a proof of infeasibility must exclude, at unit size."""
 
 KERNEL = "grasp_core.solvers.lp_kernel"
-STRATEGIES = (1, 4)
-"""HiGHS's dual and primal simplex methods, in the order they are tried: about one program in a
-thousand ends as unknown with one and is solved with the other."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,17 +70,20 @@ def maximize(program: LinearProgram) -> Optimum | Infeasible:
     try:
         return _by_simplex(program)
     except (SolverError, np.linalg.LinAlgError):
-        return _by_highs(program)
+        return _by_interior_point(program)
 
 
-def _by_highs(program: LinearProgram) -> Optimum | Infeasible:
-    failure = SolverError("HiGHS was not called with any strategy")
-    for strategy in STRATEGIES:
-        try:
-            return _solved(program, strategy)
-        except SolverError as error:
-            failure = error
-    raise failure
+def _by_interior_point(program: LinearProgram) -> Optimum | Infeasible:
+    """Solve a linear program by Clarabel, whose rows begin with the equalities."""
+    G, h = program.stacked()
+    rows, order = len(program.b), np.roll(np.arange(len(h)), len(h) - len(program.b))
+    answer, _ = answered(ConicProgram(-program.c, G[order], h[order], len(h) - rows, rows))
+    multipliers = np.empty(len(h))
+    multipliers[order] = answer.z
+    try:
+        return _checked_optimum(program, answer.x, multipliers)
+    except SolverError:
+        return _checked_ray(program, multipliers)
 
 
 def _by_simplex(program: LinearProgram) -> Optimum | Infeasible:
@@ -150,55 +148,4 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
         combined = np.abs(G.T @ multipliers).max(initial=0.0)
         if -float(h @ multipliers) > FARTHEST * combined + RESIDUAL:
             return Infeasible(multipliers)
-    raise SolverError("HiGHS called the linear program infeasible, but its proof fails the check")
-
-
-def _solved(program: LinearProgram, strategy: int) -> Optimum | Infeasible:
-    highspy, solver = _highs()
-    G, h = program.stacked()
-    lower = np.full(len(h), -np.inf)
-    lower[len(program.b) :] = h[len(program.b) :]
-    model = highspy.HighsLp()
-    model.num_col_, model.num_row_ = G.shape[1], G.shape[0]
-    model.sense_ = highspy.ObjSense.kMaximize
-    model.col_cost_ = program.c
-    model.col_lower_ = np.full(G.shape[1], -np.inf)
-    model.col_upper_ = np.full(G.shape[1], np.inf)
-    model.row_lower_, model.row_upper_ = lower, h
-    model.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
-    filled = G != 0.0
-    model.a_matrix_.start_ = np.concatenate([[0], np.cumsum(filled.sum(axis=1))])
-    model.a_matrix_.index_ = np.nonzero(filled)[1]
-    model.a_matrix_.value_ = G[filled]
-    solver.clearSolver()
-    solver.setOptionValue("simplex_strategy", strategy)
-    solver.passModel(model)
-    solver.run()
-    status = solver.getModelStatus()
-    if status == highspy.HighsModelStatus.kOptimal:
-        solution = solver.getSolution()
-        x, duals = np.array(solution.col_value), np.array(solution.row_dual)
-        return _checked_optimum(program, x, duals)
-    if status == highspy.HighsModelStatus.kInfeasible:
-        return _checked_ray(program, np.array(solver.getDualRay()[2]))
-    raise SolverError(
-        f"HiGHS ended without an optimum or a proof: {solver.modelStatusToString(status)}"
-    )
-
-
-@cache
-def _highs() -> tuple[Any, Any]:
-    """Return the package of HiGHS, and a solver with the options that proofs need."""
-    highspy: Any = importlib.import_module("highspy")
-    solver = highspy.Highs()
-    options = {
-        "output_flag": False,
-        "threads": 1,
-        "presolve": "off",  # keeps the proof of infeasibility
-        "solver": "simplex",
-        "primal_feasibility_tolerance": 1e-9,
-        "dual_feasibility_tolerance": 1e-9,
-    }
-    for name, value in options.items():
-        solver.setOptionValue(name, value)
-    return highspy, solver
+    raise SolverError("a linear program was neither solved nor proved infeasible")

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.solvers.lp import FARTHEST
 
@@ -115,7 +114,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
         _combined(rows, entering, inverse, alpha)
         leaving = _leaving(y, alpha, basis, rows)
         if leaving < 0:
-            copy(alpha, y)
+            _refine(rows.At[:, entering].copy(), rows, basis, inverse, y)
             return INFEASIBLE, entering
         drop = max(y[leaving] / alpha[leaving], 0.0)
         idle = idle + 1 if drop * beyond < UNCHANGED else 0
