@@ -31,7 +31,7 @@ As P3 makes the weights of the force directions positive, nothing else changes. 
 all fingers and behind all of them is tried first; mixed sides follow on faces that would have no
 regions. With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
 
-Before any program, `placing_kernel` bounds discs by the distance s_i along the axis between the
+Before any program, `disc_bounds` bounds discs by the distance s_i along the axis between the
 planes across it through the focus and through the disc's centre. The two points of the disc's
 border across the axis see the focus at no less than r, hence
 

@@ -1,6 +1,4 @@
-"""Bounds discs from above: by the corners of the faces alone, or by small linear programs.
-
-Reach, width and heights across bound discs by the corners alone, which costs almost no time.
+"""Bounds discs from above by the corners of the faces alone, which costs almost no time.
 
 Reach. With positive weights w of sum w_i a_i = 0 for the axes, and contacts c_i on the faces,
 sum w_i a_i.(x0 - c_i) = -sum w_i a_i.c_i wherever the focus x0 is. So the weighted mean of the
@@ -30,33 +28,18 @@ it makes the left side of (3) larger by
 
 (3) and (4) spare programs that would find discs below the least radius, or below those already
 found.
-
-Programs. An attempt is four faces in the order of the fingers, with a force cone each. Where a
-construction has discs, the bound is the value of the first program of `discs_kernel`, which
-maximises the smallest radius, on the convex hulls of the faces: no choice of their pieces offers
-more. For reguli the bound only says whether any slopes are feasible on the hulls.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
-from grasp_core.families.placements import (
-    PAIRINGS,
-    Attempts,
-    Corners,
-    FaceTable,
-    face_table,
-)
-from grasp_core.families.placing import KERNEL, REGULUS, Construction
-from grasp_core.objects.face_pieces import Shapes
+from grasp_core.families.placements import PAIRINGS, Corners
+from grasp_core.families.placing import KERNEL
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.values import FINGERS, FaceQuadruple
 
 LEAST_SINE = 1e-6
@@ -138,30 +121,3 @@ def widths_apart(faces: Indices, apart: Array, halves: Array, leaning: Array) ->
         bound = np.where(sines > LEAST_SINE, apart[pair] / np.maximum(sines, LEAST_SINE), np.inf)
         widths[:, i, j] = widths[:, j, i] = bound
     return widths
-
-
-@dataclass(frozen=True, eq=False)
-class AttemptBounds:
-    """Upper bounds on disc radii for attempts on one object's faces."""
-
-    shapes: Shapes
-
-    def of(self, construction: Construction, attempts: Attempts, least: float) -> Array:
-        """Bound the smallest radius from above, (a,) [object radii]; infinite if not proved.
-
-        For reguli the bounds are infinite or, where no slopes are feasible, minus infinity.
-        """
-        attempts = Attempts._make(map(np.ascontiguousarray, attempts))
-        # hulls stand for faces of several pieces: they offer no less than any piece
-        bounds = np.empty(len(attempts.faces))
-        if construction.patterns is None:
-            compiled(REGULUS).regulus_bounds(self._table, attempts, bounds)
-            return bounds
-        pencil, kernel = construction.family == "pencil", compiled(KERNEL)
-        kernel.bounds(pencil, self._table, attempts, construction.patterns, least, bounds)
-        # a proved bound may be off by what the check of multipliers allows
-        return bounds + RESIDUAL
-
-    @cached_property
-    def _table(self) -> FaceTable:
-        return face_table([shape.hull if shape else None for shape in self.shapes])

@@ -59,8 +59,8 @@ class FaceTable(NamedTuple):
     edges leaves rows unused."""
     b: Array  # limits of the rows E y <= b, (f, e)
     edges: Indices  # number of edges of each face, (f,)
-    corners: Array  # corners in space, (f, e, 3); a face with fewer corners leaves rows unused
-    flat: Array  # corners in plane coordinates, (f, e, 2)
+    flat: Array
+    """Corners in plane coordinates, (f, e, 2); a face with fewer corners leaves rows unused."""
     depths: Array  # largest distance of the surface from each plane, (f,)
 
 
@@ -103,7 +103,6 @@ def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
         E=np.zeros((count, most, 2)),
         b=np.zeros((count, most)),
         edges=np.zeros(count, dtype=np.int64),
-        corners=np.zeros((count, most, 3)),
         flat=np.zeros((count, most, 2)),
         depths=np.zeros(count),
     )
@@ -114,7 +113,6 @@ def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
         table.normals[place], table.origins[place] = piece.normal, piece.origin
         table.frames[place], table.depths[place] = piece.frame, piece.depth
         table.edges[place], table.flat[place, :edges] = edges, piece.corners
-        table.corners[place, :edges] = piece.origin + piece.corners @ piece.frame.T
         table.E[place, :edges], table.b[place, :edges] = piece.E, piece.b
     return table
 

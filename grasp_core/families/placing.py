@@ -53,6 +53,7 @@ from grasp_core.objects.face_pieces import (
     inscribed_radius,
     piece_of,
 )
+from grasp_core.solvers.lp import RESIDUAL
 from grasp_core.solvers.ties import graded, surpassing
 from grasp_core.values import (
     FINGERS,
@@ -125,6 +126,23 @@ class Construction:
             pencil = self.family == "pencil"
             compiled(KERNEL).place(pencil, table, attempts, self.patterns, least, placed)
         return placed
+
+    def bounds(self, table: FaceTable, attempts: Attempts, least: float) -> Array:
+        """Bound the merits of many attempts from above, (a,); above `least` tightly.
+
+        Of discs this is the value of their first program. Where faces have several pieces, hulls
+        stand for them: they offer no less than any piece. For reguli the bounds are infinite or,
+        where no slopes are feasible, minus infinity.
+        """
+        attempts = Attempts._make(map(np.ascontiguousarray, attempts))
+        bounds = np.empty(len(attempts.faces))
+        if self.patterns is None:
+            compiled(REGULUS).regulus_bounds(table, attempts, bounds)
+        else:
+            pencil = self.family == "pencil"
+            compiled(KERNEL).bounds(pencil, table, attempts, self.patterns, least, bounds)
+        # a proved bound may be off by what the check of multipliers allows
+        return bounds + RESIDUAL
 
     def one_of(self, placed: Placed, a: int) -> Placement | None:
         """Return what was placed for one attempt, or None if there is nothing as good as asked."""
@@ -283,7 +301,7 @@ class Settling:
             return
         attempts = attempts_of([(faces, cones) for faces, cones, _ in asked])
         least = np.array([end.least for _, _, end in asked])
-        placed = self.construction.placed(self._table, attempts, least)
+        placed = self.construction.placed(self.table, attempts, least)
         for a, (faces, cones, end) in enumerate(asked):
             try:
                 end.solved += 1
@@ -333,7 +351,8 @@ class Settling:
             end.settled = None if found is None else (found[0], cones, found[1], regions)
 
     @cached_property
-    def _table(self) -> FaceTable:
+    def table(self) -> FaceTable:
+        """The convex hulls of all faces."""
         return face_table([shape.hull if shape else None for shape in self.shapes])
 
 

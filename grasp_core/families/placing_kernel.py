@@ -71,9 +71,6 @@ def place(
     for a in range(len(least)):
         worth, placed.ends[a], fingers = least[a], NONE, fingers_of(faces, attempts, a)
         for p in range(len(patterns)):
-            # no program is needed where this limit is too small
-            if not pencil and reach_limit(faces, attempts, a, patterns[p]) < worth:
-                continue
             program = program_of(pencil, fingers, patterns[p])
             x = np.empty(program.A.shape[1])
             end, radius = largest_discs(program, worth, x)
@@ -94,24 +91,8 @@ def bounds(
         found[a], fingers = -np.inf, fingers_of(faces, attempts, a)
         for p in range(len(patterns)):
             worth = max(least, found[a])
-            if not pencil:
-                limit = reach_limit(faces, attempts, a, patterns[p])
-                if limit <= worth:
-                    found[a] = max(found[a], limit)
-                    continue
             program = program_of(pencil, fingers, patterns[p])
             found[a] = max(found[a], largest_last(of_equal_radii(program), worth))
-
-
-@loop("numpy")
-def reach_limit(faces: FaceTable, attempts: Attempts, a: int, sides: Array) -> float:
-    """Bound discs by (5) of `concurrent_kernel` if the focus is before or behind all fingers."""
-    if abs(sides.sum()) < FINGERS:
-        return np.inf
-    corners = Corners(faces.corners, faces.edges)
-    before, behind = _reaches(corners, attempts.faces[a], attempts.axes[a])
-    # the least s_i is at most the weighted mean of all s_i
-    return (before if sides[0] > 0.0 else behind) * np.tan(attempts.half_angles[a])
 
 
 @loop()

@@ -30,7 +30,6 @@ from grasp_core.arrays import Array
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.cones.spanning import each_cones_positively_span
 from grasp_core.errors import SolverError
-from grasp_core.families.disc_bounds import AttemptBounds
 from grasp_core.families.free import RESTARTS, Absence, Undecided, close_patches, place_free
 from grasp_core.families.placements import Attempts, Placement
 from grasp_core.families.placing import (
@@ -189,10 +188,6 @@ class FamilySearch:
     kept: MethodSearch  # what is found and kept; grasps kept meanwhile raise the threshold
 
     @cached_property
-    def _bounded(self) -> AttemptBounds:
-        return AttemptBounds(self.shapes)
-
-    @cached_property
     def _settling(self) -> Settling:
         return Settling(self.construction, self.shapes)
 
@@ -304,7 +299,7 @@ class FamilySearch:
             np.take_along_axis(coned.axes[at, kind], order[:, :, None], axis=1),
             coned.half_angles[at, kind],
         )
-        tight[row, kind, column] = self._bounded.of(construction, attempts, worth)
+        tight[row, kind, column] = construction.bounds(self._settling.table, attempts, worth)
         # both are upper bounds: the smaller one holds
         tight = np.minimum(tight, cheap)
         # no discs even of the least radius: settled here, whatever was found elsewhere

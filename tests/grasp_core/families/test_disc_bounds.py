@@ -7,9 +7,9 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.cones.spanning import span_sines
-from grasp_core.families.disc_bounds import AttemptBounds, corners_of, disc_limits
+from grasp_core.families.disc_bounds import corners_of, disc_limits
 from grasp_core.families.placements import LEAST_RADIUS, PAIRINGS, Attempts
-from grasp_core.families.placing import CONSTRUCTIONS
+from grasp_core.families.placing import CONSTRUCTIONS, Construction, Settling
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning import quadruples as planned
 from grasp_core.solvers.lp import RESIDUAL
@@ -53,20 +53,21 @@ def test_compiled_limits_are_those_of_the_formulas_or_sharper():
     assert sharper >= 50
 
 
+def bounds_on(shapes, construction, attempts, least):
+    """Bounds of a construction on the hulls of faces."""
+    return construction.bounds(Settling(construction, shapes).table, attempts, least)
+
+
 @pytest.mark.parametrize("name", BODIES)
 def test_no_program_reaches_beyond_its_limit(name):
     body = example_object(name)
     faces, axes, half_angles = quadruples(body, seed=1)
-    limits, discs, held = (
-        limits_on(body, faces, axes, half_angles),
-        AttemptBounds(face_shapes(body)),
-        0,
-    )
+    limits, shapes, held = limits_on(body, faces, axes, half_angles), face_shapes(body), 0
     for family in FAMILIES:
         construction = CONSTRUCTIONS[family]
         for order, limit in zip(construction.orders, limits[:, construction.limits].T, strict=True):
             attempts = Attempts(faces[:, order], axes[:, order], half_angles)
-            found = discs.of(construction, attempts, LEAST_RADIUS)
+            found = bounds_on(shapes, construction, attempts, LEAST_RADIUS)
             larger = found > LEAST_RADIUS + 1e-6
             assert (found[larger] <= limit[larger] + 1e-7).all()
             held += int(larger.sum())
@@ -127,13 +128,13 @@ def by_constructions(shapes, construction, attempts):
 @pytest.mark.parametrize("name", OBJECTS)
 def test_bounds_are_the_optima_of_the_programs(name, family):
     body = OBJECTS[name]()
-    construction, discs = CONSTRUCTIONS[family], AttemptBounds(face_shapes(body))
+    construction, shapes = CONSTRUCTIONS[family], face_shapes(body)
     seen = np.zeros(2, dtype=int)
     for kind in (planned.NORMAL, planned.TILTED):
         for order in construction.orders:
             some = attempts(body, kind, order)
-            quick = discs.of(construction, some, LEAST_RADIUS)
-            slow = by_constructions(discs.shapes, construction, some)
+            quick = bounds_on(shapes, construction, some, LEAST_RADIUS)
+            slow = by_constructions(shapes, construction, some)
             held = slow > LEAST_RADIUS
             np.testing.assert_allclose(quick[held], slow[held], atol=2e-8)
             assert (quick[~held] <= LEAST_RADIUS + 2e-8).all()
@@ -144,12 +145,12 @@ def test_bounds_are_the_optima_of_the_programs(name, family):
 
 def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below():
     body = example_object("random-14-1")
-    discs = AttemptBounds(face_shapes(body))
+    shapes = face_shapes(body)
     for family in FAMILIES:
         some = attempts(body, planned.TILTED, (0, 1, 2, 3), 200)
-        every = discs.of(CONSTRUCTIONS[family], some, -np.inf)
+        every = bounds_on(shapes, CONSTRUCTIONS[family], some, -np.inf)
         least = float(np.median(every))
-        few = discs.of(CONSTRUCTIONS[family], some, least)
+        few = bounds_on(shapes, CONSTRUCTIONS[family], some, least)
         larger = every > least + 1e-6
         assert larger.sum() >= 50
         np.testing.assert_allclose(few[larger], every[larger], atol=1e-9)
@@ -160,7 +161,7 @@ def test_with_a_larger_least_radius_bounds_above_it_stay_and_others_stay_below()
 def test_a_plan_without_these_bounds_is_the_same(monkeypatch):
     body = example_object("tetrahedron")
     quick = gc.plan(body, 0.4, limit=12).grasps
-    monkeypatch.setattr(AttemptBounds, "of", lambda *args: np.full(len(args[2].faces), np.inf))
+    monkeypatch.setattr(Construction, "bounds", lambda *args: np.full(len(args[2].faces), np.inf))
     slow = gc.plan(body, 0.4, limit=12).grasps
     assert len(quick) >= 3
     assert [grasp.id for grasp in slow] == [grasp.id for grasp in quick]
