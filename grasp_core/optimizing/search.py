@@ -303,7 +303,8 @@ class Searching:
         kernel, found_at = compiled(KERNEL), -1
         work = kernel.Work(
             np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
-            np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64), np.full(1, -1),
+            np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
+            np.zeros((len(self.grounds.counts), 6)), np.full(1, -1),
         )  # fmt: skip
         while not self.stop():
             search = kernel.Search(

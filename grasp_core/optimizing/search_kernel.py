@@ -14,18 +14,17 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
-from grasp_core.optimizing.replay_kernel import BY_LINE, BY_PIECES, Nodes, Pieces, branch, split
-from grasp_core.optimizing.twists_kernel import (
-    Demand,
-    Pool,
-    area,
+from grasp_core.optimizing.replay_kernel import (
+    BY_LINE,
+    BY_PIECES,
+    Nodes,
+    Pieces,
+    branch,
     cut,
-    descend,
-    extent,
-    learn,
-    multiple,
+    split,
     support,
 )
+from grasp_core.optimizing.twists_kernel import Demand, Pool, area, descend, extent, learn, multiple
 from grasp_core.values import FINGERS
 
 SPLICE = 64  # what a node does that is a part of its own
@@ -70,6 +69,7 @@ class Work(NamedTuple):
     whole: Array  # weight of each finger's polygons, (4,)
     middle: Array  # contacts in the middle of a node that is not refuted, (4, 2)
     on: Indices  # their pieces, (4,)
+    asked: Array  # the `slopes` of each piece under the twist at work, (p, 6)
     changed: Indices
     """The finger whose polygons have changed since the other fields were filled in, (1,)."""
 
@@ -302,6 +302,7 @@ def _measured(search: Search, node: int, k: int) -> float:
     cost, answers, stays = 0.0, 0, False
     rest, ends = np.empty((ROOM, 2)), np.empty(2, np.int64)
     answering = _answering(search, node, k)
+    copy(search.pool.asked[:, :, k], work.asked)
     for i in range(FINGERS):
         if not (answering >> i) & 1:
             continue
@@ -310,8 +311,8 @@ def _measured(search: Search, node: int, k: int) -> float:
         for p in range(len(pieces.normals)):
             count = stack.counts[node, i, p]
             if count > 0:
-                at = search.pool.asked[p, :, k]
-                kept = cut(stack.corners[node, i, p], count, at, pieces.friction, t, rest)
+                corners, at = stack.corners[node, i, p], work.asked[p]
+                kept = cut(corners, count, at, pieces.friction, t, rest)
                 left += _weight(rest, kept, ends)
         stays = stays or left > MOST_LEFT * work.whole[i]
         cost += np.sqrt(left / work.whole[i])
@@ -324,7 +325,6 @@ def _measured(search: Search, node: int, k: int) -> float:
 def ask(search: Search, node: int, k: int, now: int) -> None:
     """Replace the node by one for each finger that may answer, cut to where it does."""
     stack, pool, tree, work = search.stack, search.pool, search.tree, search.work
-    pieces, t, rest = search.pieces, answer_to(search, k), np.empty((ROOM, 2))
     answering = _answering(search, node, k)
     if pool.names[k] < 0:
         pool.names[k] = tree.sizes[1]
@@ -333,21 +333,12 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
     pool.used[k] = now
     note(tree, answering, pool.names[k])
     stack.above[node] += answering & (answering - 1) > 0  # with several answers
-    branch(stack, answering)
-    work.changed[0], place = ALL, stack.top[0]
-    for i in range(FINGERS):
-        if not (answering >> i) & 1:
-            continue
-        if place == stack.top[0]:  # the first answer is searched first
-            work.changed[0] = i
-        place -= 1
-        for p in range(len(pieces.normals)):
-            count = stack.counts[place, i, p]
-            if count > 0:
-                at, corners = pool.asked[p, :, k], stack.corners[place, i, p]
-                kept = cut(corners, count, at, pieces.friction, t, rest)
-                stack.counts[place, i, p] = kept
-                copy(rest[:kept], corners)
+    copy(pool.asked[:, :, k], work.asked)
+    branch(stack, answering, work.asked, search.pieces.friction, answer_to(search, k))
+    work.changed[0] = ALL
+    for i in range(FINGERS - 1, -1, -1):
+        if (answering >> i) & 1:
+            work.changed[0] = i  # the first answer is searched first
 
 
 @loop("numpy", beside=True)
