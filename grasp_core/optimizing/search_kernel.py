@@ -338,10 +338,8 @@ def _visit(search: Search, node: int, now: int) -> bool:
     look_again(search, node)
     best, cost = choose(search, node)
     if cost > 0.0 and _is_single(search, node):
-        if (
-            _lowered(search, node, now) >= search.t
-            and _middle_lowered(search, node, now) >= search.t
-        ):
+        near = _lowered(search, node, now)
+        if near >= search.t and _middle_lowered(search, node, now) >= search.t:
             return False
         best, cost = choose(search, node)
     if cost <= ASKED_ABOVE:
