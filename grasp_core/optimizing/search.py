@@ -175,8 +175,9 @@ def joined(parts: Sequence[Part]) -> dict[str, Any]:
     starts = np.cumsum(sizes, axis=0) - sizes
     runs = list[tuple[tuple[int, ...], Indices, Indices]]()
     for part, (nodes, _, _), (_, twists, lines) in zip(parts, sizes, starts, strict=True):
-        deeds: Indices = part.tree.deeds[:nodes]
-        asked: Indices = part.tree.asked[:nodes] + np.where(deeds < lines_from, twists, lines)
+        deeds = np.asarray(part.tree.deeds[:nodes], dtype=np.int64)
+        asked = np.array(part.tree.asked[:nodes], dtype=np.int64)
+        asked += np.where(deeds < lines_from, int(twists), int(lines))
         # paths of a part's runs begin with its own, and so come right after the run of nodes above
         # the place that is left for it
         ends = np.flatnonzero(deeds == splice)
