@@ -148,11 +148,6 @@ def torsion_lengths(torsions: Array, friction: Array) -> Array:
     return torsions / np.where(friction > 0.0, friction, 1.0)
 
 
-def are_torsions(torsions: Array, friction: Array) -> bool:
-    """Return whether some torsional coefficients are above zero, and only where friction is."""
-    return bool(torsions.any() and ((friction > 0.0) | (torsions == 0.0)).all())
-
-
 def unit_size(points: Array) -> tuple[Array, Array, Array]:
     """Return arms from the mean contact over the longest, that centre, and that length, or one."""
     centers: Array = points.mean(axis=-2)

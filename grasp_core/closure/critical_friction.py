@@ -402,7 +402,11 @@ def _close_in(ends: "Ends", trial: float) -> None:
 
 def _try(ends: "Ends", friction: float) -> Answer:
     """Move the ends as far as the margin program's answer at a friction proves."""
-    answer = _asked(ends.cones, friction)
+    try:
+        answer = decide(ends.cones.at_friction(friction))
+    except SolverError:  # zeros prove nothing
+        nothing = np.zeros_like(ends.cones.normals), np.zeros(WRENCH)
+        answer = Answer(math.nan, *nothing, closed=None)
     ends.close(answer.forces, friction)
     ends.open(answer.twist)
     return answer
@@ -441,14 +445,6 @@ def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
         ends.close(forces, friction)
         if ends.upper <= friction:
             return
-
-
-def _asked(cones: ContactCones, friction: float) -> Answer:
-    """Solve the margin program; where that fails, return zeros, which prove nothing."""
-    try:
-        return decide(cones.at_friction(friction))
-    except SolverError:
-        return Answer(math.nan, np.zeros_like(cones.normals), np.zeros(WRENCH), closed=None)
 
 
 @dataclass(slots=True)
@@ -521,14 +517,13 @@ class Ends:
             if not (enough <= friction and enough < self.upper):
                 continue
             there = np.hstack([forces[:, :3], torques * enough])
-            if self._closes(there, enough):
+            if self.points is None:
+                proved = bool(proves_closure(self.cones.at_friction(enough), there))
+            else:
+                proved = closes(there, self.points, self.cones.inward, enough)
+            if proved:
                 self.upper, self.forces = enough, there
                 return
-
-    def _closes(self, forces: Array, friction: float) -> bool:
-        if self.points is None:
-            return bool(proves_closure(self.cones.at_friction(friction), forces))
-        return closes(forces, self.points, self.cones.inward, friction)
 
     def open(self, twist: Array) -> None:
         """Raise the lower end to the friction up to which a twist separates."""

@@ -50,7 +50,6 @@ from grasp_core.arrays import (
     of_order_one,
 )
 from grasp_core.closure.contacts import (
-    are_torsions,
     contact_arrays,
     contact_frictions,
     contact_torsions,
@@ -135,11 +134,11 @@ class ClosureCertificate(Declared):
         if len(self.friction) == 0:
             return False
         spread = float(np.ptp(self.positions, axis=0).max())
-        rubbing = (
-            self.torques is None
-            if self.torsion_m is None
-            else are_torsions(self.torsion_m, self.friction)
-        )
+        if self.torsion_m is None:
+            rubbing = self.torques is None
+        else:
+            rubbing = (self.friction > 0.0) | (self.torsion_m == 0.0)
+            rubbing = bool(self.torsion_m.any() and rubbing.all())
         return (spread == 0.0 or spread >= SMALLEST_SIZE) and rubbing
 
     def proved(self, caution: float = 1.0) -> float:

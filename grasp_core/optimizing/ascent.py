@@ -18,8 +18,8 @@ by its product with the twist,
 
     m_j changes by  sum_i d_i . (F_i x omega).                                              (2)
 
-*The weight* is a task with forces in all directions. Contacts climb for some of them, again and
-again with those directions as well that they held least.
+*The weight* is bounded by the radius of a ball as well, with torques over a length L that is small
+(see `measures`). With it d_i x F_ci is over L, and (1) holds with alpha / L in place of alpha.
 
 Each step is a linear program: raise the least of these linearised distances or multiples, with
 positions inside the faces and no coordinate moved farther than a trust region allows. A step counts
@@ -34,7 +34,7 @@ The paper leaves open where on their faces the contacts of a grasp are best (sec
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple, cast
@@ -54,9 +54,8 @@ from grasp_core.quality.measures import (
     FERRARI_CANNY,
     THIN,
     Measure,
-    ResistedLoads,
-    resisted_loads,
     task_limits,
+    thin,
 )
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import (
@@ -64,7 +63,6 @@ from grasp_core.solvers.ties import (
     largest_first,
     nearest_optimum,
     on_grid,
-    smallest_first,
     surpassing,
 )
 from grasp_core.values import FINGERS
@@ -73,7 +71,9 @@ SEARCH_GAP = 1e-3
 """Largest relative gap between the two bounds of the quality during the climb."""
 BAND = 0.2
 """Simplices up to this share farther from zero than the nearest one take part in a step."""
-MOST_ROWS = 100
+MOST_ROWS, MOST_THIN_ROWS = 100, 300
+"""Simplices that take part at most; more where torques are over a small length, as many are alike.
+"""
 STEEPEST = 20.0
 """Largest weight of a corner in the foot of the perpendicular on a simplex: on flatter simplices
 the weights do not tell where the foot moves."""
@@ -96,14 +96,6 @@ WORTHWHILE = 1e-6  # predicted relative gain below which the climb ends
 TASK_WORTHWHILE = 1e-4
 """Predicted relative gain below which a climb for a task ends: the smallest gap that may be asked
 for, as each step takes a program for every load."""
-SPREAD, ROUNDS = 48, 4
-"""Directions of the weight for which contacts climb first, and how often they climb. Every
-direction is within 23 degrees of one of these, so that it is held at most 8 % less than they are;
-the directions that are added make up for that."""
-WEAK, APART, MOST_WEAK = 1.05, 0.97, 16
-"""Directions that are added are held up to this much better than the weakest: others are not the
-least after a small step. Cosines between them are below this: 14 degrees, half of what is between
-the first ones. They are so many at most, as each is a program more in every step."""
 
 
 class Height(NamedTuple):
@@ -144,22 +136,22 @@ class ContactFaces:
     def height(self, measure: Measure, y: Array) -> Height:
         """Bound what contacts reach of a measure, and say how it changes near them."""
         wrenches = self.wrenches(y)
-        if measure.is_usual:
-            found = wrench_set_quality(wrenches, SEARCH_GAP)
-            planes = None if found.polytope is None else partial(self.nearest_planes, found)
-            return Height(found.lower, planes)
-        found = wrench_set_quality(wrenches, CLOSED_GAP)
-        if found.lower <= 0.0:
-            return Height(0.0, None)
-        of_loads = self.planes_of_loads(wrenches, measure)
-        return Height(float(of_loads[0].min()), lambda: of_loads)
+        if measure.name == "task":
+            if wrench_set_quality(wrenches, CLOSED_GAP).lower <= 0.0:
+                return Height(0.0, None)
+            of_loads = self.planes_of_loads(wrenches, measure)
+            return Height(float(of_loads[0].min()), lambda: of_loads)
+        length = 1.0 if measure.is_usual else THIN
+        found = wrench_set_quality(wrenches if measure.is_usual else thin(wrenches), SEARCH_GAP)
+        closed = found.polytope is not None
+        return Height(found.lower, partial(self.nearest_planes, found, length) if closed else None)
 
     def climb(self, y: Array, measure: Measure = FERRARI_CANNY) -> tuple[Array, Height]:
         """Move contacts uphill to a local optimum of the quality or of a task's loads, (k, 2).
 
         Steps are taken as long as they are predicted to be worthwhile.
         """
-        worthwhile = WORTHWHILE if measure.is_usual else TASK_WORTHWHILE
+        worthwhile = TASK_WORTHWHILE if measure.name == "task" else WORTHWHILE
         found, reach = self.height(measure, y), FIRST_REACH
         for _ in range(MOST_STEPS):
             if found.planes is None or reach < LEAST_REACH:
@@ -196,14 +188,18 @@ class ContactFaces:
         x = reach * nearest_optimum(program, best)
         return on_grid(x[:n].reshape(y.shape), STEP_DIGITS), float(x[n])
 
-    def nearest_planes(self, found: FerrariCanny) -> tuple[Array, Array]:
-        """Return distances (m,) and, by (1), slopes (m, 2k) of the planes nearest to zero."""
+    def nearest_planes(self, found: FerrariCanny, length: float = 1.0) -> tuple[Array, Array]:
+        """Return distances (m,) and, by (1), slopes (m, 2k) of the planes nearest to zero.
+
+        Torques of the quality are over a length, in object radii.
+        """
         polytope = cast("InnerPolytope", found.polytope)
         points = polytope.forces @ found.wrenches.G.T
         height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
         heights: Array = height.min(axis=1)
         cells = graded(heights)
-        near = np.argsort(cells, kind="stable")[:MOST_ROWS]
+        most = MOST_ROWS if length == 1.0 else MOST_THIN_ROWS
+        near = np.argsort(cells, kind="stable")[:most]
         near = near[cells[near] <= graded((1.0 + BAND) * float(heights.min()))]
         corners, normals, b = polytope.corners[near], polytope.normals[near], heights[near]
         columns = points[corners].transpose(0, 2, 1)
@@ -212,13 +208,13 @@ class ContactFaces:
         sound = np.abs(shares).max(axis=1) < STEEPEST
         forces = self.in_space(polytope.forces)
         carried = np.einsum("mc,mcki->mki", shares[sound], forces[corners[sound]])
-        return b[sound], self.slopes(carried, normals[sound])
+        return b[sound], self.slopes(carried, normals[sound, 3:] / length)
 
     def planes_of_loads(self, wrenches: WrenchSet, measure: Measure) -> tuple[Array, Array]:
         """Return the multiple of each load, (m,), and its slopes (2), (m, 2k)."""
         limits = task_limits(wrenches, measure)
         forces = self.in_space(np.array([limit.forces for limit in limits]))
-        slopes = self.slopes(forces, np.array([limit.twist for limit in limits]))
+        slopes = self.slopes(forces, np.array([limit.twist[3:] for limit in limits]))
         return np.array([limit.multiple for limit in limits]), slopes
 
     def in_space(self, local: Array) -> Array:
@@ -226,50 +222,11 @@ class ContactFaces:
         frames = contact_frames(self.normals)
         return np.einsum("kij,nkj->nki", frames, local.reshape(len(local), -1, 3))
 
-    def slopes(self, forces: Array, twists: Array) -> Array:
-        """Return how fast contacts with forces (n, k, 3) gain under twists (n, 6), (n, 2k)."""
-        turned = np.cross(forces, twists[:, None, 3:])
+    def slopes(self, forces: Array, turning: Array) -> Array:
+        """Return how fast contacts with forces (n, k, 3) gain while turning (n, 3), (n, 2k)."""
+        turned = np.cross(forces, turning[:, None])
         planes = np.array([piece.frame for piece in self.pieces])
         return np.einsum("nki,kij->nkj", turned, planes).reshape(len(forces), -1)
-
-
-def climbs(faces: ContactFaces, measure: Measure, y: Array) -> Iterator[Array]:
-    """Yield where contacts in force closure come to by climbing for a measure, (k, 2) each."""
-    if measure.name != "weight":
-        yield faces.climb(y, measure)[0]
-        return
-    forces = _spread()
-    for _ in range(ROUNDS):
-        loads = np.hstack([forces, np.zeros_like(forces)])
-        y, _ = faces.climb(y, Measure("task", loads))
-        yield y
-        found = resisted_loads(faces.wrenches(y), measure, SEARCH_GAP)
-        forces = np.vstack([forces, _weakest(found)])
-
-
-def _spread() -> Array:
-    """Return directions along a spiral from pole to pole, all about as far apart, (n, 3)."""
-    place = np.arange(SPREAD) + 0.5
-    z, turn = 1.0 - 2.0 * place / SPREAD, np.pi * (1.0 + np.sqrt(5.0)) * place
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
-
-
-def _weakest(found: ResistedLoads) -> Array:
-    """Return directions of the weight that contacts hold least, far from each other, (n, 3)."""
-    if found.ball is None or found.ball.polytope is None:
-        return np.zeros((0, 3))
-    twists = found.ball.polytope.normals / np.repeat([1.0, THIN], 3)
-    supports, demands = found.wrenches.supports(twists), found.measure.demands(twists)
-    held = found.measure.multiples(supports, demands)
-    near = np.array(smallest_first(held))
-    near = near[held[near] <= WEAK * float(held.min())]
-    ways = -twists[near, :3] / demands[near, None]
-    kept: list[Array] = []
-    while len(ways) and len(kept) < MOST_WEAK:
-        kept.append(ways[0])
-        ways = ways[ways @ ways[0] < APART]
-    return np.array(kept)
 
 
 POINTS = 3000  # random contacts
@@ -344,15 +301,12 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
     if best.quality.lower <= 0.0:
         return best
     faces = ContactFaces(pieces, searching.friction)
-    for moved in climbs(faces, searching.measure, at):
-        there = searching.measured(np.array(on), moved)
-        inside = all(
-            float((piece.E @ y - piece.b).max()) <= 0.0
-            for piece, y in zip(pieces, moved, strict=True)
-        )
-        if inside and there.quality.lower > surpassing(best.quality.lower):
-            best = there
-    return best
+    moved, _ = faces.climb(at, searching.measure)
+    there = searching.measured(np.array(on), moved)
+    inside = all(
+        float((piece.E @ y - piece.b).max()) <= 0.0 for piece, y in zip(pieces, moved, strict=True)
+    )
+    return there if inside and there.quality.lower > surpassing(best.quality.lower) else best
 
 
 def piece_at(grounds: Grounds, place: int) -> FacePiece:

@@ -4,9 +4,9 @@ Solved: the check that `support_cuts` derives. At a node each finger may be in s
 one on each piece. Nodes that wait are a stack. The last one makes way for its children: one for
 each finger that may answer a twist, or two where a finger's polygon, or its pieces, are divided.
 
-The search takes from here what a tree does to nodes. The replay is independent of it where that
-says what contacts answer: here supports are computed in space, from the definition, and edges are
-followed by halving. From which support on a contact answers a twist is given.
+The search takes from here what a tree does to nodes, and the cuts: the hull, from outside, of
+{x in K : s(x) >= t} for a convex polygon K of a face and the support s of the contact's cone. From
+which support on a contact answers a twist is given.
 """
 
 from typing import NamedTuple
@@ -22,7 +22,8 @@ from grasp_core.values import FINGERS
 BY_PIECES, BY_LINE = 16, 32
 """What a node does, added to a finger: it divides its pieces, or its polygon. Below these numbers
 are questions, the sums of 2**i over the fingers i that may answer."""
-HALVINGS = 40  # halvings of an edge towards the point in which it begins to answer
+SLOPES = 6  # numbers that say how a contact of a piece answers a twist, see `slopes`
+LAST_DIGIT = 2.0**-52  # share of an edge by which a point that answers is moved back at first
 AT_FIRST, DEEPEST = 16, 4096
 """Number of nodes for which there is room at first, and the largest number that may wait."""
 
@@ -78,12 +79,12 @@ def _copy(nodes: Nodes, source: int, place: int) -> None:
 
 
 @loop("numpy")
-def branch(nodes: Nodes, deed: int) -> None:
+def branch(nodes: Nodes, deed: int, asked: Array, friction: float, t: float) -> None:
     """Replace the last node by one for each finger that may answer, the first finger's last.
 
-    Their polygons are still to be cut to where they answer.
+    Polygons are cut to where that finger answers; what is asked of each piece are its `slopes`.
     """
-    node = nodes.top[0] - 1
+    node, rest = nodes.top[0] - 1, np.empty((ROOM, 2))
     place = node
     for i in range(FINGERS):
         place += (deed >> i) & 1
@@ -94,6 +95,12 @@ def branch(nodes: Nodes, deed: int) -> None:
         if (deed >> i) & 1:
             place -= 1
             nodes.fresh[place, i] = 0
+            for p in range(len(asked)):
+                count, corners = nodes.counts[place, i, p], nodes.corners[place, i, p]
+                if count > 0:
+                    kept = cut(corners, count, asked[p], friction, t, rest)
+                    nodes.counts[place, i, p] = kept
+                    copy(rest[:kept], corners)
 
 
 @loop("numpy")
@@ -167,6 +174,7 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
     An answer to the twist k is a support of at least answers[k].
     """
     nodes, place = vacant(AT_FIRST, len(pieces.normals)), 0
+    answered = np.empty((len(pieces.normals), SLOPES))
     for case in range(len(first)):
         copy(first[case], nodes.corners[0])
         copy(first_counts[case], nodes.counts[0])
@@ -184,8 +192,12 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
             deed, at = deeds[place], asked[place]
             place += 1
             if 0 <= deed < BY_PIECES and 0 <= at < len(twists):
-                if not _answered(pieces, nodes, deed, twists[at], float(answers[at])):
+                for p in range(len(answered)):
+                    slopes(pieces, p, twists[at], answered[p])
+                t = float(answers[at])
+                if _do_others(nodes, deed, answered, pieces.friction, t):
                     return False
+                branch(nodes, deed, answered, pieces.friction, t)
             elif _is_division(nodes, deed) and 0 <= at < len(lines):
                 split(nodes, deed, lines[at])
             else:
@@ -204,25 +216,7 @@ def _is_division(nodes: Nodes, deed: int) -> bool:
 
 
 @loop("numpy", once=True)
-def _answered(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
-    """Put one node for each named finger in the last node's place; return False if it is wrong."""
-    corners, counts = nodes.corners, nodes.counts
-    if _do_others(pieces, nodes, deed, y, t):
-        return False
-    branch(nodes, deed)
-    place = nodes.top[0]
-    for i in range(FINGERS):
-        if (deed >> i) & 1:
-            place -= 1
-            for p in range(counts.shape[2]):
-                if counts[place, i, p] > 0:
-                    kept = _cut(pieces, p, corners[place, i, p], counts[place, i, p], y, t)
-                    counts[place, i, p] = kept
-    return True
-
-
-@loop("numpy", once=True)
-def _do_others(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> bool:
+def _do_others(nodes: Nodes, deed: int, asked: Array, friction: float, t: float) -> bool:
     """Return whether a finger of the last node may answer for which no named one stands."""
     corners, counts, fresh = nodes.corners, nodes.counts, nodes.fresh
     node, twin = nodes.top[0] - 1, False
@@ -234,63 +228,80 @@ def _do_others(pieces: Pieces, nodes: Nodes, deed: int, y: Array, t: float) -> b
     for i in range(FINGERS):
         if (deed >> i) & 1 or (twin and fresh[node, i]):
             continue
-        for p in range(counts.shape[2]):
+        for p in range(len(asked)):
             for v in range(counts[node, i, p]):
                 a, b = corners[node, i, p, v, 0], corners[node, i, p, v, 1]
-                if _support(pieces, p, a, b, y) >= t:
+                if support(asked[p], a, b, friction) >= t:
                     return True
     return False
 
 
 @loop("numpy")
-def _support(pieces: Pieces, p: int, a: float, b: float, y: Array) -> float:
-    """Return the support of the cone of a contact, from the definition."""
-    F, n, o = pieces.frames[p], pieces.normals[p], pieces.origins[p]
-    x0 = o[0] + F[0, 0] * a + F[0, 1] * b
-    x1 = o[1] + F[1, 0] * a + F[1, 1] * b
-    x2 = o[2] + F[2, 0] * a + F[2, 1] * b
-    u0 = y[0] + y[4] * x2 - y[5] * x1
-    u1 = y[1] + y[5] * x0 - y[3] * x2
-    u2 = y[2] + y[3] * x1 - y[4] * x0
-    along = F[0, 0] * u0 + F[1, 0] * u1 + F[2, 0] * u2
-    across = F[0, 1] * u0 + F[1, 1] * u1 + F[2, 1] * u2
-    slide = pieces.friction * np.sqrt(along * along + across * across)
-    return n[0] * u0 + n[1] * u1 + n[2] * u2 + slide
+def slopes(pieces: Pieces, piece: int, y: Array, out: Array) -> None:
+    """Fill in the numbers that give the support at any point (a, b) of a piece, (6,).
 
-
-@loop("numpy", once=True)
-def _cut(pieces: Pieces, p: int, corners: Array, count: int, y: Array, t: float) -> int:
-    """Cut a polygon to where a contact answers, in its place; return how many corners are left."""
-    heights, reached = np.empty(ROOM), 0
-    for k in range(count):
-        heights[k] = _support(pieces, p, corners[k, 0], corners[k, 1], y)
-        reached += heights[k] >= t
-    if not 0 < reached < count:
-        return reached
-    crossings, out = np.empty((ROOM, 2)), np.empty((ROOM, 2))
-    for k in range(count):
-        after = (k + 1) % count
-        if (heights[k] >= t) and not heights[after] >= t:
-            _follow(pieces, p, corners[after], corners[k], y, t, crossings[k])
-        elif (heights[after] >= t) and not heights[k] >= t:
-            _follow(pieces, p, corners[k], corners[after], y, t, crossings[k])
-    kept = outline(corners, count, heights, t, crossings, out)
-    copy(out[:kept], corners)
-    return kept
+    The support is out0 + out1 a + out2 b + mu |(out3 - out5 b, out4 + out5 a)|: normal velocity of
+    the contact, and its velocity along the face, which is that of a turning plane.
+    """
+    n, o, F = pieces.normals[piece], pieces.origins[piece], pieces.frames[piece]
+    u0 = y[0] + y[4] * o[2] - y[5] * o[1]
+    u1 = y[1] + y[5] * o[0] - y[3] * o[2]
+    u2 = y[2] + y[3] * o[1] - y[4] * o[0]
+    out[0] = n[0] * u0 + n[1] * u1 + n[2] * u2
+    out[3] = F[0, 0] * u0 + F[1, 0] * u1 + F[2, 0] * u2
+    out[4] = F[0, 1] * u0 + F[1, 1] * u1 + F[2, 1] * u2
+    for j in range(2):
+        w0 = y[4] * F[2, j] - y[5] * F[1, j]
+        w1 = y[5] * F[0, j] - y[3] * F[2, j]
+        w2 = y[3] * F[1, j] - y[4] * F[0, j]
+        out[1 + j] = n[0] * w0 + n[1] * w1 + n[2] * w2
+        if j == 0:
+            out[5] = F[0, 1] * w0 + F[1, 1] * w1 + F[2, 1] * w2
 
 
 @loop("numpy")
-def _follow(
-    pieces: Pieces, p: int, low: Array, high: Array, y: Array, t: float, out: Array
-) -> None:
-    """Fill in a point of the edge at which s < t, as near as doubles tell to where s = t."""
-    near, far = 0.0, 1.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (near + far)
-        a, b = low[0] + middle * (high[0] - low[0]), low[1] + middle * (high[1] - low[1])
-        if _support(pieces, p, a, b, y) < t:
-            near = middle
-        else:
-            far = middle
-    for j in range(2):
-        out[j] = low[j] + near * (high[j] - low[j])
+def support(at: Array, a: float, b: float, friction: float) -> float:
+    """Return the support of the cone of a contact at the point (a, b), by its `slopes`."""
+    one, two = at[3] - at[5] * b, at[4] + at[5] * a
+    return at[0] + at[1] * a + at[2] * b + friction * np.sqrt(one * one + two * two)
+
+
+@loop("numpy")
+def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
+    """Fill in what is left of a polygon where the support reaches t; return how many corners."""
+    heights, reached = np.empty(ROOM), 0
+    for k in range(count):
+        heights[k] = support(at, corners[k, 0], corners[k, 1], friction)
+        reached += heights[k] >= t
+    if reached == 0:
+        return 0
+    crossings = np.empty((ROOM, 2))
+    for k in range(count):
+        after = (k + 1) % count
+        if (heights[k] >= t) != (heights[after] >= t):
+            low, high = (after, k) if heights[k] >= t else (k, after)
+            _cross(corners[low], corners[high], at, friction, t, crossings[k])
+    return outline(corners, count, heights, t, crossings, out)
+
+
+@loop("numpy", once=True)
+def _cross(low: Array, high: Array, at: Array, friction: float, t: float, out: Array) -> None:
+    """Fill in a point of an edge at which s < t, as near as doubles tell to where s = t.
+
+    The point at the share x of the way from low to high has s = t - c + b x + mu |u + x v|, with u
+    and v in the plane, so that s = t where (mu |u + x v|)^2 = (c - b x)^2. As s < t for x = 0, the
+    least positive root is sought.
+    """
+    da, db = high[0] - low[0], high[1] - low[1]
+    u0, u1, v0, v1 = at[3] - at[5] * low[1], at[4] + at[5] * low[0], -at[5] * db, at[5] * da
+    c, b = t - (at[0] + at[1] * low[0] + at[2] * low[1]), at[1] * da + at[2] * db
+    square = friction * friction
+    constant = square * (u0 * u0 + u1 * u1) - c * c
+    half = square * (u0 * v0 + u1 * v1) + c * b
+    leading = square * (v0 * v0 + v1 * v1) - b * b
+    share = min(-constant / (half + np.sqrt(max(half * half - leading * constant, 0.0))), 1.0)
+    back = LAST_DIGIT
+    while share > 0.0 and support(at, low[0] + share * da, low[1] + share * db, friction) >= t:
+        share, back = share - back, 2.0 * back
+    share = share if share > 0.0 else 0.0  # also where there is no number
+    out[0], out[1] = low[0] + share * da, low[1] + share * db

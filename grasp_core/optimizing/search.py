@@ -15,7 +15,7 @@ loosest threshold first (see `best_grasp`).
 import math
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -116,6 +116,8 @@ class Found:
 class Part:
     """A subtree and the state of its search."""
 
+    path: tuple[int, ...]
+    """For this part and each above it but the first, how many nodes were left before it."""
     stack: Any
     tree: Any
     pool: Any
@@ -123,7 +125,6 @@ class Part:
     finished: bool = False
     left: list[Nodes] = field(default_factory=list[Nodes])
     """Nodes that are left to parts of their own, in the order of the tree."""
-    parts: list["Part"] = field(default_factory=list["Part"])  # these parts
 
 
 def leave(part: Part) -> None:
@@ -135,7 +136,7 @@ def leave(part: Part) -> None:
     stack.top[0] = place
 
 
-def part_from(first: Nodes, pool: Any) -> Part:
+def part_from(path: tuple[int, ...], first: Nodes, pool: Any) -> Part:
     """Return a part that begins with nodes and the twists of a pool."""
     corners, counts, fresh = first
     stack = compiled(REPLAY).vacant(max(DEEP, len(corners) + FINGERS + 1), counts.shape[2])
@@ -152,7 +153,7 @@ def part_from(first: Nodes, pool: Any) -> Part:
     own = type(pool)(*(array.copy() for array in pool))
     own.names[:] = -1
     own.used[:] -= own.used.max() + 1
-    return Part(stack, tree, own)
+    return Part(path, stack, tree, own)
 
 
 def enlarge(part: Part) -> None:
@@ -167,41 +168,28 @@ def enlarge(part: Part) -> None:
     part.tree = type(tree)(*arrays, tree.sizes)
 
 
-def joined(trunk: Part, parts: Sequence[Part]) -> dict[str, Any]:
-    """Put the trees of parts into their places in the trunk's tree, as arrays of a `CutTree`."""
+def joined(parts: Sequence[Part]) -> dict[str, Any]:
+    """Put the trees of parts into one, as arrays of a `CutTree`: a child's in its place."""
     splice, lines_from = int(compiled(KERNEL).SPLICE), int(compiled(REPLAY).BY_PIECES)
-    every = [trunk, *parts]
-    sizes = np.array([part.tree.sizes for part in every], dtype=np.int64)
+    sizes = np.array([part.tree.sizes for part in parts], dtype=np.int64)
     starts = np.cumsum(sizes, axis=0) - sizes
-    asked: dict[int, Indices] = {}
-    for part, (n, _, _), (_, twists, lines) in zip(every, sizes, starts, strict=True):
-        shifts = np.where(part.tree.deeds[:n] < lines_from, int(twists), int(lines))
-        asked[id(part)] = np.asarray(part.tree.asked[:n], dtype=np.int64) + shifts
-    rows, trees = list(_in_order(trunk, splice)), list(zip(every, sizes, strict=True))
+    runs = list[tuple[tuple[int, ...], Indices, Indices]]()
+    for part, (nodes, _, _), (_, twists, lines) in zip(parts, sizes, starts, strict=True):
+        deeds = np.asarray(part.tree.deeds[:nodes], dtype=np.int64)
+        asked = np.array(part.tree.asked[:nodes], dtype=np.int64)
+        asked += np.where(deeds < lines_from, int(twists), int(lines))
+        # paths of a part's runs begin with its own, and so come right after the run of nodes above
+        # the place that is left for it
+        ends = np.flatnonzero(deeds == splice)
+        for k, (one, two) in enumerate(zip([0, *ends + 1], [*ends, nodes], strict=True)):
+            runs.append(((*part.path, k), deeds[one:two], asked[one:two]))
+    runs.sort(key=lambda run: run[0])
     return {
-        "deeds": np.concatenate([part.tree.deeds[some] for part, some in rows]),
-        "asked": np.concatenate([asked[id(part)][some] for part, some in rows]),
-        "twists": np.concatenate([each.tree.twists[:m] for each, (_, m, _) in trees]),
-        "lines": np.concatenate([each.tree.lines[:m] for each, (_, _, m) in trees]),
+        "deeds": np.concatenate([deeds for _, deeds, _ in runs]),
+        "asked": np.concatenate([asked for _, _, asked in runs]),
+        "twists": np.concatenate([each.tree.twists[: each.tree.sizes[1]] for each in parts]),
+        "lines": np.concatenate([each.tree.lines[: each.tree.sizes[2]] for each in parts]),
     }
-
-
-def _in_order(trunk: Part, splice: int) -> Iterator[tuple[Part, slice]]:
-    """Yield the nodes of parts in the order of the whole tree: children's trees in their places."""
-    path = [(trunk, 0, 0)]
-    while path:
-        part, start, child = path.pop()
-        deeds = part.tree.deeds[: part.tree.sizes[0]]
-        if child == len(part.parts):
-            yield part, slice(start, len(deeds))
-            continue
-        hole = start + int(np.argmax(deeds[start:] == splice))
-        yield part, slice(start, hole)
-        path += [(part, hole + 1, child + 1), (part.parts[child], 0, 0)]
-
-
-_Waiting: TypeAlias = tuple[Part, Nodes, Any]
-"""A node that waits, with the part that left it and the pool of twists that it begins with."""
 
 
 class Searching:
@@ -265,10 +253,11 @@ class Searching:
         """Try to lower the bound; return whether that came about, and contacts above the known."""
         threshold = bound - self.searched.raised
         corners, counts, fresh = self.first
-        trunk = part_from((on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
+        trunk = part_from((), (on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
-        wave, parts, better = [trunk], list[Part](), list[Found]()
-        waiting = deque[_Waiting]()
+        wave, parts, better = [trunk], [trunk], list[Found]()
+        # nodes that wait, with their paths and the pools that they begin with
+        waiting = deque[tuple[tuple[int, ...], Nodes, Any]]()
         with ThreadPoolExecutor(self.jobs) as threads:
             while True:
                 self.nodes += sum(int(part.tree.sizes[0]) for part in wave)
@@ -278,17 +267,14 @@ class Searching:
                     return False, better
                 for part in wave:
                     pool = self.pool if part is trunk else part.pool
-                    waiting += [(part, node, pool) for node in part.left]
+                    waiting += [((*part.path, k), node, pool) for k, node in enumerate(part.left)]
                     part.left, part.pool = [], None
                 if not waiting:
-                    refuted, steps = bound - self.proof.slack.raised, joined(trunk, parts)
+                    refuted, steps = bound - self.proof.slack.raised, joined(parts)
                     self.proof = replace(self.proof, threshold=refuted, **steps)
                     return True, better
-                wave = list[Part]()
-                for _ in range(min(WAVE, len(waiting))):
-                    above, node, pool = waiting.popleft()
-                    above.parts.append(part_from(node, pool))
-                    wave.append(above.parts[-1])
+                some = range(min(WAVE, len(waiting)))
+                wave = [part_from(*waiting.popleft()) for _ in some]
                 search = partial(self._search, threshold=threshold, known=known, depth=MOST_DEPTH)
                 try:
                     list(threads.map(search, wave))
@@ -303,7 +289,8 @@ class Searching:
         kernel, found_at = compiled(KERNEL), -1
         work = kernel.Work(
             np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
-            np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64), np.full(1, -1),
+            np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
+            np.zeros((len(self.grounds.counts), 6)), np.full(1, -1),
         )  # fmt: skip
         while not self.stop():
             search = kernel.Search(

@@ -14,18 +14,17 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.optimizing.grounds import ROOM
-from grasp_core.optimizing.replay_kernel import BY_LINE, BY_PIECES, Nodes, Pieces, branch, split
-from grasp_core.optimizing.twists_kernel import (
-    Demand,
-    Pool,
-    area,
+from grasp_core.optimizing.replay_kernel import (
+    BY_LINE,
+    BY_PIECES,
+    Nodes,
+    Pieces,
+    branch,
     cut,
-    descend,
-    extent,
-    learn,
-    multiple,
+    split,
     support,
 )
+from grasp_core.optimizing.twists_kernel import Demand, Pool, area, descend, extent, learn, multiple
 from grasp_core.values import FINGERS
 
 SPLICE = 64  # what a node does that is a part of its own
@@ -33,14 +32,11 @@ LEAST = 1e-7  # extent of a polygon, in object radii, below which it is not divi
 SEVERAL = 2.0
 """Extent that counts for a finger with several pieces, larger than that of any piece."""
 ALL = -1  # says that all fingers have changed
-TRIALS = 6  # twists whose cuts are measured before one of them is asked
 THIN = 0.03
 """Weight of a polygon's squared extent beside its area, so that thin ones count."""
 MOST_LEFT = 0.9
 """Share of a finger's polygons above which an answer among several makes no headway."""
 SHRUNK = 0.97  # cost of a question with one answer, up to which it is asked
-BESIDE = 1.5
-"""Estimated cost, over the least cost measured, up to which a question is measured."""
 DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
 """Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
 part of its own, contacts that may reach the threshold, a node too small to be divided."""
@@ -70,6 +66,7 @@ class Work(NamedTuple):
     whole: Array  # weight of each finger's polygons, (4,)
     middle: Array  # contacts in the middle of a node that is not refuted, (4, 2)
     on: Indices  # their pieces, (4,)
+    asked: Array  # the `slopes` of each piece under the twist at work, (p, 6)
     changed: Indices
     """The finger whose polygons have changed since the other fields were filled in, (1,)."""
 
@@ -229,40 +226,15 @@ def _weight(corners: Array, count: int, ends: Indices) -> float:
 
 @loop("numpy")
 def choose(search: Search, node: int) -> tuple[int, float]:
-    """Return the twist that is best to ask, and its cost: zero if nobody can answer."""
-    ranked, costs, count = np.empty(TRIALS, np.int64), np.empty(TRIALS), 0
+    """Return the twist that seems best to ask, and its cost: zero if nobody can answer."""
+    best, least = 0, np.inf
     for k in range(search.pool.size[0]):
         cost = _estimated(search, node, k)
-        if cost == 0.0:
-            return k, 0.0
-        if count < TRIALS or cost < costs[count - 1]:
-            place = min(count, TRIALS - 1)
-            while place > 0 and costs[place - 1] > cost:
-                ranked[place], costs[place] = ranked[place - 1], costs[place - 1]
-                place -= 1
-            ranked[place], costs[place] = k, cost
-            count = min(count + 1, TRIALS)
-    best, least = -1, np.inf
-    for trial in range(count):
-        if trial > 0 and costs[trial] > BESIDE * least:
-            break
-        cost = _measured(search, node, ranked[trial])
         if cost < least:
-            best, least = ranked[trial], cost
-    return best, least
-
-
-@loop("numpy")
-def with_new(search: Search, node: int, best: int, cost: float, k: int) -> tuple[int, float]:
-    """Return the better of the best question and a twist that is new to the pool, if k is one."""
-    if k < 0:
-        return best, cost
-    if k == best:  # it has taken the place of the best
-        return choose(search, node)
-    if _estimated(search, node, k) == 0.0:
-        return k, 0.0
-    found = _measured(search, node, k)
-    return (k, found) if found < cost else (best, cost)
+            best, least = k, cost
+            if cost == 0.0:
+                return k, 0.0
+    return best, _measured(search, node, best)
 
 
 @loop("numpy")
@@ -302,6 +274,7 @@ def _measured(search: Search, node: int, k: int) -> float:
     cost, answers, stays = 0.0, 0, False
     rest, ends = np.empty((ROOM, 2)), np.empty(2, np.int64)
     answering = _answering(search, node, k)
+    copy(search.pool.asked[:, :, k], work.asked)
     for i in range(FINGERS):
         if not (answering >> i) & 1:
             continue
@@ -310,8 +283,8 @@ def _measured(search: Search, node: int, k: int) -> float:
         for p in range(len(pieces.normals)):
             count = stack.counts[node, i, p]
             if count > 0:
-                at = search.pool.asked[p, :, k]
-                kept = cut(stack.corners[node, i, p], count, at, pieces.friction, t, rest)
+                corners, at = stack.corners[node, i, p], work.asked[p]
+                kept = cut(corners, count, at, pieces.friction, t, rest)
                 left += _weight(rest, kept, ends)
         stays = stays or left > MOST_LEFT * work.whole[i]
         cost += np.sqrt(left / work.whole[i])
@@ -324,7 +297,6 @@ def _measured(search: Search, node: int, k: int) -> float:
 def ask(search: Search, node: int, k: int, now: int) -> None:
     """Replace the node by one for each finger that may answer, cut to where it does."""
     stack, pool, tree, work = search.stack, search.pool, search.tree, search.work
-    pieces, t, rest = search.pieces, answer_to(search, k), np.empty((ROOM, 2))
     answering = _answering(search, node, k)
     if pool.names[k] < 0:
         pool.names[k] = tree.sizes[1]
@@ -333,21 +305,12 @@ def ask(search: Search, node: int, k: int, now: int) -> None:
     pool.used[k] = now
     note(tree, answering, pool.names[k])
     stack.above[node] += answering & (answering - 1) > 0  # with several answers
-    branch(stack, answering)
-    work.changed[0], place = ALL, stack.top[0]
-    for i in range(FINGERS):
-        if not (answering >> i) & 1:
-            continue
-        if place == stack.top[0]:  # the first answer is searched first
-            work.changed[0] = i
-        place -= 1
-        for p in range(len(pieces.normals)):
-            count = stack.counts[place, i, p]
-            if count > 0:
-                at, corners = pool.asked[p, :, k], stack.corners[place, i, p]
-                kept = cut(corners, count, at, pieces.friction, t, rest)
-                stack.counts[place, i, p] = kept
-                copy(rest[:kept], corners)
+    copy(pool.asked[:, :, k], work.asked)
+    branch(stack, answering, work.asked, search.pieces.friction, answer_to(search, k))
+    work.changed[0] = ALL
+    for i in range(FINGERS - 1, -1, -1):
+        if (answering >> i) & 1:
+            work.changed[0] = i  # the first answer is searched first
 
 
 @loop("numpy", beside=True)
@@ -375,14 +338,11 @@ def _visit(search: Search, node: int, now: int) -> bool:
     look_again(search, node)
     best, cost = choose(search, node)
     if cost > 0.0 and _is_single(search, node):
-        near, place = _lowered(search, node, now)
-        best, cost = with_new(search, node, best, cost, place)
-        if near >= search.t:
-            near, place = _middle_lowered(search, node, now)
-            if near >= search.t:
-                return False
-            best, cost = with_new(search, node, best, cost, place)
-    if best >= 0 and cost <= ASKED_ABOVE:
+        near = _lowered(search, node, now)
+        if near >= search.t and _middle_lowered(search, node, now) >= search.t:
+            return False
+        best, cost = choose(search, node)
+    if cost <= ASKED_ABOVE:
         ask(search, node, best, now)
     elif not divide(search):
         search.work.on[0] = -1
@@ -404,8 +364,8 @@ def _is_single(search: Search, node: int) -> bool:
 
 
 @loop("numpy", once=True)
-def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
-    """Lower what all corners of a node resist; return it, and the new twist or -1."""
+def _lowered(search: Search, node: int, now: int) -> float:
+    """Lower what all corners of a node resist, and return it."""
     work, stack, pieces = search.work, search.stack, search.pieces
     least, first = np.inf, 0
     for k in range(search.pool.size[0]):
@@ -431,8 +391,8 @@ def _lowered(search: Search, node: int, now: int) -> tuple[float, int]:
 
 
 @loop("numpy", once=True)
-def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
-    """Lower what contacts in a node's middle resist; return it, and the new twist or -1."""
+def _middle_lowered(search: Search, node: int, now: int) -> float:
+    """Lower what contacts in a node's middle resist, and return it."""
     pieces, pool, work = search.pieces, search.pool, search.work
     near, nearest = np.inf, 0
     points, on = np.empty((FINGERS, 3)), work.on
@@ -453,17 +413,17 @@ def _middle_lowered(search: Search, node: int, now: int) -> tuple[float, int]:
 def _descended(
     search: Search, node: int, points: Array, on: Indices, first: tuple[int, float], steps: int,
     now: int,
-) -> tuple[float, int]:  # fmt: skip
+) -> float:  # fmt: skip
     """Descend from the pool's best twist for contacts at points; learn what is better."""
     (k, least), pieces, demand, pool = first, search.pieces, search.demand, search.pool
     y = pool.twists[k].copy()
     found = descend(pieces, demand, points, on, y, steps, search.spare)
     if not found < least:
-        return least, -1
+        return least
     place = learn(pool, pieces, demand, y, now)
     for i in range(FINGERS):
         look(search, node, i, place, place + 1)
-    return found, place
+    return found
 
 
 @loop("numpy")

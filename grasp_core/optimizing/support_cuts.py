@@ -30,9 +30,9 @@ which follow from them.
 
 Rounding. The proof is replayed in doubles. With coordinates and twists of size one or two, a corner
 is off the line or edge it should be on by less than 2e-15, a support computed is off by less than
-2e-15 (1 + mu), and s changes by at most (1 + mu) per unit of distance. By induction over the nodes
+4e-15 (1 + mu), and s changes by at most (1 + mu) per unit of distance. By induction over the nodes
 above, a point that answers all questions with s >= a + (1 + mu) k e, after k cuts of error
-e < 2e-15, is within k e of the polygons of its node: its nearest point in the polygon before a cut
+e < 4e-15, is within k e of the polygons of its node: its nearest point in the polygon before a cut
 has s >= a still, so that (2) leaves it in. With at most `MOST_CUTS` cuts above any node,
 
     measure < t + (1 + mu) * ROUNDING                                                     (3)

@@ -1,10 +1,7 @@
-"""Says what contacts on convex polygons answer twists, and which twists are worth asking, compiled.
+"""Keeps twists that are worth asking, and finds new ones by descent, compiled.
 
-*Cuts.* Solved: the hull of {x in K : s(x) >= t} for a convex polygon K of a face and the support s
-of the contact's cone, as `support_cuts` derives it, from outside.
-
-*Twists* that have divided or refuted much are kept, and new ones are found by descent. They are
-weighed by the multiple of the loads that they allow: support over demand, (1) of `measures`.
+Twists that have divided or refuted much are kept. They are weighed by the multiple of the loads
+that they allow: support over demand, (1) of `measures`.
 """
 
 from typing import NamedTuple
@@ -14,94 +11,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
-from grasp_core.optimizing.grounds import ROOM
-from grasp_core.optimizing.replay_kernel import Pieces, outline
-
-SLOPES = 6  # numbers that say how a contact of a piece answers a twist, see `slopes`
-CROSSING_STEPS = 4
-"""Steps, from both sides, towards the point in which an edge leaves the part that answers."""
-
-
-@loop("numpy")
-def slopes(pieces: Pieces, piece: int, y: Array, out: Array) -> None:
-    """Fill in the numbers that give the support at any point (a, b) of a piece, (6,).
-
-    The support is out0 + out1 a + out2 b + mu |(out3 - out5 b, out4 + out5 a)|: normal velocity of
-    the contact, and its velocity along the face, which is that of a turning plane.
-    """
-    n, o, F = pieces.normals[piece], pieces.origins[piece], pieces.frames[piece]
-    u0 = y[0] + y[4] * o[2] - y[5] * o[1]
-    u1 = y[1] + y[5] * o[0] - y[3] * o[2]
-    u2 = y[2] + y[3] * o[1] - y[4] * o[0]
-    out[0] = n[0] * u0 + n[1] * u1 + n[2] * u2
-    out[3] = F[0, 0] * u0 + F[1, 0] * u1 + F[2, 0] * u2
-    out[4] = F[0, 1] * u0 + F[1, 1] * u1 + F[2, 1] * u2
-    for j in range(2):
-        w0 = y[4] * F[2, j] - y[5] * F[1, j]
-        w1 = y[5] * F[0, j] - y[3] * F[2, j]
-        w2 = y[3] * F[1, j] - y[4] * F[0, j]
-        out[1 + j] = n[0] * w0 + n[1] * w1 + n[2] * w2
-        if j == 0:
-            out[5] = F[0, 1] * w0 + F[1, 1] * w1 + F[2, 1] * w2
-
-
-@loop("numpy")
-def support(at: Array, a: float, b: float, friction: float) -> float:
-    """Return the support of the cone of a contact at the point (a, b), by its `slopes`."""
-    one, two = at[3] - at[5] * b, at[4] + at[5] * a
-    return at[0] + at[1] * a + at[2] * b + friction * np.sqrt(one * one + two * two)
-
-
-@loop("numpy")
-def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
-    """Fill in what is left of a polygon where the support reaches t; return how many corners."""
-    heights, reached = np.empty(ROOM), 0
-    for k in range(count):
-        heights[k] = support(at, corners[k, 0], corners[k, 1], friction)
-        reached += heights[k] >= t
-    if reached == 0:
-        return 0
-    crossings = np.empty((ROOM, 2))
-    for k in range(count):
-        after = (k + 1) % count
-        if heights[k] >= t > heights[after]:
-            _cross(corners[after], corners[k], at, friction, t, crossings[k])
-        elif heights[after] >= t > heights[k]:
-            _cross(corners[k], corners[after], at, friction, t, crossings[k])
-    return outline(corners, count, heights, t, crossings, out)
-
-
-@loop("numpy")
-def _cross(low: Array, high: Array, at: Array, friction: float, t: float, out: Array) -> None:
-    """Fill in a point of an edge, just before the support reaches t on the way from low to high.
-
-    Chords of a convex function lie above it, so that a chord meets t before the function does;
-    tangents lie below it, so that a tangent meets t behind. The interval shrinks from both ends.
-    """
-    da, db = high[0] - low[0], high[1] - low[1]
-    near, far = 0.0, 1.0
-    below = support(at, low[0], low[1], friction)
-    above = support(at, high[0], high[1], friction)
-    for _ in range(CROSSING_STEPS):
-        middle = near + (far - near) * (t - below) / (above - below)
-        found = support(at, low[0] + middle * da, low[1] + middle * db, friction)
-        if found < t and middle > near:
-            near, below = middle, found
-        a, b = low[0] + far * da, low[1] + far * db
-        one, two = at[3] - at[5] * b, at[4] + at[5] * a
-        across = np.sqrt(one * one + two * two)
-        slope = at[1] * da + at[2] * db
-        if across > 0.0:
-            slope += friction * at[5] * (two * da - one * db) / across
-        if slope > 0.0:
-            trial = far - (above - t) / slope
-            if near < trial < far:
-                found = support(at, low[0] + trial * da, low[1] + trial * db, friction)
-                if found >= t:
-                    far, above = trial, found
-        if above <= below:
-            break
-    out[0], out[1] = low[0] + near * da, low[1] + near * db
+from grasp_core.optimizing.replay_kernel import SLOPES, Pieces, slopes
 
 
 @loop("numpy")

@@ -15,8 +15,8 @@ point takes the place of corner j. That new simplex adjoins
                                  lies across is not seen.
 
 Turning needs no look-up of ridges, and pairs the right ones where a ridge has more than two
-simplices. A corner is found by the sums of corners, which are exact. Functions take arrays out of
-the hull once: in loops that would cost more than the arithmetic.
+simplices. Functions take arrays out of the hull once: in loops that would cost more than the
+arithmetic.
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.arrays_kernel import copy, longer
+from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 
 D = 6
@@ -39,8 +39,6 @@ FLATNESS = 1e-9
 """Points closer than this to a common plane, relative to their extent, span nothing more."""
 ABOVE = 1e-12
 """Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
-ROOM = 2048
-"""Number of simplices for which there is room at first; it is at least doubled when it is full."""
 GROWN, OUTSIDE, FLAT, LOST = 0, 1, 2, 3
 """How growing ends: with a polytope around zero, with zero outside, with all points in a plane, or
 with a hull that rounding has broken."""
@@ -68,28 +66,40 @@ def grow(
     """
     weakest, upper = np.zeros(D), np.inf
     forces, points = np.empty((most_points, edges.shape[1])), np.empty((most_points, D))
-    hull, slack = vacant_hull(ROOM), _begin(cones.G, edges, forces, points)
-    if slack < 0.0 or not enclose(hull, points):
+    room = most_simplices  # memory that is not written to is never taken
+    hull = Hull(
+        np.empty((room, D)), np.empty(room), np.empty((room, D), np.int64),
+        np.empty((room, D), np.int64), np.empty(room), np.empty(room, np.int64),
+        np.empty((room, D), np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
+        np.zeros(2, np.int64),
+    )  # fmt: skip
+    slack = _begin(cones.G, edges, forces, points)
+    if slack < 0.0 or not _enclose(hull, points):
         return FLAT, forces[:0], hull.corners[:0], hull.normals[:0], weakest
     count = D + 1
     while True:  # each turn adds a point, up to `most_points`
-        nearest = lowest(hull)
+        nearest = _lowest(hull)
         support = _support(cones, hull.normals[nearest], forces[count])
         if support < upper:
             upper, weakest = support, hull.normals[nearest].copy()
-        full = count + 1 == most_points or hull.counts[0] > most_simplices
-        if upper <= slack or full or upper - hull.offsets[nearest] <= gap * upper:
+        near = upper - hull.offsets[nearest] <= gap * upper
+        if upper <= slack or near or count + 1 == most_points:
             break
         _wrench(cones.G, forces[count], points[count])
-        seen, ridges = look(hull, points[count], nearest, slack, count)
-        if seen == 0:
+        found, ridges = _look(hull, points[count], nearest, slack, count)
+        made, free = hull.counts
+        if found == 0 or made - free + ridges > most_simplices:
             break
-        if hull.counts[0] + ridges > len(hull.offsets):
-            hull = larger(hull)
-        if not extend(hull, seen, count, slack):
+        seen = hull.seen[:found]
+        _raise(hull, seen, count, slack)
+        if not _join(hull, seen, slack):
             return LOST, forces[:0], hull.corners[:0], hull.normals[:0], weakest
+        for f in seen:
+            hull.offsets[f] = DEAD
+            hull.free[hull.counts[1]] = f
+            hull.counts[1] += 1
         count += 1
-    inside = upper > slack and hull.offsets[lowest(hull)] > 0.0
+    inside = upper > slack and hull.offsets[_lowest(hull)] > 0.0
     live = np.flatnonzero(hull.offsets[: hull.counts[0]] < DEAD)
     status = GROWN if inside else OUTSIDE
     return status, forces[:count].copy(), hull.corners[live], hull.normals[live], weakest
@@ -178,8 +188,6 @@ class Hull(NamedTuple):
     """Indices of the points of each simplex, (room, 6)."""
     neighbors: Indices
     """Neighbour of each simplex across the ridge opposite each corner, (room, 6)."""
-    sums: Indices
-    """Sum of the point indices in `corners` of each simplex, (room,)."""
     heights: Array
     """Height, above each simplex, of the latest point that was compared with it, (room,)."""
     rounds: Indices
@@ -195,30 +203,7 @@ class Hull(NamedTuple):
 
 
 @loop(once=True)
-def vacant_hull(room: int) -> Hull:
-    """Make an empty hull with room for `room` simplices."""
-    return Hull(
-        np.empty((room, D)), np.empty(room), np.empty((room, D), np.int64),
-        np.empty((room, D), np.int64), np.empty(room, np.int64), np.empty(room),
-        np.empty(room, np.int64), np.empty((room, D), np.int64), np.empty(room, np.int64),
-        np.empty(room, np.int64), np.zeros(2, np.int64),
-    )  # fmt: skip
-
-
-@loop(once=True)
-def larger(hull: Hull) -> Hull:
-    """Copy a hull with room for twice as many simplices and for all that one point can add."""
-    room = 2 * len(hull.offsets) + D * hull.counts[0]
-    return Hull(
-        longer(hull.normals, room), longer(hull.offsets, room), longer(hull.corners, room),
-        longer(hull.neighbors, room), longer(hull.sums, room), longer(hull.heights, room),
-        longer(hull.rounds, room), longer(hull.made, room), longer(hull.seen, room),
-        longer(hull.free, room), hull.counts,
-    )  # fmt: skip
-
-
-@loop(once=True)
-def enclose(hull: Hull, points: Array) -> bool:
+def _enclose(hull: Hull, points: Array) -> bool:
     """Make the seven simplices around the first points; return False if these are nearly flat.
 
     With the points as columns over ones in the matrix A, row i of inv(A) is the affine function
@@ -238,7 +223,7 @@ def enclose(hull: Hull, points: Array) -> bool:
             hull.corners[i, j] = hull.neighbors[i, j] = j if j < i else j + 1
         hull.offsets[i] = A[i, n + D]
         _normalize(hull.normals, hull.offsets, i)
-        hull.sums[i], hull.rounds[i] = D * n // 2 - i, 0
+        hull.rounds[i] = 0
     hull.counts[0] = n
     return True
 
@@ -257,22 +242,15 @@ def _eliminate(A: Array) -> bool:
         for j in range(A.shape[1]):
             A[i, j], A[best, j] = A[best, j], A[i, j]
             A[i, j] /= pivot
-        _clear(A, i)
+        for k in range(len(A)):  # column i is zero in the other rows
+            share = A[k, i] if k != i else 0.0
+            for j in range(A.shape[1]):
+                A[k, j] -= share * A[i, j]
     return True
 
 
-@loop(once=True)
-def _clear(A: Array, i: int) -> None:
-    """Subtract multiples of row i from the others, so that column i is zero there."""
-    for k in range(len(A)):
-        share = A[k, i]
-        if k != i:
-            for j in range(A.shape[1]):
-                A[k, j] -= share * A[i, j]
-
-
 @loop()
-def lowest(hull: Hull) -> int:
+def _lowest(hull: Hull) -> int:
     """Return the simplex whose plane has the least offset."""
     offsets, found = hull.offsets, 0
     for i in range(hull.counts[0]):
@@ -281,8 +259,8 @@ def lowest(hull: Hull) -> int:
     return found
 
 
-@loop()
-def look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[int, int]:
+@loop(once=True)
+def _look(hull: Hull, point: Array, first: int, slack: float, now: int) -> tuple[int, int]:
     """Find the simplices that a point sees; return their number and that of ridges around them."""
     normals, offsets, neighbors = hull.normals, hull.offsets, hull.neighbors
     heights, rounds, seen = hull.heights, hull.rounds, hull.seen
@@ -314,27 +292,22 @@ def _height(normals: Array, offsets: Array, i: int, point: Array) -> float:
     return along - offsets[i]
 
 
-@loop()
-def extend(hull: Hull, count: int, point: int, slack: float) -> bool:
-    """Replace the first `count` seen simplices by new ones; return False if that fails."""
-    seen = hull.seen[:count]
-    _raise(hull, seen, point, slack)
-    joined = _join(hull, seen, slack)
-    _bury(hull, seen)
-    return joined
-
-
 @loop(once=True)
 def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
     """Make a new simplex wherever a seen simplex has a neighbour that is not seen."""
     normals, offsets, corners, neighbors = hull.normals, hull.offsets, hull.corners, hull.neighbors
-    sums, heights, free, counts = hull.sums, hull.heights, hull.free, hull.counts
+    heights, free, counts = hull.heights, hull.free, hull.counts
     for f in seen:
         for j in range(D):
             outer = neighbors[f, j]
             if heights[outer] > slack:
                 continue
-            new = _vacant(free, counts)
+            if counts[1] > 0:
+                counts[1] -= 1
+                new = int(free[counts[1]])
+            else:
+                new = counts[0]
+                counts[0] += 1
             hull.made[f, j] = new
             e, u = heights[f], heights[outer]
             for i in range(D):
@@ -342,21 +315,9 @@ def _raise(hull: Hull, seen: Indices, point: int, slack: float) -> None:
                 corners[new, i], neighbors[new, i] = corners[f, i], -1
             offsets[new] = e * offsets[outer] - u * offsets[f]
             _normalize(normals, offsets, new)
-            beyond = sums[outer] - sums[f] + corners[f, j]
-            neighbors[outer, _place(corners, outer, beyond)] = new
+            neighbors[outer, _place(neighbors, outer, f)] = new
             neighbors[new, j] = outer
-            sums[new] = sums[f] - corners[f, j] + point
             corners[new, j], hull.rounds[new] = point, 0
-
-
-@loop(once=True)
-def _vacant(free: Indices, counts: Indices) -> int:
-    """Return the place for a new simplex: that of a removed one, or one at the end."""
-    if counts[1] > 0:
-        counts[1] -= 1
-        return int(free[counts[1]])
-    counts[0] += 1
-    return counts[0] - 1
 
 
 @loop()
@@ -373,8 +334,7 @@ def _normalize(normals: Array, offsets: Array, i: int) -> None:
 @loop(once=True)
 def _join(hull: Hull, seen: Indices, slack: float) -> bool:
     """Connect new simplices with their neighbours; return False if one has no neighbour."""
-    corners, neighbors, made = hull.corners, hull.neighbors, hull.made
-    sums, heights = hull.sums, hull.heights
+    corners, neighbors, made, heights = hull.corners, hull.neighbors, hull.made, hull.heights
     for f in seen:
         for j in range(D):
             if heights[neighbors[f, j]] > slack:
@@ -386,7 +346,7 @@ def _join(hull: Hull, seen: Indices, slack: float) -> bool:
                 here, i, kept, steps = f, c, corners[f, j], 0
                 there = neighbors[here, i]
                 while heights[there] > slack:
-                    beyond = sums[there] - sums[here] + corners[here, i]
+                    beyond = corners[there, _place(neighbors, there, here)]
                     here, i, kept = there, _place(corners, there, kept), beyond
                     there = neighbors[here, i]
                     steps += 1
@@ -398,20 +358,11 @@ def _join(hull: Hull, seen: Indices, slack: float) -> bool:
     return True
 
 
-@loop(once=True)
-def _bury(hull: Hull, seen: Indices) -> None:
-    """Free the places of the removed simplices for new ones."""
-    for f in seen:
-        hull.offsets[f] = DEAD
-        hull.free[hull.counts[1]] = f
-        hull.counts[1] += 1
-
-
 @loop()
-def _place(corners: Indices, i: int, corner: int) -> int:
-    """Return at which place a simplex has a corner; 0 if it has not, which later checks detect."""
+def _place(rows: Indices, i: int, wanted: int) -> int:
+    """Return where a simplex has a corner or a neighbour; 0 if nowhere, which checks detect."""
     place = 0
     for j in range(D):  # without a way out, which would be predicted wrongly most of the time
-        if corners[i, j] == corner:
+        if rows[i, j] == wanted:
             place = j
     return place

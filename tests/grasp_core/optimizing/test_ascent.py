@@ -7,6 +7,8 @@ import grasp_core as gc
 from grasp_core.objects.face_pieces import inset_piece
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.better_contacts import pieces_under
+from grasp_core.quality.ferrari_canny import wrench_set_quality
+from grasp_core.quality.measures import THIN, thin
 from scenes.example_objects import example_object
 
 
@@ -26,7 +28,14 @@ def wedge():
     return body, gc.plan(body, 0.5, limit=12, cones="normal").grasps
 
 
-def test_slopes_of_the_nearest_planes_predict_small_moves(wedge):
+def ball(faces, y, length):
+    """The quality of contacts, or the ball that bounds the weight that they hold."""
+    wrenches = faces.wrenches(y)
+    return wrench_set_quality(wrenches if length == 1.0 else thin(wrenches), 1e-7)
+
+
+@pytest.mark.parametrize("length", [1.0, THIN])
+def test_slopes_of_the_nearest_planes_predict_small_moves(wedge, length):
     """The lowest of the linearised distances against the quality itself, 1e-4 away.
 
     Both bounds are good to 1e-7 of the quality; curvature adds about the move's square.
@@ -35,12 +44,12 @@ def test_slopes_of_the_nearest_planes_predict_small_moves(wedge):
     rng, tested = np.random.default_rng(1), 0
     for grasp in grasps:
         faces, y = contacts_of(body, grasp)
-        here = faces.quality(y, gap=1e-7)
-        distances, slopes = faces.nearest_planes(here)
+        here = ball(faces, y, length)
+        distances, slopes = faces.nearest_planes(here, length)
         for _ in range(3):
             move = 1e-4 * rng.normal(size=y.size)
             predicted = (distances + slopes @ move).min() - distances.min()
-            there = faces.quality(y + move.reshape(y.shape), gap=1e-7)
+            there = ball(faces, y + move.reshape(y.shape), length)
             steepest = np.abs(slopes).max() * np.abs(move).sum()
             assert there.lower - here.lower == pytest.approx(predicted, abs=0.02 * steepest)
             tested += 1

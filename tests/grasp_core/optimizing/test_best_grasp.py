@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.compiled import compiled
 from grasp_core.optimizing import best_grasp as searching
 from grasp_core.optimizing import search
 from grasp_core.optimizing.ascent import CLIMBED, climbed
-from grasp_core.optimizing.grounds import exact_maps, grounds_of
+from grasp_core.optimizing.grounds import ROOM, exact_maps, grounds_of
 from grasp_core.optimizing.search import Searching, Stop
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
@@ -328,3 +329,28 @@ def test_false_maps_are_noticed():
     assert box.verify()
     assert not replace(box, maps=box.maps[:3]).verify()
     assert not replace(box, maps=box.maps[::-1]).verify()
+
+
+def test_a_cut_keeps_all_that_answers_and_next_to_nothing_else():
+    """The cone's support from its definition, at corners and near those on the border."""
+    body, rng, cut_at = example_object("wedge"), np.random.default_rng(5), 0
+    grounds, kernel = grounds_of(body, 0.05 * body.radius), compiled(search.REPLAY)
+    pieces = kernel.Pieces(grounds.normals, grounds.origins, grounds.frames, FRICTION)
+    for _ in range(400):
+        p, y, t = int(rng.integers(len(grounds.counts))), rng.normal(size=6), rng.normal()
+        polygon, at, out = grounds.polygons()[p], np.empty(6), np.empty((ROOM, 2))
+        kernel.slopes(pieces, p, y, at)
+        kept = kernel.cut(np.array(polygon), len(polygon), at, FRICTION, t, out)
+
+        def reached(places, p=p, y=y):
+            return grounds.supports(np.full(len(places), p), places, FRICTION, y[None])[:, 0]
+
+        answering = reached(polygon) >= t
+        assert (kept > 0) == answering.any()
+        new = np.array([q for q in out[:kept] if not (q == polygon).all(axis=1).any()])
+        assert kept == answering.sum() + len(new)
+        for q in new:
+            # below the threshold but for rounding, and no farther from it than doubles tell
+            assert -1e-11 < reached(q[None])[0] - t < 1e-14
+            cut_at += 1
+    assert cut_at >= 200

@@ -1,22 +1,18 @@
 """The best grasps for the weight and for tasks, against definitions, closed forms and tampering."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.ascent import _weakest
 from grasp_core.optimizing.grounds import exact_maps, grounds_of
 from grasp_core.optimizing.search import Searching, Stop
 from grasp_core.optimizing.support_cuts import ROUNDING, read_proof, write_proof
-from grasp_core.quality.measures import Measure, resisted_loads
+from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.contacts_on_faces import FRICTION, LIFT, best
-from tests.tampering.changes import forged
 
 
 def loosely_bounded():
@@ -99,17 +95,3 @@ def test_compiled_demands_are_those_of_the_definition(measure):
 def test_wrenches_that_do_not_fit_the_measure_are_refused(changed):
     with pytest.raises(gc.InputError, match="wrenches"):
         gc.best_grasp(example_object("tetrahedron"), FRICTION, **changed)
-
-
-def test_weak_directions_are_ordered_without_last_digits():
-    """The eight facets of an octahedron hold as much as each other, however long normals are."""
-    places = np.vstack([np.eye(3), -np.eye(3)])
-    wrenches = WrenchSet.at(places, -places, np.full(6, 0.3))
-    found = resisted_loads(wrenches, Measure("weight"), 1e-3)
-    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    facing, rng = np.hstack([signs, np.zeros((8, 3))]), np.random.default_rng(0)
-    for _ in range(8):
-        normals = rng.uniform(0.5, 2.0, size=(8, 1)) * facing
-        polytope = forged(found.ball.polytope, normals=normals)
-        again = _weakest(forged(found, ball=forged(found.ball, polytope=polytope)))
-        assert np.abs(again + signs / np.sqrt(3.0)).max() <= 1e-12
