@@ -6,14 +6,13 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
-from grasp_core.geometry.vectors_kernel import dotted
+from grasp_core.geometry.vectors_kernel import cross, dotted
 from grasp_core.hands.distances_kernel import (
-    box_box,
     corners_of,
     hull_hull,
     hull_surface,
-    into_frame,
     nearest,
+    reaching,
     squared,
     windings,
 )
@@ -21,8 +20,11 @@ from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree
 
 INSIDE = 0.5  # windings of a surface around a point from which the point counts as inside
 ROUNDING = 1e-9
-"""Distance beyond a limit from which a quick bound on a distance decides, and up to which hulls
-overlap [m]."""
+"""Distance beyond a limit from which a quick bound on a distance decides, up to which hulls
+overlap, and by which links of a posture may be nearer than is asked for [m]."""
+FACES, AXES = 6, 15  # normals that may separate two boxes, and all axes, with those from edges
+PARALLEL = 1e-10
+"""Sine of the angle between edges below which their cross product is no axis."""
 
 
 @loop()
@@ -104,20 +106,38 @@ def may_be_near(middles: Array, reaches: Array, i: int, j: int, limit: float) ->
 
 
 @loop(once=True)
-def _apart_by_faces(hand: HandArrays, turned: Array, middles: Array, i: int, j: int) -> float:
-    """Return how far the boxes of two shapes are apart at least, along the axes of either."""
-    widest = -np.inf
-    for one, other in ((i, j), (j, i)):
-        for a in range(3):
-            height, reach = 0.0, hand.shape_sizes[one, a]
+def _separation(
+    hand: HandArrays, turned: Array, middles: Array, i: int, j: int, limit: float, way: Array
+) -> float:  # fmt: skip
+    """Return how far the boxes of two shapes are apart at least, and fill in the way to the second.
+
+    It is the farthest along a normal of either or the cross product of an edge of each (separating
+    axes of convex bodies). If they overlap, the way is the least by which the second must move to
+    be free. Ends with the first axis beyond the limit.
+    """
+    widest, one, other = -np.inf, turned[i].T.copy(), turned[j].T.copy()
+    between, axis = middles[j] - middles[i], np.empty(3)
+    for n in range(AXES):
+        if n < FACES:
+            copy(one[n // 2] if n % 2 == 0 else other[n // 2], axis)
+        else:
+            cross(one[n % 3], other[n // 3 - 2], axis)
+            length = np.sqrt(dotted(axis, axis))
+            if length < PARALLEL:
+                continue
             for k in range(3):
-                height += turned[one, k, a] * (middles[other, k] - middles[one, k])
-            for b in range(3):
-                along = 0.0
-                for k in range(3):
-                    along += turned[one, k, a] * turned[other, k, b]
-                reach += abs(along) * hand.shape_sizes[other, b]
-            widest = max(widest, abs(height) - reach)
+                axis[k] /= length
+        ahead = dotted(axis, between)
+        gap = abs(ahead)
+        for k in range(3):
+            gap -= hand.shape_sizes[i, k] * abs(dotted(axis, one[k]))
+            gap -= hand.shape_sizes[j, k] * abs(dotted(axis, other[k]))
+        if gap > widest:
+            widest = gap
+            for k in range(3):
+                way[k] = axis[k] if ahead >= 0.0 else -axis[k]
+            if widest > limit:
+                break
     return widest
 
 
@@ -140,76 +160,34 @@ def core_in(hand: HandArrays, R: Array, middle: Array, s: int) -> tuple[Array, f
     return corners, float(hand.tip_roundings[hand.shape_tips[s]])
 
 
-@loop(once=True)
-def _from_block(
-    hand: HandArrays, turned: Array, middles: Array, block: int, s: int, limit: float, way: Array,
-    point: Array,
-) -> float:  # fmt: skip
-    """Return `pair_distance` from a block; -inf if they overlap by more than their roundings."""
-    finger, local, between = hand.shape_tips[block], np.empty(3), np.empty((3, 3))
-    own = hand.cover_corners[hand.tip_firsts[finger] : hand.tip_firsts[finger + 1]]
-    relative_frame(turned, middles, block, s, local, between)
-    others, rounding = core_in(hand, between, local, s)
-    near, other, both = np.empty(3), np.empty(3), float(hand.tip_roundings[finger]) + rounding
-    apart = hull_hull(own, others, limit + both, near, other)
-    if apart <= ROUNDING:
-        return -np.inf
-    if apart <= limit + both:
-        length = np.sqrt(squared(other, near))
-        for a in range(3):
-            near[a] = (other[a] - near[a]) / length
-            other[a] -= near[a] * rounding
-        moved(turned[block], middles[block], other, point)
-        for a in range(3):
-            way[a] = dotted(turned[block, a], near)
-    return apart - both
-
-
-@loop()
-def relative_frame(
-    turned: Array, middles: Array, i: int, j: int, local: Array, between: Array
-) -> None:  # fmt: skip
-    """Fill in the middle, (3,), and the axes, (3, 3), of a shape j in the frame of a shape i."""
-    into_frame(turned[i], middles[i], middles[j], local)
-    for a in range(3):
-        for b in range(3):
-            between[a, b] = (
-                turned[i, 0, a] * turned[j, 0, b]
-                + turned[i, 1, a] * turned[j, 1, b]
-                + turned[i, 2, a] * turned[j, 2, b]
-            )
-
-
 @loop()
 def pair_distance(
     hand: HandArrays, turned: Array, middles: Array, i: int, j: int, limit: float, way: Array,
     point: Array,
 ) -> float:  # fmt: skip
-    """Return the signed distance of two shapes of a hand."""
-    both = hand.shape_radii[i] + hand.shape_radii[j]
-    h, g = hand.shape_sizes[i], hand.shape_sizes[j]
-    apart = _apart_by_faces(hand, turned, middles, i, j) - both
+    """Return the signed distance of two shapes of a hand, or a bound on it beyond a limit.
+
+    Up to the limit, fills in the unit way from the first to the second, and the second's point. If
+    hulls overlap, it is the least way by which their boxes, or what covers blocks, come apart.
+    """
+    radii = hand.shape_radii[i] + hand.shape_radii[j]
+    apart = _separation(hand, turned, middles, i, j, limit + radii + ROUNDING, way) - radii
     if apart > limit + ROUNDING:
         return apart
-    if is_block(hand, i) or is_block(hand, j):
-        block, s = (i, j) if is_block(hand, i) else (j, i)
-        exact = _from_block(hand, turned, middles, block, s, limit, way, point)
-        if exact > -np.inf:  # else what covers the blocks shows the way
-            if block == j:
-                for a in range(3):
-                    way[a] = -way[a]
-            return exact
-    local, between, found, at = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
-    relative_frame(turned, middles, i, j, local, between)
-    apart = box_box(h, g, between, local, limit + both, found, at) - both
-    if apart <= limit:
-        for a in range(3):
-            at[a] -= found[a] * hand.shape_radii[j]
-        moved(turned[i], middles[i], at, point)
-        for a in range(3):
-            way[a] = 0.0
-            for b in range(3):
-                way[a] += turned[i, a, b] * found[b]
+    corners, own = core_in(hand, turned[i], middles[i], i)
+    others, rounding = core_in(hand, turned[j], middles[j], j)
+    near, both = np.empty(3), own + rounding
+    exact = hull_hull(corners, others, limit + both, near, point)
+    if exact > limit + both:
+        return exact - both
+    if exact > ROUNDING:
+        apart, length = exact - both, np.sqrt(squared(near, point))
+        for k in range(3):
+            way[k] = (point[k] - near[k]) / length
+    else:
+        copy(others[reaching(others, way, -1.0)], point)
+    for k in range(3):
+        point[k] -= rounding * way[k]
     return apart
 
 
@@ -317,7 +295,8 @@ def free_postures(
         if not near:
             continue
         place_shapes(hand, eye, zero, R, p, turned, middles)
-        if of_itself(hand, turned, middles, apart) >= apart:
+        # parts may be built as near to each other as that
+        if of_itself(hand, turned, middles, apart) >= apart - ROUNDING:
             kept[found] = n
             found += 1
     return found

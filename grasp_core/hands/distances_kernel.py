@@ -1,15 +1,10 @@
-"""Measures exact distances between boxes, triangles, points, hulls and surfaces, compiled.
-
-Two boxes that do not overlap are nearest at a corner of one and a point of the other, or at an edge
-of each. If they overlap, an axis among the normals and the cross products of edges shows how far
-one must move to be free of the other (separating axes of convex bodies). The distance of two boxes
-is signed: a negative one is the least such way. Hulls that overlap have the distance zero.
+"""Measures exact distances between hulls, triangles, points and surfaces, compiled.
 
 Two hulls are nearest where the hull of the differences of their corners is nearest to the origin.
 That point is approached as Gilbert, Johnson and Keerthi do: by the corner that reaches farthest
 towards the origin, as long as there is one that reaches farther than the point itself. The point
 lies in a triangle of corners; of the triangles that the new corner makes with two of the old ones,
-that which is nearest to the origin is kept.
+that which is nearest to the origin is kept. Hulls that overlap have the distance zero.
 
 Source: E. G. Gilbert, D. W. Johnson and S. S. Keerthi, A fast procedure for computing the distance
 between complex objects in three-dimensional space, 1988.
@@ -23,9 +18,7 @@ from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import cross, dotted
 from grasp_core.hands.hand_arrays import SurfaceTree
 
-PARALLEL = 1e-10
-"""Sine of the angle between edges below which their cross product is no axis."""
-BOX_CORNERS, BOX_EDGES = 8, 12
+BOX_CORNERS = 8
 MOST_STEPS = 100
 """Largest number of corners that are tried: the bound of the loop, which ends after ten or so."""
 CLOSE = 1e-13
@@ -76,48 +69,6 @@ def point_triangle(p: Array, T: Array, near: Array, weights: Array) -> float:
     return squared(p, near)
 
 
-@loop(once=True)
-def segment_segment(a: Array, u: Array, b: Array, v: Array, between: Array, end: Array) -> float:
-    """Return the squared distance of the segments a + s u and b + t v, s and t from 0 to 1.
-
-    `between` is filled with the way from the first to the second, `end` with its end.
-
-    Source: C. Ericson, Real-Time Collision Detection, section 5.1.9.
-    """
-    r = a - b
-    uu, vv, uv, ur, vr = dotted(u, u), dotted(v, v), dotted(u, v), dotted(u, r), dotted(v, r)
-    s, t = 0.0, 0.0
-    if uu > 0.0 and vv > 0.0:
-        whole = uu * vv - uv * uv
-        if whole > PARALLEL * PARALLEL * uu * vv:
-            s = min(max((uv * vr - ur * vv) / whole, 0.0), 1.0)
-        t = (uv * s + vr) / vv
-        if t < 0.0:
-            t = 0.0
-            s = min(max(-ur / uu, 0.0), 1.0)
-        elif t > 1.0:
-            t = 1.0
-            s = min(max((uv - ur) / uu, 0.0), 1.0)
-    elif uu > 0.0:
-        s = min(max(-ur / uu, 0.0), 1.0)
-    elif vv > 0.0:
-        t = min(max(vr / vv, 0.0), 1.0)
-    for j in range(3):
-        end[j] = b[j] + t * v[j]
-        between[j] = end[j] - a[j] - s * u[j]
-    return dotted(between, between)
-
-
-@loop()
-def point_box(p: Array, h: Array) -> float:
-    """Return the squared distance of a point from the box |x_i| <= h_i, zero inside."""
-    square = 0.0
-    for j in range(3):
-        out = max(abs(p[j]) - h[j], 0.0)
-        square += out * out
-    return square
-
-
 @loop()
 def into_frame(R: Array, middle: Array, p: Array, out: Array) -> None:
     """Fill in a point's coordinates in the frame with axes R (columns) and the given origin."""
@@ -142,111 +93,7 @@ def corners_of(h: Array, R: Array, middle: Array) -> Array:
 
 
 @loop()
-def edges_of(corners: Array) -> tuple[Array, Array]:
-    """Return where the edges of a box start and how they run, (12, 3) each."""
-    starts, along, n = np.empty((BOX_EDGES, 3)), np.empty((BOX_EDGES, 3)), 0
-    for j in range(3):
-        for k in range(BOX_CORNERS):
-            if not k >> j & 1:
-                for i in range(3):
-                    starts[n, i] = corners[k, i]
-                    along[n, i] = corners[k | 1 << j, i] - corners[k, i]
-                n += 1
-    return starts, along
-
-
-@loop()
-def _try_axis(axis: Array, h: Array, points: Array, widest: float, best: Array) -> float:
-    """Return the larger of `widest` and the gap along an axis, and keep the axis if it is that."""
-    length = np.sqrt(dotted(axis, axis))
-    if length < PARALLEL:
-        return widest
-    reach = (abs(axis[0]) * h[0] + abs(axis[1]) * h[1] + abs(axis[2]) * h[2]) / length
-    low, high = np.inf, -np.inf
-    for k in range(len(points)):
-        height = dotted(axis, points[k]) / length
-        low, high = min(low, height), max(high, height)
-    gap, sign = low - reach, 1.0
-    if -high - reach > gap:
-        gap, sign = -high - reach, -1.0
-    if gap > widest:
-        for j in range(3):
-            best[j] = sign * axis[j] / length
-        return gap
-    return widest
-
-
-@loop(once=True)
-def box_box(
-    h: Array, g: Array, R: Array, middle: Array, limit: float, way: Array, point: Array
-) -> float:  # fmt: skip
-    """Return the signed distance of the box |x_i| <= h_i from another box."""
-    others, axis, units, turned = corners_of(g, R, middle), np.empty(3), np.eye(3), R.T.copy()
-    widest = -np.inf
-    for j in range(3):
-        widest = _try_axis(units[j], h, others, widest, way)
-        widest = _try_axis(turned[j], h, others, widest, way)
-        if widest > limit:
-            return widest
-    for j in range(3):
-        for k in range(3):
-            cross(units[j], turned[k], axis)
-            widest = _try_axis(axis, h, others, widest, way)
-        if widest > limit:
-            return widest
-    if widest <= 0.0:
-        lowest = np.inf
-        for k in range(BOX_CORNERS):
-            height = dotted(way, others[k])
-            if height < lowest:
-                lowest = height
-                copy(others[k], point)
-        return widest
-    return _nearest_features(h, g, R, middle, others, way, point)
-
-
-@loop(once=True)
-def _nearest_features(
-    h: Array, g: Array, R: Array, middle: Array, others: Array, way: Array, point: Array
-) -> float:  # fmt: skip
-    """Compute the distance of two boxes that do not overlap, from corners and edges."""
-    corners, best = corners_of(h, np.eye(3), np.zeros(3)), np.inf
-    local, between, end = np.empty(3), np.empty(3), np.empty(3)
-    for k in range(BOX_CORNERS):
-        square = point_box(others[k], h)
-        if square < best:
-            best = square
-            copy(others[k], point)
-            for j in range(3):
-                way[j] = others[k, j] - min(max(others[k, j], -h[j]), h[j])
-        into_frame(R, middle, corners[k], local)
-        square = point_box(local, g)
-        if square < best:
-            best = square
-            for j in range(3):
-                local[j] = min(max(local[j], -g[j]), g[j])
-            for i in range(3):
-                point[i] = middle[i]
-                for j in range(3):
-                    point[i] += R[i, j] * local[j]
-                way[i] = point[i] - corners[k, i]
-    starts, along = edges_of(corners)
-    froms, ways = edges_of(others)
-    for e in range(BOX_EDGES):
-        for k in range(BOX_EDGES):
-            square = segment_segment(starts[e], along[e], froms[k], ways[k], between, end)
-            if square < best:
-                best = square
-                copy(between, way)
-                copy(end, point)
-    distance = np.sqrt(best)
-    for j in range(3):
-        way[j] /= max(distance, 1e-300)
-    return distance
-
-
-@loop()
-def _reaching(points: Array, way: Array, sign: float) -> int:
+def reaching(points: Array, way: Array, sign: float) -> int:
     """Return the number of the point that reaches farthest along sign * way."""
     best, farthest = 0, -np.inf
     for n in range(len(points)):
@@ -303,7 +150,7 @@ def hull_hull(
         if square == 0.0:
             apart = 0.0
             break
-        i, j = _reaching(corners, at, -1.0), _reaching(others, at, 1.0)
+        i, j = reaching(corners, at, -1.0), reaching(others, at, 1.0)
         for k in range(3):
             w[k] = corners[i, k] - others[j, k]
         ahead = dotted(at, w)

@@ -36,11 +36,9 @@ from grasp_core.hands.collisions_kernel import (
 from grasp_core.hands.distances_kernel import into_frame, nearest, squared
 from grasp_core.hands.hand_arrays import HandArrays, Pose, Sums, SurfaceTree, Targets, Wanted
 
-SCALE_MOVE, SCALE_TURN = 1e6, 2.5e3
-"""Squares of the millimetres by which one metre of a move, and one radian, moves a fingertip."""
 LARGEST_MOVE, LARGEST_TURN = 0.02, 0.35  # largest step [m, rad]
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-7, 1e4
-GROWTH, SHRINKING = 4.0, 0.3
+DAMPING = 30.0
+"""Added to the squares of the millimetres by which a metre, or a radian, moves what is wrong."""
 STALLED, PATIENCE = 0.02, 4
 """A start is given up after so many steps in a row that make the cost smaller by less than this."""
 BACK = 2.5e-4
@@ -351,7 +349,7 @@ def empty_sums(hand: HandArrays, targets: Targets) -> Sums:
 
 
 @loop(once=True)
-def _solved(H: Array, g: Array, step: Array) -> bool:
+def _solve(H: Array, g: Array, step: Array) -> None:
     """Solve H step = -g by Cholesky's factors, from and into the lower half of H."""
     n = len(g)
     for i in range(n):
@@ -359,12 +357,7 @@ def _solved(H: Array, g: Array, step: Array) -> bool:
             total = H[i, j]
             for k in range(j):
                 total -= H[i, k] * H[j, k]
-            if i > j:
-                H[i, j] = total / H[j, j]
-            elif total <= 0.0:
-                return False
-            else:
-                H[i, i] = np.sqrt(total)
+            H[i, j] = total / H[j, j] if i > j else np.sqrt(total)
     for i in range(n):
         total = -g[i]
         for k in range(i):
@@ -375,18 +368,14 @@ def _solved(H: Array, g: Array, step: Array) -> bool:
         for k in range(i + 1, n):
             total -= H[k, i] * step[k]
         step[i] = total / H[i, i]
-    return True
 
 
 @loop(once=True)
-def _step(
-    hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums, damping: float, A: Array, step: Array
-) -> bool:  # fmt: skip
-    """Fill in the damped step from a pose, no longer than the largest; whether there is one."""
-    n, g = len(step), sums.g.copy()
-    copy(sums.H, A)
+def _fill_step(hand: HandArrays, wanted: Wanted, pose: Pose, sums: Sums, step: Array) -> None:
+    """Fill in the damped step from a pose, no longer than the largest; uses the sums up."""
+    n, H, g = len(step), sums.H, sums.g
     for i in range(n):
-        A[i, i] += damping * (SCALE_MOVE if i < MOVES // 2 else SCALE_TURN)
+        H[i, i] += DAMPING
         if i < MOVES:
             held = not wanted.palm_moves
         else:
@@ -394,42 +383,32 @@ def _step(
             held = (q <= low and g[i] > 0.0) or (q >= high and g[i] < 0.0)
         if held:
             for j in range(n):
-                A[max(i, j), min(i, j)] = 0.0
-            A[i, i], g[i] = 1.0, 0.0
-    if not _solved(A, g, step):
-        return False
+                H[max(i, j), min(i, j)] = 0.0
+            H[i, i], g[i] = 1.0, 0.0
+    _solve(H, g, step)
     longest = 1.0
     for i in range(n):
         longest = max(longest, abs(step[i]) / (LARGEST_MOVE if i < MOVES // 2 else LARGEST_TURN))
     for i in range(n):
         step[i] /= longest
-    return True
 
 
 @loop(once=True)
-def _stepped(hand: HandArrays, pose: Pose, pivot: Array, step: Array, new: Pose) -> None:
-    """Fill in palm and joints of the pose after a step, within ranges and as they are coupled."""
+def _take(hand: HandArrays, pose: Pose, pivot: Array, step: Array) -> None:
+    """Take a step with palm and joints, within ranges and as they are coupled."""
     about, turned = np.empty((3, 3)), step[3:MOVES]
     angle = np.sqrt(dotted(turned, turned))
     turn(turned / angle if angle > 0.0 else np.zeros(3), angle, about)
-    product(about, pose.palm, new.palm)
-    moved(about, pivot, pose.origin - pivot, new.origin)
+    product(about, pose.palm.copy(), pose.palm)
+    moved(about, pivot, pose.origin - pivot, pose.origin)
     for j in range(3):
-        new.origin[j] += step[j]
+        pose.origin[j] += step[j]
     for k in range(len(pose.q)):
         angle = pose.q[k] + step[MOVES + k]
-        new.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
+        pose.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
     for k in range(len(pose.q)):  # the angles of free joints stay as they are
-        angle = hand.offsets[k] + hand.ratios[k] * new.q[hand.drivers[k]]
-        new.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
-
-
-@loop()
-def _take(source: Pose, target: Pose) -> None:
-    """Fill in where a hand is from another pose."""
-    copy(source.palm, target.palm)
-    copy(source.origin, target.origin)
-    copy(source.q, target.q)
+        angle = hand.offsets[k] + hand.ratios[k] * pose.q[hand.drivers[k]]
+        pose.q[k] = min(max(angle, hand.ranges[k, 0]), hand.ranges[k, 1])
 
 
 @loop()
@@ -437,33 +416,22 @@ def settle(
     hand: HandArrays, tree: SurfaceTree, targets: Targets, wanted: Wanted, pose: Pose, sums: Sums,
     most_steps: int, good: float,
 ) -> None:  # fmt: skip
-    """Move a hand until it touches and overlaps no more, or is given up."""
-    A, step, new = np.empty_like(sums.H), np.empty_like(sums.g), empty_pose(hand, len(pose.tips))
-    tried = empty_sums(hand, targets)
-    _take(pose, new)
-    damping, stalled, before, steps = FIRST_DAMPING, 0, np.inf, 0
-    while True:
-        residuals(hand, tree, targets, wanted, new, tried)
-        after = tried.parts[TOUCH] + tried.parts[OVERLAP]
-        if after < before:
-            _take(new, pose)
-            copy(tried.H, sums.H)
-            copy(tried.g, sums.g)
-            copy(tried.parts, sums.parts)
-            damping = max(damping * SHRINKING, LEAST_DAMPING)
-            stalled = stalled + 1 if after > (1.0 - STALLED) * before else 0
-            before = after
-        else:
-            damping *= GROWTH
-            stalled += 1
+    """Move a hand until it touches and overlaps no more, or is given up.
+
+    A step that makes the sum of squares larger is taken like any other: where such steps were
+    refused, searches took more than twice as many starts.
+    """
+    step, stalled, least = np.empty_like(sums.g), 0, np.inf
+    for taken in range(most_steps + 1):
+        residuals(hand, tree, targets, wanted, pose, sums)
+        cost = sums.parts[TOUCH] + sums.parts[OVERLAP]
+        stalled = stalled + 1 if cost > (1.0 - STALLED) * least else 0
+        least = min(least, cost)
         settled = sums.parts[OFF] <= good and sums.parts[OVERLAP] <= FREE
-        if settled or stalled >= PATIENCE or damping > MOST_DAMPING or steps == most_steps:
+        if settled or stalled >= PATIENCE or taken == most_steps:
             return
-        # damping grows until it outweighs the rest of the matrix, which then is definite
-        while not _step(hand, wanted, pose, sums, damping, A, step):
-            damping *= GROWTH
-        _stepped(hand, pose, sums.pivot, step, new)
-        steps += 1
+        _fill_step(hand, wanted, pose, sums, step)
+        _take(hand, pose, sums.pivot, step)
 
 
 @loop()

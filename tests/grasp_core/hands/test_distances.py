@@ -78,13 +78,22 @@ def corners(h, R, middle):
     return middle + (signs * h) @ R.T
 
 
+def boxes_apart(h, g, R, middle, way, point):
+    """Signed distance of the box |x_i| <= h_i from another, as two shapes of a hand."""
+    arrays = hand_arrays(gc.load_hand("allegro"))._replace(
+        shape_sizes=np.array([h, g]), shape_radii=np.zeros(2), shape_tips=np.full(2, -1)
+    )
+    turned, middles = np.array([np.eye(3), R]), np.array([np.zeros(3), middle])
+    return compiled(HANDS).pair_distance(arrays, turned, middles, 0, 1, 10.0, way, point)
+
+
 def test_boxes_are_as_far_apart_as_a_program_says_and_the_way_and_point_lie_between():
-    rng, kernel = np.random.default_rng(4), compiled(KERNEL)
+    rng = np.random.default_rng(4)
     way, point, apart = np.empty(3), np.empty(3), 0
     for _ in range(300):
         h, g = rng.uniform(0.1, 1.0, (2, 3)) * rng.integers(0, 2, (2, 3))
         R, middle = random_rotation(rng), rng.normal(scale=1.2, size=3)
-        found = kernel.box_box(h, g, R, middle, 10.0, way, point)
+        found = boxes_apart(h, g, R, middle, way, point)
         true = hulls_apart(corners(h, np.eye(3), np.zeros(3)), corners(g, R, middle))
         assert max(found, 0.0) == pytest.approx(true, abs=1e-6)
         if found > 0.01:
@@ -97,20 +106,20 @@ def test_boxes_are_as_far_apart_as_a_program_says_and_the_way_and_point_lie_betw
 
 
 def test_overlapping_boxes_come_apart_by_the_stated_way_and_no_shorter():
-    rng, kernel = np.random.default_rng(5), compiled(KERNEL)
+    rng = np.random.default_rng(5)
     way, point, other, seen = np.empty(3), np.empty(3), np.empty(3), 0
     for _ in range(200):
         h, g = rng.uniform(0.3, 1.0, (2, 3))
         R, middle = random_rotation(rng), rng.normal(scale=0.5, size=3)
-        depth = -kernel.box_box(h, g, R, middle, 10.0, way, point)
+        depth = -boxes_apart(h, g, R, middle, way, point)
         if depth <= 0.0:
             continue
         seen += 1
         moved = middle + 1.0001 * depth * way
-        assert kernel.box_box(h, g, R, moved, 10.0, other, point) > 0.0
+        assert boxes_apart(h, g, R, moved, other, point) > 0.0
         for direction in rng.normal(size=(20, 3)):
             near = middle + 0.999 * depth * direction / np.linalg.norm(direction)
-            assert kernel.box_box(h, g, R, near, 10.0, other, point) < 0.0
+            assert boxes_apart(h, g, R, near, other, point) < 0.0
     assert seen > 50
 
 
