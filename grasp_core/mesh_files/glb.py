@@ -160,12 +160,8 @@ def _matrix(node: Tree) -> Array:
         size = float(np.linalg.norm(quaternion))
         if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
             raise ValueError(f"a rotation is a quaternion of length {size:.3g}, expected 1")
-        x, y, z, w = quaternion / size
-        matrix[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
+        turns: Any = importlib.import_module("trimesh.transformations")
+        matrix = turns.quaternion_matrix(np.roll(quaternion, 1))  # glTF lists the real part last
     if "scale" in node:
         matrix[:3, :3] *= _numbers(node["scale"], 3)
     if "translation" in node:
