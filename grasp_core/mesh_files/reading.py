@@ -102,7 +102,8 @@ def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, int]:
         if count > most:
             too_many(count, most)
         rows = np.frombuffer(data, STL_ROW, offset=STL_HEAD + 4)
-        return *_unshared(rows["corners"].reshape(-1, 3).astype(np.float64)), 0
+        corners = rows["corners"].reshape(-1, 3).astype(np.float64)
+        return corners, np.arange(3 * count).reshape(-1, 3), 0
     if data.startswith(UTF_16):
         data = data.decode("utf-16", "replace").encode()
     data = data.removeprefix(BYTE_ORDER_MARK)
@@ -110,15 +111,9 @@ def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, int]:
         raise ValueError("it begins otherwise")
     if kind == "glb":
         return *read_glb(data, most), 0
-    if kind == "stl":
-        written = read_stl_text(data, most)
-        return *_unshared(written.array), written.digits
-    written, polygons = {"ply": read_ply, "obj": read_obj, "off": read_off}[kind](data, most)
+    read = {"ply": read_ply, "obj": read_obj, "off": read_off, "stl": read_stl_text}[kind]
+    written, polygons = read(data, most)
     return written.array, polygons.fans(written.array), written.digits
-
-
-def _unshared(points: Array) -> tuple[Array, Indices]:
-    return points, np.arange(len(points)).reshape(-1, 3)
 
 
 PLY_TYPES = {
@@ -397,21 +392,20 @@ def read_off(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
     return points, polygons
 
 
-def read_stl_text(data: bytes, most: int) -> TextPoints:
+def read_stl_text(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
     """Read the corners of all solids of a text STL file; line breaks between words do not count."""
-    text, points = COMMENT.sub(b"", plain_text(data)), TextPoints()
+    text, points, polygons = COMMENT.sub(b"", plain_text(data)), TextPoints(), Polygons(most)
     place, inside = 0, False
     while found := (STL_INSIDE if inside else STL_BEGIN).match(text, place):
         place = found.end()
         if found.lastindex:
             for corner in range(0, 9, 3):
                 points.add(found.groups()[corner : corner + 3])
-            if len(points) > 3 * most:
-                too_many(len(points) // 3, most)
+            polygons.add(range(len(points) - 3, len(points)))
         else:
             inside = not inside
     if inside or text[place:].strip():
         expected = "`endsolid` or a whole triangle" if inside else "`solid`"
         got = b" ".join(text[place : place + 80].split()[:4])
         raise ValueError(f"expected {expected}, got {got!r}")
-    return points
+    return points, polygons
