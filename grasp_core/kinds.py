@@ -182,9 +182,9 @@ RandomWrenches = Annotated[int, Range(least=0, most=10_000)]
 Repeats = Annotated[int, Range(least=0, most=100_000)]
 Count = Annotated[int, Range(least=1, most=MOST_COUNT)]
 Number = Annotated[int, Range(least=0, most=MOST_COUNT)]
+"""A number of things, of which there may be none."""
 FaceSets = Annotated[int, Range(least=0, most=10**18)]
 """Number of sets of faces, of which 400 faces have more than a thousand million."""
-"""A number of things, of which there may be none."""
 Seed = Annotated[int, Range(least=0, most=MOST_SEED)]
 Vector = tuple[float, float, float]
 Direction = Annotated[Vector, Size()]

@@ -1,17 +1,16 @@
-"""Reads GLB files (binary glTF): trimesh decodes the meshes, and nodes say where they are.
+"""Reads GLB files (binary glTF): trimesh decodes meshes, and the poses of nodes in their parents.
 
 The pose of a mesh is the product of the matrices from the root of its scene down to its node. Where
 this matrix mirrors, the triangles are wound the other way, so that normals still point outwards.
 trimesh passes over what it does not read, and trusts the numbers of a file. So features that would
-change the shape (compression, sparse accessors, skins, morph targets, external files) and numbers
-that would make a small file huge are refused first.
+change the shape (compression, sparse accessors, skins, morph targets, external files, meshes under
+a camera) and numbers that would make a small file huge are refused first.
 """
 
 import importlib
 import io
 import json
 import struct
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -33,6 +32,9 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 INDEX_TYPES, FLOAT_TYPE = (5121, 5123, 5125), 5126
 TRIANGLES, STRIP = 4, 5
 MODES = {TRIANGLES, STRIP}
+BELOW = {"mesh", "children"}
+MOTIONS = {"translation": 3, "rotation": 4, "scale": 3}
+"""Parts of a node's pose, with their counts of numbers."""
 Tree = dict[str, Any]
 """A JSON object of a glTF file, whose values are checked where they are used."""
 
@@ -44,7 +46,7 @@ def read_glb(data: bytes, most: int) -> tuple[Array, Indices]:
         _check_features(tree)
         _check_sizes(tree, len(data), most)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-            return _scene(tree, data, most)
+            return _scene(data, most)
     except (MeshError, MemoryError):
         raise
     except Exception as error:  # trimesh raises whatever the numbers of the file lead it to
@@ -72,7 +74,7 @@ def _check_features(tree: Tree) -> None:
         "numbers outside the binary chunk": len(buffers) > 1 or any("uri" in b for b in buffers),
         "compression": not all(name.startswith(PLAIN_EXTENSIONS) for name in names),
         "a skin or weights of morph targets": any({"skin", "weights"} & n.keys() for n in nodes),
-        "a mesh that is a camera too": any({"mesh", "camera"} <= node.keys() for node in nodes),
+        "a camera with meshes": any("camera" in n and BELOW & n.keys() for n in nodes),
         "morph targets or extensions": any("targets" in p or p.get("extensions") for p in parts),
         "lines, points or fans": not {part.get("mode", TRIANGLES) for part in parts} <= MODES,
         "sparse numbers": any("sparse" in a or "bufferView" not in a for a in accessors),
@@ -80,6 +82,8 @@ def _check_features(tree: Tree) -> None:
     for feature in (name for name, there in wrong.items() if there):
         message = f"the file has a feature that is not read: {feature}; export plain triangles"
         raise MeshError(MeshRefusal.UNSUPPORTED, message)
+    for node in nodes:
+        _check_pose(node)
     for part in parts:
         points = _item(accessors, part["attributes"]["POSITION"])
         if (points["componentType"], points["type"]) != (FLOAT_TYPE, "VEC3"):
@@ -107,70 +111,44 @@ def _check_sizes(tree: Tree, size: int, most: int) -> None:
         raise ValueError(f"nodes must form a tree of at most {MOST_NODES} nodes")
 
 
-def _scene(tree: Tree, data: bytes, most: int) -> tuple[Array, Indices]:
+def _check_pose(node: Tree) -> None:
+    """Refuse a pose that trimesh would read as another one."""
+    if "matrix" in node:
+        columns = _numbers(node["matrix"], 16)[3::4]  # glTF lists matrices by columns
+        if MOTIONS.keys() & node.keys() or columns.tolist() != [0.0, 0.0, 0.0, 1.0]:
+            raise ValueError("a node has a matrix of perspective, or a rotation beside its matrix")
+    given = {name: _numbers(node[name], count) for name, count in MOTIONS.items() if name in node}
+    size = float(np.linalg.norm(given.get("rotation", 1.0)))
+    if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
+        raise ValueError(f"a rotation is a quaternion of length {size:.3g}, expected 1")
+
+
+def _scene(data: bytes, most: int) -> tuple[Array, Indices]:
     """Decode all parts of meshes, and place them by the nodes of the default scene."""
     gltf: Any = importlib.import_module("trimesh.exchange.gltf")
 
     found = gltf.load_glb(io.BytesIO(data), skip_materials=True)
-    decoded = iter(found["geometry"].values())
-    meshes = [
-        [(part, next(decoded)) for part in mesh["primitives"]] for mesh in tree.get("meshes", [])
-    ]
     points, triangles = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
+    poses = {found["base_frame"]: np.eye(4)}
     before = placed = 0
-    for pose, mesh in _placed(tree):
+    for node in found["graph"]:  # those above come first
+        pose = poses[node["frame_to"]] = poses[node["frame_from"]] @ node["matrix"]
+        if "geometry" not in node:
+            continue
+        held = found["geometry"][node["geometry"]]
+        rows = np.array(held["faces"], dtype=np.int64)
+        placed += max(len(rows), 1)
+        if placed > most:
+            too_many(placed, most)
+        check_corners(rows, len(held["vertices"]))
+        used, rows = np.unique(rows, return_inverse=True)
+        rows = before + rows.reshape(-1, 3)
+        local = np.asarray(held["vertices"])[used].astype(np.float64)
+        points.append(local @ pose[:3, :3].T + pose[:3, 3])
         mirrored = np.linalg.det(pose[:3, :3]) < 0.0
-        for part, held in meshes[mesh]:
-            rows = np.array(held["faces"], dtype=np.int64)
-            if part.get("mode") == STRIP:  # begun as elsewhere, so that sums keep their last digits
-                rows[1::2] = np.roll(rows[1::2], -1, axis=1)
-            placed += max(len(rows), 1)
-            if placed > most:
-                too_many(placed, most)
-            check_corners(rows, len(held["vertices"]))
-            used, rows = np.unique(rows, return_inverse=True)
-            rows = before + rows.reshape(-1, 3)
-            local = np.asarray(held["vertices"])[used].astype(np.float64)
-            points.append(local @ pose[:3, :3].T + pose[:3, 3])
-            triangles.append(rows[:, ::-1] if mirrored else rows)
-            before += len(used)
+        triangles.append(rows[:, ::-1] if mirrored else rows)
+        before += len(used)
     return np.vstack(points), np.vstack(triangles)
-
-
-def _placed(tree: Tree) -> Iterator[tuple[Array, int]]:
-    """Yield the 4x4 pose matrix and the index of each mesh in the default scene."""
-    waiting = [(np.eye(4), root) for root in _roots(tree)]
-    while waiting:
-        above, number = waiting.pop()
-        node = _item(tree["nodes"], number)
-        pose = above @ _matrix(node)
-        waiting += [(pose, child) for child in node.get("children", [])]
-        if "mesh" in node:
-            yield pose, node["mesh"]
-
-
-def _matrix(node: Tree) -> Array:
-    matrix = np.eye(4)
-    if "matrix" in node:
-        matrix = _numbers(node["matrix"], 16).reshape(4, 4).T  # glTF lists matrices by columns
-        if {"translation", "rotation", "scale"} & node.keys() or (matrix[3] != (0, 0, 0, 1)).any():
-            raise ValueError("a node has a matrix of perspective, or a rotation beside its matrix")
-    if "rotation" in node:
-        quaternion = _numbers(node["rotation"], 4)
-        size = float(np.linalg.norm(quaternion))
-        if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
-            raise ValueError(f"a rotation is a quaternion of length {size:.3g}, expected 1")
-        x, y, z, w = quaternion / size
-        matrix[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    if "scale" in node:
-        matrix[:3, :3] *= _numbers(node["scale"], 3)
-    if "translation" in node:
-        matrix[:3, 3] = _numbers(node["translation"], 3)
-    return matrix
 
 
 def _numbers(given: list[Any], count: int) -> Array:

@@ -111,9 +111,6 @@ SINGLE = 2.0**-24
 FEWEST_DIGITS, ALL_DIGITS = 5, 17
 WRITTEN = 0.501
 """Largest error of a written number, in units of its last digit."""
-BLOCK, STRIDE = 1024, 64
-"""Vertices whose words are looked at together; beyond the first block only every 64th of them, and
-the one with the largest coordinate, which has the most digits where decimals are fixed."""
 EXPONENT = re.compile(rb"[eE][+-]?\d+")
 SIGNS = b"+-."
 FLOATS = 3
@@ -125,9 +122,8 @@ class TextPoints:
 
     numbers: "array[float]" = field(default_factory=lambda: array("d"))
     """Coordinates, three for each vertex."""
-    _digits: int = 0
-    _decimals: set[int] = field(default_factory=set[int])
-    _waiting: list[Sequence[bytes]] = field(default_factory=list[Sequence[bytes]])
+    words: bytearray = field(default_factory=bytearray)
+    """The words of the coordinates, with spaces between them."""
 
     def __len__(self) -> int:
         return len(self.numbers) // FLOATS
@@ -137,9 +133,7 @@ class TextPoints:
         if len(words) != FLOATS:
             raise ValueError(f"a vertex needs three numbers, got {len(words)}")
         self.numbers.extend([float(word.replace(b"_", b"?")) for word in words])
-        self._waiting.append(words)
-        if len(self._waiting) == BLOCK:
-            self._look()
+        self.words += b" ".join(words) + b" "
 
     @property
     def array(self) -> Array:
@@ -149,21 +143,10 @@ class TextPoints:
     @property
     def digits(self) -> int:
         """Significant digits that the writer kept; 0 if the numbers may be exact."""
-        self._look()
-        fixed = len(self._decimals) == 1 and min(self._decimals) >= FEWEST_DIGITS
-        return self._digits if fixed or self._digits >= FEWEST_DIGITS else 0
-
-    def _look(self) -> None:
-        waiting = self._waiting
-        if waiting and self._digits < ALL_DIGITS:
-            if len(self) > BLOCK:
-                sizes = np.abs(self.numbers[-FLOATS * len(waiting) :])
-                waiting = [*waiting[::STRIDE], waiting[int(sizes.argmax()) // FLOATS]]
-            words = [word for words in waiting for word in words]
-            self._digits = max(self._digits, most_digits(words))
-            if len(self._decimals) <= 1:
-                self._decimals |= {len(word.partition(b".")[2]) for word in words}
-        self._waiting.clear()
+        words = set(bytes(self.words).split())
+        digits, decimals = most_digits(words), {len(word.partition(b".")[2]) for word in words}
+        fixed = len(decimals) == 1 and min(decimals) >= FEWEST_DIGITS
+        return digits if fixed or digits >= FEWEST_DIGITS else 0
 
 
 def most_digits(words: Iterable[bytes]) -> int:

@@ -10,10 +10,11 @@ file, and no more triangles than are allowed are kept: `MeshLimits` bounds both.
 import io
 import re
 import struct
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import chain, groupby, islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -101,7 +102,8 @@ def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, int]:
         if count > most:
             too_many(count, most)
         rows = np.frombuffer(data, STL_ROW, offset=STL_HEAD + 4)
-        return *_unshared(rows["corners"].reshape(-1, 3).astype(np.float64)), 0
+        corners = rows["corners"].reshape(-1, 3).astype(np.float64)
+        return corners, np.arange(3 * count).reshape(-1, 3), 0
     if data.startswith(UTF_16):
         data = data.decode("utf-16", "replace").encode()
     data = data.removeprefix(BYTE_ORDER_MARK)
@@ -109,40 +111,35 @@ def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, int]:
         raise ValueError("it begins otherwise")
     if kind == "glb":
         return *read_glb(data, most), 0
-    if kind == "stl":
-        written = read_stl_text(data, most)
-        return *_unshared(written.array), written.digits
-    if kind == "ply":
-        points, digits, polygons = read_ply(data, most)
-        return points, polygons.fans(points), digits
-    written, polygons = (read_obj if kind == "obj" else read_off)(data, most)
+    read = {"ply": read_ply, "obj": read_obj, "off": read_off, "stl": read_stl_text}[kind]
+    written, polygons = read(data, most)
     return written.array, polygons.fans(written.array), written.digits
 
 
-def _unshared(points: Array) -> tuple[Array, Indices]:
-    return points, np.arange(len(points)).reshape(-1, 3)
-
-
 PLY_TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8",
-    "float16": "f2", "float32": "f4", "float64": "f8",
+    "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I",
+    "float": "f", "double": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H",
+    "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q",
+    "float16": "e", "float32": "f", "float64": "d",
 }  # fmt: skip
+"""Number types of PLY as `struct` and numpy write them."""
+FRACTIONS = "efd"
+"""Those of the types that are no whole numbers."""
 PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 PLY_END = re.compile(rb"\n[ \t]*end_header[ \t]*\r?\n|\r[ \t]*end_header[ \t]*\r")
-LONGEST_HEADER = 2**16
-PLY_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I",
-             "i8": "q", "u8": "Q", "f2": "e", "f4": "f", "f8": "d"}  # fmt: skip
+LONGEST_HEADER, LONGEST_LIST = 2**16, 2**31
 PLY_CORNERS = {"vertex_indices", "vertex_index"}
 PLY_POINT = ("x", "y", "z")
+
+Take: TypeAlias = Callable[[str, int], Sequence[Any]]
+"""A function that takes the next values of a table, of types as `struct` writes them, (n,)."""
 
 
 class Column(NamedTuple):
     """A property of a PLY table: one number, or one list of numbers, in each row."""
 
     name: str
-    kind: str  # the number type as numpy writes it, without the byte order, such as `f4`
+    kind: str  # the number type as `struct` writes it
     counted: str | None
     """The number type of a list's length; None if the column holds single numbers."""
 
@@ -155,27 +152,79 @@ class Table(NamedTuple):
     columns: list[Column]
 
 
-def read_ply(data: bytes, most: int) -> tuple[Array, int, Polygons]:
-    """Read the vertices (n, 3) of a PLY file, the digits of their text, and its polygons."""
+def read_ply(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
+    """Read a PLY file: a header, and rows of the tables that it announces, as text or as bytes."""
     order, tables, place = _ply_header(data)
-    body = _TextTables(data[place:]) if order == "=" else _BinaryTables(data, place, order)
-    points, polygons = np.empty((0, 3)), Polygons(most)
+    body: Iterator[bytes]
+    if is_text := order == PLY_ORDERS["ascii"]:
+        lines = worded_lines(plain_text(data[place:]).replace(b"_", b"?"))
+        body = chain.from_iterable(lines)
+        take: Take = partial(_taken_words, body)
+    else:
+        body = io.BytesIO(data[place:])
+        take = partial(_taken_numbers, body, order)
+    points, polygons = TextPoints(), Polygons(most)
     for table in tables:
-        if table.name == "face":
-            (name,) = {column.name for column in table.columns} & PLY_CORNERS
-            for cells in _rows(table, body):
+        for cells in _rows(table, take):
+            if table.name == "vertex":
+                point = [cells[axis] for axis in PLY_POINT]
+                (points.add if is_text else points.numbers.extend)(point)
+            elif table.name == "face":
+                (name,) = PLY_CORNERS & cells.keys()
                 corners = [float(corner) for corner in cells[name]]
                 if not all(map(float.is_integer, corners)):
                     raise ValueError("the corners of a face must be whole numbers")
                 polygons.add([int(corner) for corner in corners])
-        elif table.name == "vertex":
-            points = body.points(table)
-        else:
-            deque(_rows(table, body), maxlen=0)
-    body.begin_row()
-    if body.goes_on():
+    if next(body, None) is not None:
         raise ValueError("the file goes on after the tables that its header announces")
-    return points, body.digits, polygons
+    for column in (each for table in tables if table.name == "vertex" for each in table.columns):
+        if column.name in PLY_POINT:
+            _round_to(column, points.array[:, PLY_POINT.index(column.name)])
+    return points, polygons
+
+
+def _taken_words(words: Iterator[bytes], _: str, count: int) -> Sequence[bytes]:
+    taken = list(islice(words, count))
+    if len(taken) < count:
+        raise ValueError("a table or a row is shorter than the header says")
+    return taken
+
+
+def _taken_numbers(body: io.BytesIO, order: str, kinds: str, _: int) -> Sequence[float]:
+    taken = body.read(size := struct.calcsize(order + kinds))
+    if len(taken) < size:
+        raise ValueError("a table is shorter than the header says")
+    return struct.unpack(order + kinds, taken)
+
+
+def _rows(table: Table, take: Take) -> Iterator[dict[str, Any]]:
+    """Yield the cells of each row by the names of columns; single numbers are taken together."""
+    runs = [
+        (counted, list(columns)) for counted, columns in groupby(table.columns, lambda c: c.counted)
+    ]
+    for _ in range(table.rows):
+        cells = dict[str, Any]()
+        for counted, columns in runs:
+            if counted is None:
+                kinds = "".join(column.kind for column in columns)
+                values = take(kinds, len(columns))
+                cells.update((c.name, value) for c, value in zip(columns, values, strict=True))
+                continue
+            for name, kind, _ in columns:
+                length = int(take(counted, 1)[0])
+                if not 0 <= length <= LONGEST_LIST:
+                    raise ValueError(f"a list has a length of {length}")
+                cells[name] = take(f"{length}{kind}", length)
+        yield cells
+
+
+def _round_to(column: Column, values: Array) -> None:
+    """Round coordinates, (n,), to the number type that the header gives them."""
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        kept = values.astype(column.kind)
+    if column.kind not in FRACTIONS and (kept != values).any():
+        raise ValueError(f"{column.name} does not fit the whole numbers that the header gives")
+    values[:] = kept
 
 
 def _ply_header(data: bytes) -> tuple[str, list[Table], int]:
@@ -217,94 +266,8 @@ def _check_ply(order: str, tables: list[Table]) -> None:
         names = {column.name for column in columns}
         if rows < 0 or (rows and not columns) or len(names) < len(columns):
             raise ValueError("the header has a count below 0, or the same name twice")
-        if any(column.counted and column.counted.startswith("f") for column in columns):
+        if any(column.counted and column.counted in FRACTIONS for column in columns):
             raise ValueError("the length of a list must be a whole number")
-
-
-def _rows(table: Table, body: "_TextTables | _BinaryTables") -> Iterator[dict[str, Sequence[Any]]]:
-    """Yield the cells of each row by the names of columns; single numbers are lists of one."""
-    for _ in range(table.rows):
-        cells = dict[str, Sequence[Any]]()
-        body.begin_row()
-        for name, kind, count in table.columns:
-            length = 1 if count is None else int(body.take(count, 1)[0])
-            cells[name] = body.take(kind, length)
-        yield cells
-
-
-class _TextTables:
-    """The tables of a text PLY, with a line for each row."""
-
-    digits = 0
-
-    def __init__(self, data: bytes) -> None:
-        self.lines = worded_lines(plain_text(data).replace(b"_", b"?"))
-        self.words, self.place = list[bytes](), 0
-
-    def begin_row(self) -> None:
-        """Go on to the next line."""
-        if self.goes_on():
-            raise ValueError("a row has more values than the header says")
-        self.words, self.place = next(self.lines, list[bytes]()), 0
-
-    def take(self, _: str, length: int) -> list[bytes]:
-        """Take the next words of the row."""
-        end = self.place + length
-        if not self.place <= end <= len(self.words):
-            raise ValueError("a table or a row is shorter than the header says")
-        taken, self.place = self.words[self.place : end], end
-        return taken
-
-    def points(self, table: Table) -> Array:
-        """Return the vertices (n, 3), rounded to the number types that the header gives."""
-        written = TextPoints()
-        for cells in _rows(table, self):
-            written.add([cells[axis][0] for axis in PLY_POINT])
-        points, self.digits = written.array, written.digits
-        for name, kind, _ in (column for column in table.columns if column.name in PLY_POINT):
-            values = points[:, PLY_POINT.index(name)]
-            with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-                kept = values.astype(kind)
-            if not kind.startswith("f") and (kept != values).any():
-                raise ValueError(f"{name} does not fit the whole numbers that the header gives")
-            values[:] = kept
-        return points
-
-    def goes_on(self) -> bool:
-        """Return whether anything follows in the row."""
-        return self.place < len(self.words)
-
-
-class _BinaryTables:
-    """The tables of a binary PLY, one after another; methods are those of a text."""
-
-    digits = 0
-
-    def __init__(self, data: bytes, place: int, order: str) -> None:
-        self.data, self.place, self.order = data, place, order
-
-    def begin_row(self) -> None:
-        pass
-
-    def take(self, kind: str, length: int) -> Sequence[float]:
-        end = self.place + length * int(kind[1])
-        if not self.place <= end <= len(self.data):
-            raise ValueError("a table is shorter than the header says")
-        taken = struct.unpack_from(f"{self.order}{length}{PLY_CODES[kind]}", self.data, self.place)
-        self.place = end
-        return taken
-
-    def points(self, table: Table) -> Array:
-        if any(column.counted for column in table.columns):
-            listed = [[cells[axis][0] for axis in PLY_POINT] for cells in _rows(table, self)]
-            return np.array(listed, dtype=np.float64).reshape(-1, 3)
-        fields = [(column.name, self.order + column.kind) for column in table.columns]
-        rows = np.frombuffer(self.data, np.dtype(fields), table.rows, self.place)
-        self.place += rows.nbytes
-        return np.stack([rows[axis].astype(np.float64) for axis in PLY_POINT], axis=1)
-
-    def goes_on(self) -> bool:
-        return self.place < len(self.data)
 
 
 LONGEST_LINE = 2**20
@@ -333,14 +296,14 @@ OFF_HEAD = re.compile(rb"(?:ST)?C?N?OFF(\d*)", re.IGNORECASE)
 colour and normal values after a point are ignored."""
 OFF_COUNTS = (2, 3)
 STL_BEGIN = re.compile(rb"\s*solid[^\n]*", re.IGNORECASE)
-STL_FACET = re.compile(
-    rb"\s*facet(?:\s+(?!outer\s)\S+){0,4}\s+outer\s+loop"
+STL_INSIDE = re.compile(
+    rb"\s*endsolid[^\n]*|\s*facet(?:\s+(?!outer\s)\S+){0,4}\s+outer\s+loop"
     + 3 * rb"\s+vertex\s+(\S+)\s+(\S+)\s+(\S+)"
     + rb"\s+endloop\s+endfacet\b",
     re.IGNORECASE,
 )
-"""A triangle of a text STL file; the word `normal` and its numbers may be there in part."""
-STL_END = re.compile(rb"\s*endsolid[^\n]*", re.IGNORECASE)
+"""A triangle of a text STL file, or its end; the word `normal` and its numbers may be there in
+part."""
 
 
 def plain_text(data: bytes) -> bytes:
@@ -429,26 +392,20 @@ def read_off(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
     return points, polygons
 
 
-def read_stl_text(data: bytes, most: int) -> TextPoints:
+def read_stl_text(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
     """Read the corners of all solids of a text STL file; line breaks between words do not count."""
-    text, points, place = COMMENT.sub(b"", plain_text(data)), TextPoints(), 0
-    while begun := STL_BEGIN.match(text, place):
-        place = begun.end()
-        while facet := STL_FACET.match(text, place):
+    text, points, polygons = COMMENT.sub(b"", plain_text(data)), TextPoints(), Polygons(most)
+    place, inside = 0, False
+    while found := (STL_INSIDE if inside else STL_BEGIN).match(text, place):
+        place = found.end()
+        if found.lastindex:
             for corner in range(0, 9, 3):
-                points.add(facet.groups()[corner : corner + 3])
-            if len(points) > 3 * most:
-                too_many(len(points) // 3, most)
-            place = facet.end()
-        if not (ended := STL_END.match(text, place)):
-            raise ValueError(
-                f"expected `endsolid` or a whole triangle, got {_next_words(text, place)!r}"
-            )
-        place = ended.end()
-    if text[place:].strip():
-        raise ValueError(f"expected `solid`, got {_next_words(text, place)!r}")
-    return points
-
-
-def _next_words(text: bytes, place: int) -> bytes:
-    return b" ".join(text[place : place + 80].split()[:4])
+                points.add(found.groups()[corner : corner + 3])
+            polygons.add(range(len(points) - 3, len(points)))
+        else:
+            inside = not inside
+    if inside or text[place:].strip():
+        expected = "`endsolid` or a whole triangle" if inside else "`solid`"
+        got = b" ".join(text[place : place + 80].split()[:4])
+        raise ValueError(f"expected {expected}, got {got!r}")
+    return points, polygons

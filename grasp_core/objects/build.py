@@ -230,7 +230,8 @@ def content_hash(points: Array, corners: Indices) -> str:
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     renamed = place[corners]
-    turned = np.array([np.roll(t, -int(np.argmin(t))) for t in renamed])
+    turns = (renamed.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    turned = np.take_along_axis(renamed, turns, axis=1)
     turned = turned[np.lexsort(turned.T[::-1])]
     digest = hashlib.sha256(np.ascontiguousarray(points[order] + 0.0, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(turned, dtype="<i8").tobytes())

@@ -213,7 +213,8 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
     if len(bodies) == 1:
         return bodies
     solid, marks = union(bodies, [body.marks for body in bodies])
-    found = _with_cavities(_Body(solid.vertices, solid.triangles, marks).parts(), slack)
+    found, flat, _ = _sorted_out(_Body(solid.vertices, solid.triangles, marks).parts(), slack, [])
+    found += [shell for shell in flat if shell.volume > 0.0]
     if len(found) == len(bodies):
         return bodies
     if max(map(thin_share, found)) > CLEAN:
@@ -224,18 +225,6 @@ def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
         )
     said.append(f"{len(bodies)} parts that overlap or touch were united")
     return found
-
-
-def _with_cavities(shells: list[_Body], slack: float) -> list[_Body]:
-    bodies = [shell for shell in shells if shell.volume > 0.0]
-    for shell in shells:
-        if shell.volume <= 0.0:
-            hollow = shell.turned()
-            shared = [intersection_volume(body, hollow) for body in bodies]
-            host = int(np.argmax(shared))
-            if shared[host] > slack:
-                bodies[host] = bodies[host].joined(shell)
-    return bodies
 
 
 def check_volume(solid: Mesh) -> None:

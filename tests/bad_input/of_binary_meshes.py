@@ -165,6 +165,7 @@ GLBS = {
     "quantized numbers": (changed("extensionsUsed", ["KHR_mesh_quantization"]), "compression"),
     "a part's compression": (
         changed("meshes.0.primitives.0.extensions", {"KHR_draco_mesh_compression": {}}), "plain"),
+    "a mesh that is a camera too": (changed("nodes.0.camera", 0), "a camera with meshes"),
     "a skin": (changed("nodes.0.skin", 0), "skin"),
     "morphs": (changed("meshes.0.primitives.0.targets", [{"POSITION": 0}]), "morph"),
     "numbers behind http": (changed("buffers.0.uri", "http://localhost/a.bin"), "outside"),
