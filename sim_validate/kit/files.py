@@ -21,7 +21,7 @@ import tomllib
 import zipfile
 from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, Self, TypeAlias, TypeVar
 
@@ -45,6 +45,7 @@ from grasp_core.files.text_files import (
 from grasp_core.grasp_tables import ById, Named, frame_of
 from grasp_core.kinds import Friction
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -67,7 +68,17 @@ Item = TypeVar("Item", bound=Named)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class AboutGrasps(RecordFile, ById[Item]):
+class ResultFile(RecordFile):
+    """Base of files that say which versions made them."""
+
+    versions: Mapping[str, str | None] = field(
+        default_factory=versions, compare=False, kw_only=True
+    )
+    """Versions of every package that can change a number."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AboutGrasps(ResultFile, ById[Item]):
     """Base of files about the grasps of an object.
 
     They are sequences, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
@@ -76,7 +87,7 @@ class AboutGrasps(RecordFile, ById[Item]):
     object: AboutObject
     friction: Friction
     """Coulomb coefficient at every contact."""
-    complete: bool
+    complete: bool = field(kw_only=True)
     """Whether every grasp that was asked for was dealt with."""
 
     @property

@@ -4,7 +4,7 @@ The best grasp, and the bound on all others, are held by `best.json`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -14,19 +14,18 @@ from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
-from grasp_core.files.records import RecordFile, recorded
+from grasp_core.files.records import recorded
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import Family, Friction, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best_grasp import BestGrasp, Ended, GapAt, best_grasp, measured
 from grasp_core.optimizing.support_cuts import write_proof
-from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject
+from sim_validate.kit.files import AboutObject, ResultFile
 
 PROOF = "best-proof.npz"
 MEASURES: Mapping[MeasureName, tuple[str, str]] = {
@@ -61,7 +60,7 @@ class Placed(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Best(RecordFile):
+class Best(ResultFile):
     """The best grasp of an object by one measure, with the proved bound on all others."""
 
     FILE = "best.json"
@@ -87,7 +86,6 @@ class Best(RecordFile):
     history: tuple[GapAt, ...]
     planned: tuple[Rated, ...]
     """The planned grasps, which may be nearer to edges."""
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     @classmethod
     def of(
