@@ -28,12 +28,12 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject, ResultFile
 
 PROOF = "best-proof.npz"
-MEASURES: Mapping[MeasureName, tuple[str, str]] = {
-    "ferrari-canny": ("Ferrari-Canny quality", " N"),
-    "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
-    "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
+MEASURES: Mapping[MeasureName, tuple[str, str, str]] = {
+    "ferrari-canny": ("quality", "Ferrari-Canny quality", " N"),
+    "weight": ("weight", "weight held in every orientation, for normal forces of sum 1 N", " N"),
+    "task": ("multiple", "multiple of the task's loads, for normal forces of sum 1 N", ""),
 }
-"""What each measure says of a grasp, and its unit."""
+"""What each measure says of a grasp, in a word and in full, and its unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +144,6 @@ WHY = {
 """Why a search ended, in words."""
 ROUGH = 1e-3
 """Gap between the bounds of what planned grasps hold."""
-WORDS = {"ferrari-canny": "quality", "weight": "weight", "task": "multiple"}
-"""What each measure gives, in a word."""
 
 
 def search_best(
@@ -157,7 +155,7 @@ def search_best(
 
         def tell(now: GapAt) -> None:
             closed = round(STEPS * (1.0 - max(now.gap - command.gap, 0.0)))
-            word = WORDS[command.measure]
+            word, *_ = MEASURES[command.measure]
             note = f"({word} {now.quality:.4f}, bound {now.bound:.4f}, gap {100 * now.gap:.1f} %)"
             steps.update(closed, STEPS, note)
 
@@ -193,7 +191,7 @@ def write_best(
 
 def show_best(found: Best, reporter: Reporter) -> int:
     """Show the best grasp, the bound, and how much of the possible each planned grasp reaches."""
-    word, (_, unit) = WORDS[found.measure], MEASURES[found.measure]
+    word, _, unit = MEASURES[found.measure]
     reporter.say(
         f"best grasp {found.grasp.id}: {word} {found.quality[0]:.4f}{unit}; no four contacts "
         f"{1e3 * found.clearance_m:.3g} mm from edges exceed {found.bound:.4f}{unit} (gap "
