@@ -224,14 +224,14 @@ def moved(mark: Mark, by: Array) -> Mark:
             return replace(mark, left=mark.left + float(by[0]), top=mark.top + float(by[1]))
 
 
-def beside(sheets: Sequence[Sheet], apart: float = 0.0) -> Sheet:
+def beside(sheets: Sequence[Sheet]) -> Sheet:
     """Put sheets side by side, from left to right."""
     marks, left = list[Mark](), 0.0
     for sheet in sheets:
         marks += [moved(mark, np.array([left, 0.0])) for mark in sheet.marks]
-        left += sheet.width + apart
+        left += sheet.width
     height = max(sheet.height for sheet in sheets)
-    return Sheet(left - apart, height, "; ".join(each.name for each in sheets), tuple(marks))
+    return Sheet(left, height, "; ".join(each.name for each in sheets), tuple(marks))
 
 
 def circle(center: Array, radius: float) -> Array:
@@ -261,9 +261,9 @@ def numbered(center: Array, radius: float, text: str, colour: str) -> tuple[Mark
     )
 
 
-def ink_line(points: Sequence[tuple[float, float]], width: float = 1.0) -> Line:
-    """Draw a line in ink through points."""
-    return Line((np.array(points),), INK, width)
+def ink_line(points: Sequence[tuple[float, float]]) -> Line:
+    """Draw a thin line in ink through points."""
+    return Line((np.array(points),), INK, 1.0)
 
 
 def _image_png(levels: Indices) -> bytes:
