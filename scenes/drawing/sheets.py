@@ -65,10 +65,8 @@ def ramp_bytes() -> Indices:
     """Return the colours of the ramp, (LEVELS, 3), from 0 to 255."""
     knots = np.array([rgb(colour) for colour in RAMP])
     places = np.linspace(0.0, len(RAMP) - 1.0, LEVELS)
-    low = np.minimum(places.astype(np.int64), len(RAMP) - 2)
-    share = (places - low)[:, None]
-    mixed = (1.0 - share) * knots[low] + share * knots[low + 1]
-    return np.rint(255.0 * mixed).astype(np.int64)
+    mixed = [np.interp(places, np.arange(len(RAMP)), knots[:, part]) for part in range(3)]
+    return np.rint(255.0 * np.stack(mixed, axis=1)).astype(np.int64)
 
 
 def levels_of(values: Array, low: float, high: float) -> Indices:

@@ -335,8 +335,8 @@ def wider(grasp: Grasp, found: GraspRegions) -> Grasp:
     """Give a grasp its certified regions if their discs around its contacts are larger."""
     if found.regions is None or found.normals is None:
         return grasp
-    radius = min(
-        _room(region.polygon, contact.position, normal)
+    radius = min(  # how far each contact is from the nearest edge of its region
+        float(edge_rows((region.polygon - contact.position) @ plane_frame(normal))[1].min())
         for region, contact, normal in zip(
             found.regions, grasp.contacts, found.normals, strict=True
         )
@@ -344,11 +344,3 @@ def wider(grasp: Grasp, found: GraspRegions) -> Grasp:
     if radius <= grasp.radius and grasp.regions[0].kind != "point":
         return grasp
     return replace(grasp, regions=found.regions, radius=max(radius, 0.0))
-
-
-def _room(polygon: Array, point: Array, normal: Array) -> float:
-    """Compute how far a point lies from the nearest edge of a convex polygon (c, 3) [m]."""
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    inward = np.cross(normal, edges)
-    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    return float(np.einsum("ci,ci->c", inward, point - polygon).min())
