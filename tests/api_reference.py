@@ -14,13 +14,13 @@ from docstring_parser import DocstringStyle, parse
 
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import HoldsWrenches
-from sim_validate.kit.files import AboutGrasps
+from sim_validate.kit.files import AboutGrasps, ResultFile
 
 PAGE = Path(__file__).parent.parent / "docs" / "api.md"
 PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
 UNTOLD = ("Key", "Shape", "Shown", "UNRECORDED", "FLAT")
 """Rules of types that the page leaves out."""
-BASES = (AboutGrasps, HoldsWrenches)
+BASES = (ResultFile, AboutGrasps, HoldsWrenches)
 """Bases whose members are told with those of each class."""
 INTRODUCTION = """\
 # Python reference

@@ -107,10 +107,10 @@ class Panel:
         kept = tuple(thinned(points[piece]) for piece in pieces if len(piece) and known[piece[0]])
         return Line(kept, colour, width)
 
-    def level(self, y: float, colour: str, *, dashed: bool = True) -> Line:
-        """Draw a line across the panel at a height."""
+    def level(self, y: float, colour: str) -> Line:
+        """Draw a dashed line across the panel at a height."""
         ends = self.at(np.array([self.x.low, self.x.high]), np.array([y, y]))
-        return Line((ends,), colour, 1.2, dashed=dashed)
+        return Line((ends,), colour, 1.2, dashed=True)
 
     def upright(self, x: float, colour: str, *, dashed: bool = False) -> Line:
         """Draw a line from the bottom to the top of the panel."""

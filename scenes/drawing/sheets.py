@@ -65,10 +65,8 @@ def ramp_bytes() -> Indices:
     """Return the colours of the ramp, (LEVELS, 3), from 0 to 255."""
     knots = np.array([rgb(colour) for colour in RAMP])
     places = np.linspace(0.0, len(RAMP) - 1.0, LEVELS)
-    low = np.minimum(places.astype(np.int64), len(RAMP) - 2)
-    share = (places - low)[:, None]
-    mixed = (1.0 - share) * knots[low] + share * knots[low + 1]
-    return np.rint(255.0 * mixed).astype(np.int64)
+    mixed = [np.interp(places, np.arange(len(RAMP)), knots[:, part]) for part in range(3)]
+    return np.rint(255.0 * np.stack(mixed, axis=1)).astype(np.int64)
 
 
 def levels_of(values: Array, low: float, high: float) -> Indices:
@@ -224,14 +222,14 @@ def moved(mark: Mark, by: Array) -> Mark:
             return replace(mark, left=mark.left + float(by[0]), top=mark.top + float(by[1]))
 
 
-def beside(sheets: Sequence[Sheet], apart: float = 0.0) -> Sheet:
+def beside(sheets: Sequence[Sheet]) -> Sheet:
     """Put sheets side by side, from left to right."""
     marks, left = list[Mark](), 0.0
     for sheet in sheets:
         marks += [moved(mark, np.array([left, 0.0])) for mark in sheet.marks]
-        left += sheet.width + apart
+        left += sheet.width
     height = max(sheet.height for sheet in sheets)
-    return Sheet(left - apart, height, "; ".join(each.name for each in sheets), tuple(marks))
+    return Sheet(left, height, "; ".join(each.name for each in sheets), tuple(marks))
 
 
 def circle(center: Array, radius: float) -> Array:
@@ -261,9 +259,9 @@ def numbered(center: Array, radius: float, text: str, colour: str) -> tuple[Mark
     )
 
 
-def ink_line(points: Sequence[tuple[float, float]], width: float = 1.0) -> Line:
-    """Draw a line in ink through points."""
-    return Line((np.array(points),), INK, width)
+def ink_line(points: Sequence[tuple[float, float]]) -> Line:
+    """Draw a thin line in ink through points."""
+    return Line((np.array(points),), INK, 1.0)
 
 
 def _image_png(levels: Indices) -> bytes:

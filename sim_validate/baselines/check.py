@@ -88,25 +88,22 @@ def measured(
     job = job.prepared(len(chosen), processors)
     count, total = processes(len(chosen), processors), len(chosen) + len(executing)
     answers = chain(
-        each(partial(_or_refusal, job), chosen, jobs=count),
-        each(partial(_or_refusal, executed_grasp), executing, jobs=processors),
-    )
+        each(partial(_or_refusal, job, ""), chosen, jobs=count),
+        each(partial(_or_refusal, executed_grasp, "the execution is refused: "), executing,
+             jobs=processors),
+    )  # fmt: skip
     verdicts, executions = dict[str, Verdict](), dict[str, ExecutedGrasp]()
     refused = dict[str, str]()
-    for done, answer in enumerate(answers, start=1):
-        name = chosen[(done - 1) % len(chosen)].id
-        if isinstance(answer, Verdict):
-            verdicts[name] = answer
-        elif isinstance(answer, ExecutedGrasp):
-            executions[name] = answer
+    for done, (grasp, answer) in enumerate(zip([*chosen, *chosen], answers, strict=False), start=1):
+        if isinstance(answer, str):
+            refused.setdefault(grasp.id, answer)
         else:
-            why = answer if done <= len(chosen) else f"the execution is refused: {answer}"
-            refused.setdefault(name, why)
+            (verdicts if isinstance(answer, Verdict) else executions)[grasp.id] = answer
         report(done, total)
     entries = [
         Entry.of(verdicts[grasp.id], executions.get(grasp.id))
         for grasp in chosen
-        if grasp.id in verdicts and grasp.id not in refused
+        if grasp.id not in refused
     ]
     kept = Baseline(
         grasps_file=where,
@@ -122,12 +119,12 @@ def measured(
     return Measured(now, files, kept, verdicts, refused, executions)
 
 
-def _or_refusal(work: Callable[[Any], Any], job: Any) -> Any:
+def _or_refusal(work: Callable[[Any], Any], beginning: str, job: Any) -> Any:
     """Return what a job gives, or why it is refused."""
     try:
         return work(job)
     except InputError as error:
-        return str(error)
+        return f"{beginning}{error}"
 
 
 def setup_for(saved: Plan, path: Path | None) -> Setup:

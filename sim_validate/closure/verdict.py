@@ -20,7 +20,6 @@ from grasp_core.figures import Compared, Shown, figure, less, more
 from grasp_core.files.records import FLAT, UNRECORDED, recorded
 from grasp_core.kinds import Friction, Many, Measured, OrInfinity, path_of
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.provenance import versions
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import FingerDrive, Scene
 from sim_validate.closure.controls import ControlVerdict
@@ -370,7 +369,6 @@ class Verdicts(AboutGrasps[Verdict]):
     gate: Gate
     """How the simulator did on cases with known answers."""
     verdicts: tuple[Verdict, ...]
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     @classmethod
     def of(
@@ -378,7 +376,7 @@ class Verdicts(AboutGrasps[Verdict]):
         complete: bool = True,
     ) -> Self:  # fmt: skip
         """Collect verdicts on the grasps of an object for a file."""
-        return cls(AboutObject.of(body), friction, complete, gate, verdicts)
+        return cls(AboutObject.of(body), friction, gate, verdicts, complete=complete)
 
     @recorded
     def summary(self) -> Mapping[str, int]:

@@ -92,15 +92,11 @@ def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[Column, ...]:
         if each.flat is not None:
             found += columns_of(each.flat, groups)
         else:
-            found.append(_column(each.key, each.kind, meanings(kind).get(each.name, ""), groups))
+            form, meaning = _form(each.kind, groups), meanings(kind).get(each.name, "")
+            assert form is not None, each.key  # noqa: S101 - all fields of row classes are cells
+            unit = (unit_of(each.key) or "1") if form[0] == "float" else ""
+            found.append(Column(each.key, form[0], meaning.replace("None", "null"), unit, form[1]))
     return tuple(found)
-
-
-def _column(name: str, kind: Any, meaning: str, groups: Mapping[str, int]) -> Column:
-    form = _form(kind, groups)
-    assert form is not None, name  # noqa: S101 - row classes only have fields that are cells
-    unit = (unit_of(name) or "1") if form[0] == "float" else ""
-    return Column(name, form[0], meaning.replace("None", "null"), unit, form[1])
 
 
 def _form(kind: Any, groups: Mapping[str, int]) -> Form | None:
@@ -108,7 +104,11 @@ def _form(kind: Any, groups: Mapping[str, int]) -> Form | None:
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
         shape = next((rule for rule in parts[1:] if isinstance(rule, Shape)), None)
-        return _form(parts[0], groups) if shape is None else _form_of_array(shape, groups)
+        if shape is None:
+            return _form(parts[0], groups)
+        lengths = (FINGERS if n is None else groups[n] if isinstance(n, str) else n
+                   for n in shape.shape)  # fmt: skip
+        return "int" if shape.whole else "float", tuple(lengths)
     if origin in (Union, UnionType):
         return _form(next(part for part in parts if part is not type(None)), groups)
     if origin is tuple:
@@ -117,12 +117,6 @@ def _form(kind: Any, groups: Mapping[str, int]) -> Form | None:
         return "text", ()
     plain: Mapping[Any, CellKind] = {str: "text", bool: "bool", int: "int", float: "float"}
     return (plain[kind], ()) if kind in plain else None
-
-
-def _form_of_array(shape: Shape, groups: Mapping[str, int]) -> Form:
-    lengths = (FINGERS if n is None else groups[n] if isinstance(n, str) else n
-               for n in shape.shape)  # fmt: skip
-    return "int" if shape.whole else "float", tuple(lengths)
 
 
 def _form_of_items(parts: tuple[Any, ...]) -> Form | None:

@@ -78,9 +78,10 @@ def export(
         for object_id, body, rows in _grasped_objects(chosen):
             of_object = sorted(rows, key=lambda row: row.friction)
             for friction, same in groupby(of_object, key=lambda row: row.friction):
-                path = _new_path(place, f"{object_id[:SHORT]}-{friction}-{body.name}")
+                # the object's hash tells files apart, whatever of its name they can keep
+                name = UNSAFE.sub("_", f"{object_id[:SHORT]}-{friction}-{body.name}")[:LONGEST]
                 lines = _lines(object_id, body, list(same), facts)
-                write_parts(path, (line.encode() for line in lines))
+                write_parts(place / f"{name}.yaml", (line.encode() for line in lines))
                 files += 1
             objects += 1
             grasps += len(rows)
@@ -112,15 +113,6 @@ def _facts(chosen: Dataset) -> dict[str, str]:
         "config_sha256": manifest.config_sha256,
         **{f"version_{name}": text for name, text in sorted(manifest.versions.items())},
     }
-
-
-def _new_path(folder: Path, name: str) -> Path:
-    path = folder / f"{UNSAFE.sub('_', name).lstrip('.')[:LONGEST]}.yaml"
-    if path.exists():
-        raise InputError(
-            f"{name}: two grasps would get the same file name, {path.name}; rename one of them"
-        )
-    return path
 
 
 def _lines(

@@ -365,12 +365,11 @@ class Rows:
     def of_unit(self, row: ObjectRow, friction: float) -> "Rows":
         """Return the rows of one object at one friction."""
         beginning = id_beginning(row.object_id, friction)
-        return Rows(
-            (row,),
-            tuple(each for each in self.grasps if each.grasp_id.startswith(beginning)),
-            tuple(each for each in self.trials if each.grasp_id.startswith(beginning)),
-            tuple(each for each in self.executions if each.grasp_id.startswith(beginning)),
-        )
+        own = {
+            name: tuple(each for each in self.of(name) if each.grasp_id.startswith(beginning))
+            for name in NAMES if name != "objects"
+        }  # fmt: skip
+        return Rows((row,), **own)
 
     def cells(self, name: Name, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
         """Return the cells of the rows of a table."""

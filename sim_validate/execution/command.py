@@ -7,6 +7,7 @@ for other programs.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -82,14 +83,9 @@ def execute_grasps(
         remove_results(folder, "executions")
     changed, count = physics or {}, len(saved.grasps)
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
-    about = AboutObject.of(saved.body)
-
-    def collected(grasps: tuple[ExecutedGrasp, ...], *, complete: bool) -> Executions:
-        return Executions(about, saved.friction, complete, settings, grasps)
-
     found = reporter.collected(
         "executing", executed(tasks, jobs), count, ("survived", lambda each: each.survived),
-        collected, folder,
+        partial(Executions, AboutObject.of(saved.body), saved.friction, settings), folder,
     )  # fmt: skip
     _show(found, reporter)
     if not all(each.controls_let_go for each in found):

@@ -5,7 +5,7 @@ These are also what `executions.json` holds.
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
@@ -15,7 +15,6 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more
 from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.kinds import FieldError, OrInfinity, Quantity, path_of
-from grasp_core.provenance import versions
 from grasp_core.solvers.ties import first_best
 from scenes.settings import PhysicsSettings
 from sim_validate.kit.files import AboutGrasps
@@ -331,7 +330,6 @@ class Executions(AboutGrasps[ExecutedGrasp]):
     """How they were executed, with the impulse of a knock that was used."""
     grasps: Annotated[tuple[ExecutedGrasp, ...], Key("executions")]
     """What the execution of each grasp found."""
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     def _check_together(self) -> None:
         object.__setattr__(self, "settings", self.settings.used)

@@ -123,17 +123,13 @@ def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporte
     if saved.grasps and must_compile(REACHING, command.jobs):
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
+    settings = None if job.execution is None else job.execution.used
     results, count = processes.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
     return reporter.collected(
         "reaching", results, count, ("reached", lambda each: each.reach.reached),
-        partial(_collected, job), command.out,
+        partial(Reaches, AboutObject.of(job.body), job.friction, hand, job.asked, settings),
+        command.out,
     )  # fmt: skip
-
-
-def _collected(job: ReachJob, found: tuple[ReachedGrasp, ...], *, complete: bool) -> Reaches:
-    settings = None if job.execution is None else job.execution.used
-    about_object = AboutObject.of(job.body)
-    return Reaches(about_object, job.friction, complete, job.hand, job.asked, settings, found)
 
 
 def _show(found: Reaches, reporter: Reporter) -> None:

@@ -6,7 +6,7 @@ another hand and is refused.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -21,7 +21,6 @@ from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.kinds import Direction, HandClearance, NotNegative, Seed, Starts
-from grasp_core.provenance import versions
 from grasp_core.settings import Settings
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.trials import HandVerdict
@@ -113,7 +112,6 @@ class Reaches(AboutGrasps[ReachedGrasp]):
     execution: ExecutionSettings | None
     """Settings with which grasps were executed; None where it was not asked for."""
     reaches: tuple[ReachedGrasp, ...]
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     def _check_together(self) -> None:
         for place, each in enumerate(self.reaches):

@@ -21,7 +21,7 @@ import tomllib
 import zipfile
 from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, Self, TypeAlias, TypeVar
 
@@ -45,6 +45,7 @@ from grasp_core.files.text_files import (
 from grasp_core.grasp_tables import ById, Named, frame_of
 from grasp_core.kinds import Friction
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.provenance import versions
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -67,7 +68,17 @@ Item = TypeVar("Item", bound=Named)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class AboutGrasps(RecordFile, ById[Item]):
+class ResultFile(RecordFile):
+    """Base of files that say which versions made them."""
+
+    versions: Mapping[str, str | None] = field(
+        default_factory=versions, compare=False, kw_only=True
+    )
+    """Versions of every package that can change a number."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AboutGrasps(ResultFile, ById[Item]):
     """Base of files about the grasps of an object.
 
     They are sequences, as a plan is: `len`, iteration, `[0]`, `["c-0-1-2-7"]` and slices.
@@ -76,7 +87,7 @@ class AboutGrasps(RecordFile, ById[Item]):
     object: AboutObject
     friction: Friction
     """Coulomb coefficient at every contact."""
-    complete: bool
+    complete: bool = field(kw_only=True)
     """Whether every grasp that was asked for was dealt with."""
 
     @property
@@ -247,8 +258,8 @@ def whole_folder(folder: Path) -> Generator[Path]:
     prefix = f".{named.name[:SHOWN]}{UNFINISHED}"
     for path in named.parent.iterdir():
         if path.name.startswith(prefix):
-            with suppress(OSError), _locked(path) as abandoned:
-                if abandoned:
+            with suppress(OSError), _locked(path) as refused:
+                if not refused:  # its command has ended
                     shutil.rmtree(path)
     temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=prefix))
     try:
@@ -262,16 +273,15 @@ def whole_folder(folder: Path) -> Generator[Path]:
 
 
 @contextmanager
-def _locked(folder: Path) -> Generator[bool]:
-    """Lock a folder until the end of the block, or of the process; yield whether that worked."""
-    handle = os.open(folder, os.O_RDONLY)
+def _locked(folder: Path) -> Generator[int]:
+    """Lock a folder until the end of the block, or of the process; yield why not, as an errno."""
+    handle, refused = os.open(folder, os.O_RDONLY), 0
     try:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            locked = True
-        except OSError:  # another process has locked it, or the file system has no locks
-            locked = False
-        yield locked
+        except OSError as error:  # another process has locked it, or the file system has no locks
+            refused = error.errno or errno.ENOLCK
+        yield refused
     finally:
         os.close(handle)
 
@@ -395,8 +405,13 @@ def alone_in(folder: Path | None) -> Generator[None]:
     if folder is None:
         yield
         return
-    handle, made = _taken(folder)
-    try:
+    made = _make(folder)
+    with _locked(folder) as refused:
+        # a file system may have no locks: then its users take care
+        if refused == errno.EWOULDBLOCK or not folder.exists():
+            raise InputError(
+                f"{folder}: another command is writing to it; wait, or give another --out"
+            )
         for part in PARTS:
             remove_unfinished(folder / part)
         try:
@@ -405,8 +420,6 @@ def alone_in(folder: Path | None) -> Generator[None]:
             with suppress(OSError):  # a folder that holds something stays
                 for path in made:
                     path.rmdir()
-    finally:
-        os.close(handle)
 
 
 def _make(folder: Path) -> list[Path]:
@@ -425,31 +438,3 @@ def _make(folder: Path) -> list[Path]:
             f"{folder}: no file can be written there ({error.strerror}); give another --out"
         ) from error
     return missing
-
-
-def _taken(folder: Path) -> tuple[int, list[Path]]:
-    """Open and lock a folder, making it if needed, and list the folders that are new.
-
-    The loop repeats if another command removes the folder between the two steps.
-    """
-    made = list[Path]()
-    while True:
-        made += _make(folder)
-        try:
-            handle = os.open(folder, os.O_RDONLY)
-        except FileNotFoundError:  # the command that had made it has just removed it
-            continue
-        try:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:  # a file system may have no locks: then its users take care
-                if error.errno == errno.EWOULDBLOCK:
-                    raise InputError(
-                        f"{folder}: another command is writing to it; wait, or give another --out"
-                    ) from error
-            if folder.exists() and os.path.samestat(os.fstat(handle), folder.stat()):
-                return handle, made
-        except BaseException:
-            os.close(handle)
-            raise
-        os.close(handle)

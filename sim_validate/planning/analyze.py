@@ -22,11 +22,10 @@ from grasp_core.closure.wrench_sets import Norm
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedError, about
 from grasp_core.figures import NONE, Shown, figures
-from grasp_core.files.records import FLAT, RecordFile, recorded
+from grasp_core.files.records import FLAT, recorded
 from grasp_core.files.text_files import read_text
 from grasp_core.forces.contact_forces import contact_forces
 from grasp_core.kinds import Count, Null, OrInfinity, Quantity
-from grasp_core.provenance import versions
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
@@ -35,6 +34,7 @@ from grasp_core.solvers.ties import first_best
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
+from sim_validate.kit.files import ResultFile
 from sim_validate.kit.processes import each
 
 MOST_EDGES = 10_000
@@ -129,7 +129,7 @@ class Analysis(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Analyses(RecordFile):
+class Analyses(ResultFile):
     """The analyses of all grasps of a contacts file."""
 
     FILE = "document of analyses"
@@ -140,7 +140,6 @@ class Analyses(RecordFile):
     question: Annotated[Question, FLAT]
     grasps: tuple[Analysis, ...]
     complete: bool
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     @recorded
     def summary(self) -> Mapping[str, int]:

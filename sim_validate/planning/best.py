@@ -4,7 +4,7 @@ The best grasp, and the bound on all others, are held by `best.json`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -14,27 +14,26 @@ from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
-from grasp_core.files.records import RecordFile, recorded
+from grasp_core.files.records import recorded
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import Family, Friction, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best_grasp import BestGrasp, Ended, GapAt, best_grasp, measured
 from grasp_core.optimizing.support_cuts import write_proof
-from grasp_core.provenance import versions
 from grasp_core.quality.measures import MeasureName
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject
+from sim_validate.kit.files import AboutObject, ResultFile
 
 PROOF = "best-proof.npz"
-MEASURES: Mapping[MeasureName, tuple[str, str]] = {
-    "ferrari-canny": ("Ferrari-Canny quality", " N"),
-    "weight": ("weight held in every orientation, for normal forces of sum 1 N", " N"),
-    "task": ("multiple of the task's loads, for normal forces of sum 1 N", ""),
+MEASURES: Mapping[MeasureName, tuple[str, str, str]] = {
+    "ferrari-canny": ("quality", "Ferrari-Canny quality", " N"),
+    "weight": ("weight", "weight held in every orientation, for normal forces of sum 1 N", " N"),
+    "task": ("multiple", "multiple of the task's loads, for normal forces of sum 1 N", ""),
 }
-"""What each measure says of a grasp, and its unit."""
+"""What each measure says of a grasp, in a word and in full, and its unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,7 @@ class Placed(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Best(RecordFile):
+class Best(ResultFile):
     """The best grasp of an object by one measure, with the proved bound on all others."""
 
     FILE = "best.json"
@@ -87,7 +86,6 @@ class Best(RecordFile):
     history: tuple[GapAt, ...]
     planned: tuple[Rated, ...]
     """The planned grasps, which may be nearer to edges."""
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     @classmethod
     def of(
@@ -146,8 +144,6 @@ WHY = {
 """Why a search ended, in words."""
 ROUGH = 1e-3
 """Gap between the bounds of what planned grasps hold."""
-WORDS = {"ferrari-canny": "quality", "weight": "weight", "task": "multiple"}
-"""What each measure gives, in a word."""
 
 
 def search_best(
@@ -159,7 +155,7 @@ def search_best(
 
         def tell(now: GapAt) -> None:
             closed = round(STEPS * (1.0 - max(now.gap - command.gap, 0.0)))
-            word = WORDS[command.measure]
+            word, *_ = MEASURES[command.measure]
             note = f"({word} {now.quality:.4f}, bound {now.bound:.4f}, gap {100 * now.gap:.1f} %)"
             steps.update(closed, STEPS, note)
 
@@ -195,7 +191,7 @@ def write_best(
 
 def show_best(found: Best, reporter: Reporter) -> int:
     """Show the best grasp, the bound, and how much of the possible each planned grasp reaches."""
-    word, (_, unit) = WORDS[found.measure], MEASURES[found.measure]
+    word, _, unit = MEASURES[found.measure]
     reporter.say(
         f"best grasp {found.grasp.id}: {word} {found.quality[0]:.4f}{unit}; no four contacts "
         f"{1e3 * found.clearance_m:.3g} mm from edges exceed {found.bound:.4f}{unit} (gap "

@@ -6,7 +6,7 @@ Certified regions of an object's grasps are held by one proof file each, and one
 import hashlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,22 +20,27 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError, UndecidedError, about
 from grasp_core.figures import Shown, figures
-from grasp_core.files.records import FLAT, RecordFile, recorded
+from grasp_core.files.records import FLAT, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
-from grasp_core.grasp_tables import ById
-from grasp_core.kinds import Count, Family, Friction, NotNegative, number, path_of
+from grasp_core.kinds import Count, Family, NotNegative, number, path_of
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.provenance import versions
-from grasp_core.records.grasps_json import load_grasps
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject, alone_in, read_arrays, remove_results, write_arrays
+from sim_validate.kit.files import (
+    AboutGrasps,
+    AboutObject,
+    alone_in,
+    read_arrays,
+    remove_results,
+    write_arrays,
+)
 from sim_validate.kit.processes import each
+from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import Certifying
 
 PROOFS = "proofs"
@@ -145,19 +150,14 @@ class GraspRegions(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Regions(RecordFile, ById[GraspRegions]):
+class Regions(AboutGrasps[GraspRegions]):
     """The certified regions of an object's grasps, as `regions.json` holds them."""
 
     FILE = "regions.json"
     SCHEMA = 2
 
-    object: AboutObject
-    friction: Friction
     certifying: Annotated[Certifying, FLAT]
     grasps: tuple[GraspRegions, ...]
-    complete: bool
-    """Whether every grasp that was asked for was looked at."""
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     @recorded
     def summary(self) -> Mapping[str, int]:
@@ -262,18 +262,18 @@ def _region(name: str, given: NDArray[Any], normal: Array, scale: float) -> Cont
 
 def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
     """Certify independent contact regions for a file's grasps, and write them with their proofs."""
-    saved = load_grasps(command.grasps)
-    chosen = [grasp for grasp in saved.grasps if command.grasp in (None, grasp.id)][: command.limit]
-    if not chosen:
-        wanted = f"a grasp {command.grasp}" if command.grasp else "at least one grasp"
-        raise InputError(f"{command.grasps}: expected {wanted} to certify, found none")
-    friction = saved.friction if command.friction is None else command.friction
+    saved = asked_grasps(
+        command.grasps, reporter, grasp=command.grasp, friction=command.friction,
+        limit=command.limit,
+    )  # fmt: skip
+    if saved is None:
+        return Exit.NONE
     with alone_in(command.out):
         if command.out is not None:
             remove_results(command.out, "regions")
         found = certified(
-            saved.body, chosen, friction, command.certifying, folder=command.out, jobs=command.jobs,
-            reporter=reporter,
+            saved.body, saved.grasps, saved.friction, command.certifying, folder=command.out,
+            jobs=command.jobs, reporter=reporter,
         )  # fmt: skip
     _show(found, reporter)
     reporter.document(found.document())
@@ -335,8 +335,8 @@ def wider(grasp: Grasp, found: GraspRegions) -> Grasp:
     """Give a grasp its certified regions if their discs around its contacts are larger."""
     if found.regions is None or found.normals is None:
         return grasp
-    radius = min(
-        _room(region.polygon, contact.position, normal)
+    radius = min(  # how far each contact is from the nearest edge of its region
+        float(edge_rows((region.polygon - contact.position) @ plane_frame(normal))[1].min())
         for region, contact, normal in zip(
             found.regions, grasp.contacts, found.normals, strict=True
         )
@@ -344,11 +344,3 @@ def wider(grasp: Grasp, found: GraspRegions) -> Grasp:
     if radius <= grasp.radius and grasp.regions[0].kind != "point":
         return grasp
     return replace(grasp, regions=found.regions, radius=max(radius, 0.0))
-
-
-def _room(polygon: Array, point: Array, normal: Array) -> float:
-    """Compute how far a point lies from the nearest edge of a convex polygon (c, 3) [m]."""
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    inward = np.cross(normal, edges)
-    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    return float(np.einsum("ci,ci->c", inward, point - polygon).min())

@@ -1,20 +1,18 @@
 """Runs the command `transfer`, which carries grasps over to a part that has changed."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Self
 
 from grasp_core.declared import counted
 from grasp_core.errors import InputError
-from grasp_core.files.records import FLAT, RecordFile
+from grasp_core.files.records import FLAT
 from grasp_core.files.text_files import write_text
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts
-from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import extended
 from grasp_core.transferring.transfer import (
@@ -31,7 +29,7 @@ from grasp_core.transferring.transfer import (
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject, alone_in, remove_results
+from sim_validate.kit.files import AboutObject, ResultFile, alone_in, remove_results
 from sim_validate.planning.asked_objects import GRASPS, asked_grasps, load_object
 
 MM = 1e3
@@ -43,7 +41,7 @@ BAD: tuple[Change, ...] = ("worse", "gone")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TransferFile(RecordFile):
+class TransferFile(ResultFile):
     """Grasps carried over to a changed part; both parts are only named, so nothing reads it."""
 
     FILE = "transfer.json"
@@ -52,7 +50,6 @@ class TransferFile(RecordFile):
     old: AboutObject
     new: AboutObject
     transfer: Annotated[Transfer, FLAT]
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     @classmethod
     def of(cls, found: Transfer) -> Self:

@@ -1,16 +1,15 @@
 """What published tests, our trials and the analysis say of grasps, as `judgements.json` has it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
-from grasp_core.files.records import FLAT, Key, RecordFile, recorded
+from grasp_core.files.records import FLAT, Key, recorded
 from grasp_core.kinds import Friction, Measured, Number, OrInfinity, Quantity
-from grasp_core.provenance import versions
-from sim_validate.kit.files import AboutObject
+from sim_validate.kit.files import AboutObject, ResultFile
 from sim_validate.protocols.published import PublishedProtocol
 
 
@@ -112,7 +111,7 @@ class Totals(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Judgements(RecordFile):
+class Judgements(ResultFile):
     """The judgements of an object's grasps by published tests."""
 
     FILE = "judgements.json"
@@ -125,7 +124,6 @@ class Judgements(RecordFile):
     judgements: tuple[Judgement, ...]
     complete: bool
     """Whether every grasp that was asked for was judged."""
-    versions: Mapping[str, str | None] = field(default_factory=versions, compare=False)
 
     def _check_together(self) -> None:
         for each in self.judgements:

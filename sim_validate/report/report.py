@@ -233,7 +233,7 @@ def possible_facts(best: Best | None, grasp: str) -> Iterable[Fact]:
     share = None if best is None else best.shares.get(grasp)
     if best is None or share is None:
         return
-    what, unit = MEASURES[best.measure]
+    _, what, unit = MEASURES[best.measure]
     yield (
         "Share of the possible", f"{PERCENT * share:.1f} %",
         f"{what}, over the bound {number(best.bound)}{unit} for all contacts "
@@ -344,7 +344,7 @@ def _judged(runs: Sequence[RunFolder]) -> Record | None:
 
 
 def _described_possible(best: Best) -> Record:
-    (what, unit), name = MEASURES[best.measure], best.grasp.id
+    (_, what, unit), name = MEASURES[best.measure], best.grasp.id
     proved = f"by the proof in {best.proof}" if best.proof else "whose proof was not kept"
     distinct = {each.id: each for each in reversed(best.rated)}
     ranked = sorted(distinct.values(), key=lambda each: (-each.quality[0], each.id))

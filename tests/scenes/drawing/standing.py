@@ -92,4 +92,4 @@ def reaches_text():
         for each in plan
     )
     about = AboutObject.of(body)
-    return Reaches(about, FRICTION, True, hand, ReachSettings(), None, found).text()
+    return Reaches(about, FRICTION, hand, ReachSettings(), None, found, complete=True).text()

@@ -50,4 +50,4 @@ BODY = scenes.example_object("tetrahedron")
 
 def executions(complete=True):
     """What the file of these grasps holds."""
-    return Executions(AboutObject.of(BODY), 0.5, complete, SETTINGS, GRASPS)
+    return Executions(AboutObject.of(BODY), 0.5, SETTINGS, GRASPS, complete=complete)

@@ -72,7 +72,7 @@ def executed(saved, found):
 
 
 def results(saved, found, complete=True):
-    return Executions(AboutObject.of(saved.body), 0.4, complete, SETTINGS, found)
+    return Executions(AboutObject.of(saved.body), 0.4, SETTINGS, found, complete=complete)
 
 
 @pytest.fixture(scope="module")
@@ -263,7 +263,7 @@ def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
 def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monkeypatch):
     asked = []
     monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
-    executions = Executions(AboutObject("", "", ""), 0.35, True, settings, ())
+    executions = Executions(AboutObject("", "", ""), 0.35, settings, (), complete=True)
     line = execute_command(executions, str(run / "grasps.json"), "c-0-1-2-7")
     assert main(shlex.split(line)[1:]) == Exit.GOOD
     (flags,) = asked
