@@ -18,13 +18,14 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, TypeAlias, TypeVar
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, cross, to_digits
 from grasp_core.errors import InputError
 from scenes.mujoco.closure_scene import Layout
+from scenes.mujoco.mjcf_text import SceneText
 from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
 
 STATE = (
@@ -163,16 +164,7 @@ Following: TypeAlias = Callable[[Indices, Indices, Array, Array], Indices]
 of all trials, and gives the sample after it for each; one beyond its last sample ends a trial."""
 
 
-class HasText(Protocol):
-    """A scene of any kind."""
-
-    @property
-    def xml(self) -> str:
-        """Return the text of the model."""
-        ...
-
-
-AnyScene = TypeVar("AnyScene", bound=HasText)
+AnyScene = TypeVar("AnyScene", bound=SceneText)
 
 
 class Bench(Generic[AnyScene]):
