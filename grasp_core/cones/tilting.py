@@ -117,22 +117,19 @@ def _search(normals: Array, thetas: Array) -> TiltedCones:
     kernel, best = compiled(KERNEL), TiltedCones(normals.copy(), np.empty(len(normals)))
     kernel.half_angles(best.axes, normals, thetas, best.half_angles)
     kernel.balance(tuple(best), normals, thetas)
-    # singular values: the third is the normals' spread across the plane they lie in most nearly
-    sizes = np.linalg.svd(normals, compute_uv=False)
-    flat = np.flatnonzero(sizes[:, 2] < FLAT * sizes[:, 1])
+    # squares of spreads: the first is across the plane that the normals lie in most nearly
+    squares, directions = np.linalg.eigh(normals.transpose(0, 2, 1) @ normals)
+    flat = np.flatnonzero(squares[:, 0] < FLAT**2 * squares[:, 1])
     bent = best.axes[flat], best.half_angles[flat]
-    kernel.bend(bent, normals[flat], thetas[flat], _across(normals[flat]))
+    kernel.bend(bent, normals[flat], thetas[flat], _across(normals[flat], directions[flat, :, 0]))
     best.axes[flat], best.half_angles[flat] = bent
     return _improved(best.axes, normals, thetas)
 
 
-def _across(normals: Array) -> Array:
-    """Return the direction across the plane in which the normals nearly lie, (q, 3)."""
-    _, _, directions = np.linalg.svd(normals)
-    across = directions[:, 2]
+def _across(normals: Array, across: Array) -> Array:
+    """Return directions across planes, each to the side that tells turned normals alike, (q, 3)."""
     turns = np.cross(normals[:, :1], normals[:, 1:])
     which = np.argmax(np.linalg.norm(turns, axis=-1) > BESIDE, axis=1)
-    # the side of the plane is tied to the normals, so that a turned object gets turned axes
     handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
     return np.asarray(across * np.where(handed < 0.0, -1.0, 1.0)[:, None], dtype=np.float64)
 

@@ -50,8 +50,8 @@ def tilted_cones(normals, thetas):
     found = normals.copy(), half_angle(normals, normals, thetas)
     for cap in CAPS:
         found = wider(*found, balanced(normals, cap * thetas), normals, thetas)
-    sizes = np.linalg.svd(normals, compute_uv=False)
-    flat, across = sizes[:, 2] < FLAT * sizes[:, 1], _across(normals)
+    _, sizes, directions = np.linalg.svd(normals)
+    flat, across = sizes[:, 2] < FLAT * sizes[:, 1], _across(normals, directions[:, 2])
     for sides in SIDES:
         for cap in CAPS[:-1]:
             bent = [
