@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_core.arrays import Array, cross
+from grasp_core.arrays import Array
+from grasp_core.compiled import compiled
 from grasp_core.geometry.polygons import nearest_on_segments
 from grasp_core.objects.on_faces import nearest_on_triangles
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
@@ -32,10 +33,6 @@ SLOPE = 0.05
 """Depth of a pyramid per distance of its base's middle from the nearest edge."""
 THIN = 1e-5
 """Width of a piece below which it is left out, in object radii; neighbours close the gap."""
-MOST_HALVINGS = 12
-"""Halvings of the depth after which a pyramid is left as it is: the object is a sheet there."""
-PARALLEL = 1e-12
-"""Sine of the angle between edges below which their cross product is no axis."""
 
 
 def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, ...] | None:
@@ -50,7 +47,7 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
     middles = triangles.mean(axis=1)
     widest = float(np.linalg.norm(triangles - middles[:, None], axis=2).max())
     spatial: Any = importlib.import_module("scipy.spatial")
-    tree = spatial.KDTree(middles)
+    tree, kernel = spatial.KDTree(middles), compiled("scenes.mujoco.clearance_kernel")
     found, thin, slack = list[Array](), THIN * body.radius, TOUCHING * body.radius
     pieces = list(_flat_pieces(body))
     for corners, inward in compress(pieces, _distances(pieces, near) <= reach):
@@ -60,44 +57,10 @@ def touched_solids(body: Polyhedron, near: Array, reach: float) -> tuple[Array, 
         width = float(np.linalg.norm(edges - middle, axis=1).min())
         if width > thin:
             depth = SLOPE * width
-            around = triangles[tree.query_ball_point(middle, extent + depth + widest)]
-            depth = clear_depth(corners, inward, depth, around, slack)
+            near_by = np.array(tree.query_ball_point(middle, extent + depth + widest), np.int64)
+            depth = float(kernel.clear_depth(corners, inward, depth, triangles, near_by, slack))
             found.append(np.vstack([corners, middle + depth * inward]))
     return tuple(found)
-
-
-def clear_depth(base: Array, inward: Array, depth: float, triangles: Array, slack: float) -> float:
-    """Return the largest of depth, depth / 2, ... at which a pyramid and triangles are separated.
-
-    Takes `base` (n, 3) [m]; `inward` (3,); `depth`, `slack` [m]; `triangles` (t, 3, 3) [m].
-    """
-    middle = base.mean(axis=0)
-    heights = (triangles - middle) @ inward
-    below = heights.max(axis=1) > slack  # the base separates all others
-    left, highest = triangles[below], heights[below].min(axis=1)
-    rims = np.roll(base, -1, axis=0) - base
-    for _ in range(MOST_HALVINGS):
-        # a triangle that is clear of a pyramid is clear of all lower ones
-        near = highest < depth
-        left, highest = left[near], highest[near]
-        if not len(left):
-            break
-        solid = np.vstack([base, middle + depth * inward])
-        ridges = solid[-1] - base
-        edges, sides = np.concatenate([rims, ridges]), np.roll(left, -1, axis=1) - left
-        slopes = np.broadcast_to(cross(rims, ridges), (len(left), *base.shape))
-        across = cross(edges[:, None], sides[:, None]).reshape(len(left), -1, 3)
-        axes = np.concatenate([cross(sides[:, :1], sides[:, 1:2]), slopes, across], axis=1)
-        lengths, least = np.linalg.norm(axes, axis=2), np.zeros(axes.shape[:2])
-        sizes = np.linalg.norm(edges, axis=1)[:, None] * np.linalg.norm(sides, axis=2)[:, None]
-        least[:, -across.shape[1] :] = PARALLEL * sizes.reshape(len(left), -1)
-        own, other = axes @ solid.T, axes @ left.transpose(0, 2, 1)
-        gaps = np.maximum(other.min(axis=2) - own.max(axis=2), own.min(axis=2) - other.max(axis=2))
-        touched = ~((gaps >= -slack * lengths) & (lengths > least)).any(axis=1)
-        if not touched.any():
-            break
-        left, highest, depth = left[touched], highest[touched], 0.5 * depth
-    return depth
 
 
 def _distances(pieces: Sequence[tuple[Array, Array]], points: Array) -> Array:

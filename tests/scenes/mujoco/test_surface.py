@@ -11,7 +11,8 @@ from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 import scenes
-from scenes.mujoco.surface import clear_depth, touched_solids
+from grasp_core.compiled import compiled
+from scenes.mujoco.surface import touched_solids
 from tests.scenes.meshes import dented_ball
 
 NEAR = 1e-6
@@ -140,4 +141,5 @@ def test_a_pyramid_below_a_flat_sheet_is_as_deep_as_it_may_be():
     """Nothing is near it but the triangles of its own plane."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     sheet, below = square[np.array([[0, 1, 2], [0, 2, 3]])], np.array([0.0, 0.0, -1.0])
-    assert clear_depth(square, below, 0.05, sheet, 1e-9) == 0.05
+    kernel = compiled("scenes.mujoco.clearance_kernel")
+    assert kernel.clear_depth(square, below, 0.05, sheet, np.arange(2), 1e-9) == 0.05
