@@ -93,7 +93,7 @@ def _by_simplex(program: LinearProgram) -> Optimum | Infeasible:
     ended = kernel.vertex_of(n)
     basis = ended.basis
     rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), count - len(program.b))
-    status, against = kernel.solve(program.c, rows, -math.inf, ended)
+    status, against = kernel.solve(program.c, rows, -math.inf, ended, False)
     if status == kernel.LOST:
         raise SolverError("the simplex method reached its limit of steps without an answer")
     basis.sort()

@@ -85,16 +85,25 @@ def bounded(c: Array, rows: Rows, cutoff: float, accuracy: float, vertex: Vertex
 
     It is minus infinity where nothing is feasible, and infinite where nothing is proved.
     """
-    status, against = solve(c, rows, cutoff, vertex)
-    if status == INFEASIBLE:
-        return -np.inf if proved_empty(rows, vertex, against, FARTHEST) else np.inf
-    # a wrong answer of the search costs tightness, never correctness
-    return np.inf if status == LOST else proved_bound(c, rows, vertex, accuracy)
+    # a basis that is nearly singular proves nothing; another rule reaches another one
+    for first in (False, True):
+        status, against = solve(c, rows, cutoff, vertex, first)
+        if status == INFEASIBLE and proved_empty(rows, vertex, against, FARTHEST):
+            return -np.inf
+        if status in (OPTIMAL, BELOW):
+            # a wrong answer of the search costs tightness, never correctness
+            bound = proved_bound(c, rows, vertex, accuracy)
+            if bound < np.inf:
+                return bound
+    return np.inf
 
 
 @loop("numpy")
-def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int]:
-    """Find a best vertex: how that ended, and the row that contradicts the basis, if one does."""
+def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex, first: bool) -> tuple[int, int]:
+    """Find a best vertex: how that ended, and the row that contradicts the basis, if one does.
+
+    The row that is violated most enters the basis, or the first that is violated.
+    """
     n, count, idle = len(c), len(rows.b), 0
     basis, y, x = vertex
     inverse, value, norms = *_corner(c, count, vertex), _lengths(rows)
@@ -104,7 +113,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex) -> tuple[int, int
             _refine(c, rows, basis, inverse, y)
             return BELOW, -1
         _exceeded(x, rows, excess)
-        entering = _violated(excess, rows, norms, inside, idle > PATIENCE * n)
+        entering = _violated(excess, rows, norms, inside, first or idle > PATIENCE * n)
         if entering < 0:
             _refine(c, rows, basis, inverse, y)
             return OPTIMAL, -1

@@ -17,6 +17,13 @@ from tests.golden.fields import NUMBER
 TOLERANCE = 1e-6
 LEAST_SCALE = 1e-6
 """Numbers below it (in metres, newtons, or without a unit) count as noise of this size."""
+LOOSER = {
+    # processors differ in the last digits, which grow while something slides, and in which of two
+    # bounds within the gap a search ends
+    re.compile(r"(displacement_m|rotation_rad|slip_m.*|predicted_loss)$"): (5e-2, 1e-5),
+    re.compile(r"ferrari_canny"): (1e-4, LEAST_SCALE),
+}
+"""Tolerances of fields that kept results hold less exactly, and what counts as noise there."""
 
 SETTINGS = re.compile(
     r"settings\.(physics|hold|limit|friction|fingers|flags)|\.physics\.| option\."
@@ -44,21 +51,23 @@ def kept_of(fields):
     return kept
 
 
-def unlike_kept(before, now):
-    """Say how what is kept differs from what is found; nothing if it does not."""
+def unlike_kept(name, before, now):
+    """Say how what is kept of a field differs from what is found; nothing if it does not."""
     if before[0] != now[0]:
         return f"{before[0]} values before, {now[0]} now"
     if len(before) == 2:
         return None if before == now else "something differs; --against a commit says what"
-    scale = max(before[1], now[1], LEAST_SCALE)
+    looser = (value for field, value in LOOSER.items() if field.search(name))
+    tolerance, least = next(looser, (TOLERANCE, LEAST_SCALE))
+    scale = max(before[1], now[1], least)
     off = max(abs(one - other) for one, other in zip(before[2:], now[2:], strict=True)) / scale
-    if off <= TOLERANCE * math.sqrt(before[0]):
+    if off <= tolerance * math.sqrt(before[0]):
         return None
     return f"{before[0]} numbers differ by about {off:.1e} of the largest, {now[1]:.3g}"
 
 
-def unlike(before, now):
-    """Say how two lists of values differ; nothing if not a bit does."""
+def unlike(_, before, now):
+    """Say how two lists of values of a field differ; nothing if not a bit does."""
     if len(before) != len(now):
         return f"{len(before)} values before, {len(now)} now"
     pairs = [(one, other) for one, other in zip(before, now, strict=True) if one != other]
@@ -80,7 +89,7 @@ def differences(before, now, say):
             yield field, "is gone"
         elif field not in before:
             yield field, "is new"
-        elif said := say(before[field], now[field]):
+        elif said := say(field, before[field], now[field]):
             yield field, said
 
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 ASIDE = re.compile(
-    r"(^|\.)versions\.|seconds|\.mujoco$|proof\.sha256$|^(files\.\*\.(sha256|bytes)|\w+_sha256)$"
+    r"(^|\.)versions\.|seconds|\.mujoco$|proof\.sha256$|^files\.\*\.(sha256|bytes)$"
+    r"|(^|\.)(\w+_sha256|arithmetic)$"
 )
 """Fields that tell of the machine, the moment, or of code; what is hashed is all here."""
 

@@ -114,7 +114,7 @@ def test_with_everything_found_families_take_turns_largest_first():
 
 
 def test_counts_of_sets_of_faces_may_exceed_a_thousand_million():
-    """An object of 400 faces has 1,050 million sets of four, and each can be paired in three ways."""
+    """400 faces have 1,050 million sets of four, and each can be paired in three ways."""
     counts = MethodCounts(tried=3 * 10**9, pruned=3 * 10**9)
     assert counts.pruned == 3 * 10**9
     assert Outcomes(held=0, absent=0, open=10**10).open == 10**10
