@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 57_047,
+    "lines of packages": 57_048,
     "modules of packages": 239,
-    "lines of tests": 48_945,
+    "lines of tests": 48_946,
     "lines of docs": 7_204,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises

@@ -16,7 +16,7 @@ largest at a corner of the box. So, for equal half-angles,
     sin(theta*) = min over the 4 triples, over signs s in {+-1}^3, of 1 / |A^-1 s|,     (2)
 
 and the property holds exactly for theta < theta*. The columns of A^-1 are cross products of
-the axes over det A, which is how the code evaluates it. theta* never exceeds asin(1/3): the
+the axes over det A; `spanning_kernel` evaluates it so. theta* never exceeds asin(1/3): the
 ball of radius sin(theta*) lies in a tetrahedron inscribed in the unit sphere.
 
 Source: Sudsang & Ponce 1995, Definition 3 and Proposition 4; the closed form is this project's.

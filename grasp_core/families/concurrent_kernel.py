@@ -5,16 +5,16 @@ the largest common radius r, one inside each face, such that x0 lies in the forc
 every point of every disc. When the four force cones positively span R^3 whatever direction
 each contributes (P3), any four contacts in the discs are then in equilibrium.
 
-Derivation. On face i the points are c_i + T_i y. Let g run over the inward unit normals of
+Derivation. On face i the points are o_i + T_i y. Let g run over the inward unit normals of
 the facets of a pyramid inscribed in force cone i. A contact at y can aim at x0 iff
-g.(x0 - c_i - T_i y) >= 0 for all g. Over a disc of radius r around y_i the worst case is
-g.(x0 - c_i - T_i y_i) - r |T_i'g|, and the disc lies inside the face iff e.y_i + r <= b for
+g.(x0 - o_i - T_i y) >= 0 for all g. Over a disc of radius r around y_i the worst case is
+g.(x0 - o_i - T_i y_i) - r |T_i'g|, and the disc lies inside the face iff e.y_i + r <= b for
 its edges. All of it is linear in (x0, y_1..y_4, r):
 
-    maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.c_i    for all i, g      (1)
+    maximise r  subject to  g.x0 - (T_i'g).y_i - r |T_i'g| >= g.o_i    for all i, g      (1)
                             e.y_i + r <= b                             for all i, edges  (2)
 
-A curved patch has its surface at c_i + T_i y + h n_i, |h| <= eps: the left side of (1) loses
+A curved patch has its surface at o_i + T_i y + h n_i, |h| <= eps: the left side of (1) loses
 
     eps |g.n_i|.                                                                         (3)
 
@@ -25,11 +25,12 @@ r is the smallest of them, see `discs_kernel`.
 The lines of force have to meet, not the forces: fingers may also push away from a focus behind
 them, as from inside a hole. For such a finger side = -1, and the cone has to hold
 
-    side (x0 - c_i - T_i y).                                                             (4)
+    side (x0 - o_i - T_i y).                                                             (4)
 
 As P3 makes the weights of the force directions positive, nothing else changes. The focus before
 all fingers and behind all of them is tried first; mixed sides follow on faces that would have no
-regions. With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper.
+regions. With axis = normal, half-angle = theta and all sides +1 this is section 3.1 of the paper:
+(1) for r = 0 and a circular cone says that x0 projects into the face grown by d tan(theta).
 
 Before any program, `disc_bounds` bounds discs by the distance s_i along the axis between the
 planes across it through the focus and through the disc's centre. The two points of the disc's

@@ -71,7 +71,7 @@ def disc_limits(
 def angle_limits(extent: float, widths: Array, half_angles: Array) -> Array:
     """Bound the discs from above where only the cones' half-angles are known, (q, 4)."""
     reaches = np.full(len(half_angles), extent)
-    # (5) of `concurrent`: the least s_i is at most the weighted mean of all s_i
+    # (5) of `concurrent_kernel`: the least s_i is at most the weighted mean of all s_i
     concurrent: Array = reaches * np.tan(half_angles)
     pencil = pencil_radius_bounds(reaches, widths, half_angles)
     return np.hstack([concurrent[:, None], pencil])

@@ -352,9 +352,9 @@ def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tupl
             tight = frames.tight[pair, slopes[pair], bound]
             rows.At[X + pair, row], rows.At[Z + pair, row] = -tight[0], -tight[1]
             row += 1
-    # (8) for both pairs: l_i is p times the slope of the other
-    steepest = min(abs(frames.tau[0, slopes[0]]), abs(frames.tau[1, slopes[1]]))
-    return rows, LEAST_GAP / steepest
+    # (8) for both pairs: by (2), l_i is p times the slope of the other
+    flattest = min(abs(frames.tau[0, slopes[0]]), abs(frames.tau[1, slopes[1]]))
+    return rows, LEAST_GAP / flattest
 
 
 @loop()
