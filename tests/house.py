@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 57_048,
+    "lines of packages": 57_054,
     "modules of packages": 239,
     "lines of tests": 48_946,
     "lines of docs": 7_204,

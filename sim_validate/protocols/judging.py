@@ -26,7 +26,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
-from grasp_core.kinds import Friction, instance, value_of
+from grasp_core.kinds import Friction, instance, one_of, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
@@ -41,8 +41,7 @@ from sim_validate.engine.traces import Outcome, judge, rotation_angles
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.trials import hand_setup, require_faithful_hands
-from sim_validate.protocols import published
-from sim_validate.protocols.published import Passing, PublishedProtocol, Run
+from sim_validate.protocols.published import PROTOCOLS, Passing, PublishedProtocol, Run
 from sim_validate.protocols.verdict import Judgement, OurVerdict, RunVerdict
 
 
@@ -71,7 +70,7 @@ def judge_by(
         InputError: A number is out of range, contacts are not on the object, or no test has the
             name.
     """
-    found = protocol if isinstance(protocol, PublishedProtocol) else published.protocol(protocol)
+    found = _protocol(protocol)
     check_body(body)
     value_of(Friction, friction, "friction")
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
@@ -118,7 +117,7 @@ def judge_hand_by(
         InputError: Hand, object and pose do not belong together, a number is out of range, or no
             test has the name.
     """
-    found = protocol if isinstance(protocol, PublishedProtocol) else published.protocol(protocol)
+    found = _protocol(protocol)
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     value_of(Friction, friction, "friction")
@@ -163,6 +162,13 @@ def _ours(
     contacts = stance_of(hand, reach).contacts
     analysis = Analysis(body, contacts, friction, setup, held.hand.motors)
     return our_verdict(analysis, forces, lambda: held)
+
+
+def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
+    if isinstance(given, PublishedProtocol):
+        return given
+    one_of(given, PROTOCOLS, "protocol")
+    return PROTOCOLS[given]
 
 
 def our_verdict(

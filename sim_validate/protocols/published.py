@@ -328,5 +328,5 @@ def protocol(name: str) -> PublishedProtocol:
     Raises:
         InputError: No test has this name.
     """
-    one_of(name, PROTOCOLS, "protocol")
+    one_of(name, PROTOCOLS, "name")
     return PROTOCOLS[name]
