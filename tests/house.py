@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 57_054,
     "modules of packages": 239,
-    "lines of tests": 48_946,
+    "lines of tests": 48_947,
     "lines of docs": 7_204,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises

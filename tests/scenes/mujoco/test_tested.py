@@ -99,7 +99,8 @@ def test_stiff_servos_get_inertia_so_that_steps_are_short_beside_their_ring():
 def welded(weld):
     """The Allegro hand on a weld at a dodecahedron, as its file has it."""
     body, hand = scaled("dodecahedron", 0.035), gc.load_hand("allegro")
-    reach = next(each for each in reaches("allegro", "dodecahedron", 0.035) if each.reached)
+    found = [each for each in reaches("allegro", "dodecahedron", 0.035) if each.reached]
+    reach = max(found, key=lambda each: min(each.joints[1:12:4]))  # three fingers can open
     strong = hand.with_torque_limits(0.7, "a test")
     servos = replace(hand_file(hand), weld=weld)
     physics = replace(protocol("dexgraspbench").physics, timestep=5e-4)
