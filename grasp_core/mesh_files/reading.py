@@ -124,7 +124,7 @@ PLY_TYPES = {
 }  # fmt: skip
 """Number types of PLY as `struct` and numpy write them."""
 FRACTIONS = "efd"
-"""Those of the types that are no whole numbers."""
+"""Letters of the types whose values may have fractions."""
 PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 PLY_END = re.compile(rb"\n[ \t]*end_header[ \t]*\r?\n|\r[ \t]*end_header[ \t]*\r")
 LONGEST_HEADER, LONGEST_LIST = 2**16, 2**31

@@ -1,3 +1,4 @@
+from collections import Counter
 from unittest import mock
 
 import numpy as np
@@ -161,6 +162,26 @@ def kernel_rows(A, b, equalities=0):
 
 def vertex_of(simplex, basis, y):
     return simplex.Vertex(np.array(basis), np.array(y, dtype=float), np.zeros(len(basis)))
+
+
+def test_either_rule_for_the_row_that_enters_ends_with_the_same_answer():
+    """Where the basis that one rule ends with proves nothing, `bounded` takes the other rule."""
+    rng, seen = np.random.default_rng(8), Counter()
+    for _ in range(300):
+        A, c = rng.normal(size=(20, 5)), rng.normal(size=5)
+        simplex, rows = kernel_rows(A, rng.uniform(-0.3, 1.0, size=20))
+        ends = []
+        for first in (False, True):
+            vertex = simplex.vertex_of(5)
+            status, against = simplex.solve(c, rows, -np.inf, vertex, first)
+            if status == simplex.INFEASIBLE:
+                assert simplex.proved_empty(rows, vertex, against, lp.FARTHEST)
+                ends.append(-np.inf)
+            else:
+                ends.append(simplex.proved_bound(c, rows, vertex, 1e-11))
+        seen[ends[0] == -np.inf] += 1
+        assert ends[0] == ends[1] or abs(ends[0] - ends[1]) <= 1e-9 * (1.0 + abs(ends[0]))
+    assert min(seen[False], seen[True]) >= 40
 
 
 def test_compiled_bounds_count_only_what_multipliers_prove():
