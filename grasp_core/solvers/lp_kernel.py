@@ -9,11 +9,16 @@ only ask for a bound have it proved here, from the multipliers alone.
 Method. Any n independent rows, the basis, meet in a point x and give c = y_1 a_1 + .. + y_n a_n. As
 long as y >= 0 (of any sign for equalities), c.x is at least the optimum. The corner on the side of
 c of the box |x_i| <= BOX is such a basis, with which the search begins. If x violates a row r,
-write a_r = alpha_1 a_1 + .. + alpha_n a_n: r enters, and the row with the least y_j / alpha_j among
-positive alpha_j leaves, which keeps y >= 0 and lowers c.x. Without a positive alpha_j no point
-meets both r and the basis. Of the violated rows the one that is violated most enters; after many
-steps that lower nothing the first one does, which leaves most circles. Steps are limited: a circle
-ends as LOST.
+write a_r = alpha_1 a_1 + .. + alpha_n a_n: r enters, and a row of positive alpha_j leaves, which
+lowers c.x. The one with the least y_j / alpha_j would keep y >= 0. Small alpha_j spoil the inverse
+of the basis, so that of those that lower no y_j below -SLACK the largest alpha_j is taken (Harris,
+"Pivot selection methods of the Devex LP code", Mathematical Programming 5, 1973). Without a
+positive alpha_j no point meets both r and the basis. Of the violated rows the one that is violated
+most enters; after many steps that lower nothing the first one does, which leaves most circles.
+
+If x violates no row, but a y_j is negative, c.x rises on the edge where x moves off row j alone.
+The first row that is met there enters in its place, as in the primal simplex method. Steps of
+either kind are limited: a circle ends as LOST.
 """
 
 from typing import NamedTuple
@@ -32,7 +37,12 @@ VIOLATED = 1e-10
 """Distance beyond a row's plane at which a point violates the row."""
 POSITIVE = 1e-9
 """Least alpha_j that may serve as a pivot."""
-SAME_RATIO = 1e-12
+SLACK = 1e-10
+"""Size below zero that multipliers may reach on the way."""
+NEGATIVE = 1e-13
+"""Size below zero from which a multiplier's row has to leave the basis in the end."""
+AT_ONCE = 1e-12
+"""Distance beyond a row's plane at which a step along an edge may end."""
 UNCHANGED = 1e-13
 """Decrease of c.x in one step below which the step counts as no progress."""
 PATIENCE, MOST = 3, 60
@@ -109,26 +119,33 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex, first: bool) -> t
     inverse, value, norms = *_corner(c, count, vertex), _lengths(rows)
     alpha, excess, inside = np.empty(n), np.empty(count), np.zeros(count, dtype=np.bool_)
     for _ in range(MOST * n):
-        if value < cutoff and not _leans_on_box(y, basis, count):
+        if value < cutoff and not _is_held_up(y, basis, rows):
             _refine(c, rows, basis, inverse, y)
-            return BELOW, -1
+            if not _is_held_up(y, basis, rows):
+                return BELOW, -1
         _exceeded(x, rows, excess)
         entering = _violated(excess, rows, norms, inside, first or idle > PATIENCE * n)
-        if entering < 0:
+        if entering >= 0:
+            if excess[entering] < 0.0:
+                _turn(rows, excess, entering)
+            _combined(rows, entering, inverse, alpha)
+            leaving = _leaving(y, alpha, basis, rows)
+            if leaving < 0:
+                _refine(rows.At[:, entering].copy(), rows, basis, inverse, y)
+                return INFEASIBLE, entering
+        else:
             _refine(c, rows, basis, inverse, y)
-            return OPTIMAL, -1
-        if excess[entering] < 0.0:
-            _turn(rows, entering)
-        beyond = abs(excess[entering])
-        _combined(rows, entering, inverse, alpha)
-        leaving = _leaving(y, alpha, basis, rows)
-        if leaving < 0:
-            _refine(rows.At[:, entering].copy(), rows, basis, inverse, y)
-            return INFEASIBLE, entering
+            leaving = _negative(y, basis, rows)
+            if leaving < 0:
+                return OPTIMAL, -1
+            entering = _blocking(inverse[:, leaving], rows, excess, inside)
+            if entering < 0:
+                return LOST, -1
+            _combined(rows, entering, inverse, alpha)
         drop = max(y[leaving] / alpha[leaving], 0.0)
-        idle = idle + 1 if drop * beyond < UNCHANGED else 0
-        value -= drop * beyond
-        _exchange(inverse, x, alpha, leaving, beyond)
+        idle = idle + 1 if drop * abs(excess[entering]) < UNCHANGED else 0
+        value -= drop * excess[entering]
+        _exchange(inverse, x, alpha, leaving, excess[entering])
         for j in range(n):
             y[j] -= drop * alpha[j]
         y[leaving] = drop
@@ -173,8 +190,12 @@ def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> b
 @loop("numpy")
 def _may_weigh(share: float, k: int, rows: Rows) -> bool:
     """Return whether a proof may use row k this much: never the box, equalities always."""
-    count = len(rows.b)
-    return k < count and (share > 0.0 or k >= count - rows.equalities)
+    return k < len(rows.b) and (share > 0.0 or _is_equality(k, rows))
+
+
+@loop("numpy")
+def _is_equality(k: int, rows: Rows) -> bool:
+    return len(rows.b) - rows.equalities <= k < len(rows.b)
 
 
 @loop("numpy", once=True)
@@ -202,12 +223,43 @@ def _lengths(rows: Rows) -> Array:
     return norms
 
 
-@loop("numpy", once=True)
-def _leans_on_box(y: Array, basis: Indices, count: int) -> bool:
-    leans = False
+@loop("numpy")
+def _is_held_up(y: Array, basis: Indices, rows: Rows) -> bool:
+    """Return whether the value is no bound: it leans on the box, or a multiplier is negative."""
+    leans = _negative(y, basis, rows) >= 0
     for j in range(len(y)):
-        leans |= basis[j] >= count and y[j] > 0.0
+        leans |= basis[j] >= len(rows.b) and y[j] > 0.0
     return leans
+
+
+@loop("numpy")
+def _negative(y: Array, basis: Indices, rows: Rows) -> int:
+    """Return the place in the basis with the most negative multiplier, -1 if there is none."""
+    least, found = -NEGATIVE, -1
+    for j in range(len(y)):
+        if y[j] < least and not _is_equality(basis[j], rows):
+            least, found = y[j], j
+    return found
+
+
+@loop("numpy", once=True)
+def _blocking(column: Array, rows: Rows, excess: Array, inside: NDArray[np.bool_]) -> int:
+    """Return the row that is met first on the edge against a column; -1 if there is none.
+
+    Of rows that are met with the first one, the steepest is taken.
+    """
+    count = len(excess) - rows.equalities
+    rates, farthest, steepest, found = np.zeros(count), np.inf, POSITIVE, -1
+    for i in range(len(column)):
+        for k in range(count):
+            rates[k] -= rows.At[i, k] * column[i]
+    for k in range(count):
+        if rates[k] > POSITIVE and not inside[k]:
+            farthest = min(farthest, (max(-excess[k], 0.0) + AT_ONCE) / rates[k])
+    for k in range(count):
+        if rates[k] > steepest and not inside[k] and -excess[k] <= farthest * rates[k]:
+            steepest, found = rates[k], k
+    return found
 
 
 @loop("numpy", once=True)
@@ -237,9 +289,9 @@ def _violated(
 
 
 @loop("numpy", once=True)
-def _turn(rows: Rows, k: int) -> None:
+def _turn(rows: Rows, excess: Array, k: int) -> None:
     """Change the sign of an equality, so that points below it violate it."""
-    rows.b[k] = -rows.b[k]
+    rows.b[k], excess[k] = -rows.b[k], -excess[k]
     for i in range(len(rows.At)):
         rows.At[i, k] = -rows.At[i, k]
 
@@ -281,18 +333,18 @@ def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
 
 @loop("numpy", once=True)
 def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
-    """Return the place in the basis with the least y / alpha, -1 if no alpha is positive.
+    """Return the place in the basis that leaves, -1 if no alpha is positive.
 
-    Of equal quotients the one with the largest alpha is taken. Equalities stay in the basis.
+    Of the quotients y / alpha that lower no multiplier below -`SLACK`, the one with the largest
+    alpha is taken: small ones spoil the inverse. Equalities stay in the basis.
     """
-    count, least, found = len(rows.b), np.inf, -1
+    most, largest, found = np.inf, POSITIVE, -1
     for j in range(len(y)):
-        if alpha[j] <= POSITIVE or count - rows.equalities <= basis[j] < count:
-            continue
-        ratio = y[j] / alpha[j]
-        tie = ratio <= least + SAME_RATIO
-        if ratio < least - SAME_RATIO or (tie and alpha[j] > alpha[found]):
-            least, found = min(ratio, least), j
+        if alpha[j] > POSITIVE and not _is_equality(basis[j], rows):
+            most = min(most, (max(y[j], 0.0) + SLACK) / alpha[j])
+    for j in range(len(y)):
+        if alpha[j] > largest and y[j] <= most * alpha[j] and not _is_equality(basis[j], rows):
+            largest, found = alpha[j], j
     return found
 
 

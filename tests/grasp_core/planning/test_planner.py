@@ -14,6 +14,7 @@ from grasp_core.objects.standard_order import standard
 from grasp_core.planning.certify import _place, faces_as_given
 from grasp_core.planning.quadruples import PlannedCones, all_blocks
 from scenes.example_objects import example_object
+from tests.benchmarks.invariance import chosen, examine, found_on
 from tests.benchmarks.objects import sphere_hull
 from tests.judges import pyramid_margin, random_rotation
 
@@ -112,6 +113,14 @@ def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
         expected = pytest.approx(radii[grasp.id] / scale, rel=RADIUS_ACCURACY)
         assert grasp.radius == expected
     assert len(here.grasps) >= 50
+
+
+@pytest.mark.parametrize("number", [4, 18, 25])
+def test_faces_and_families_stay_where_vertices_move_by_a_thousand_millionth(number):
+    name, friction = chosen(number)
+    *_, count, differing = examine((number, found_on(example_object(name), friction)))
+    assert count > 50
+    assert differing == []
 
 
 def test_more_friction_never_loses_a_grasp():

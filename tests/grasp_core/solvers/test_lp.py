@@ -164,24 +164,25 @@ def vertex_of(simplex, basis, y):
     return simplex.Vertex(np.array(basis), np.array(y, dtype=float), np.zeros(len(basis)))
 
 
-def test_either_rule_for_the_row_that_enters_ends_with_the_same_answer():
-    """Where the basis that one rule ends with proves nothing, `bounded` takes the other rule."""
+def test_bounds_are_proved_where_many_rows_nearly_meet_in_a_vertex():
+    """A corner of a box, each of whose rows comes four times, turned by about the last pivot."""
     rng, seen = np.random.default_rng(8), Counter()
-    for _ in range(300):
-        A, c = rng.normal(size=(20, 5)), rng.normal(size=5)
-        simplex, rows = kernel_rows(A, rng.uniform(-0.3, 1.0, size=20))
-        ends = []
-        for first in (False, True):
-            vertex = simplex.vertex_of(5)
-            status, against = simplex.solve(c, rows, -np.inf, vertex, first)
-            if status == simplex.INFEASIBLE:
-                assert simplex.proved_empty(rows, vertex, against, lp.FARTHEST)
-                ends.append(-np.inf)
-            else:
-                ends.append(simplex.proved_bound(c, rows, vertex, 1e-11))
-        seen[ends[0] == -np.inf] += 1
-        assert ends[0] == ends[1] or abs(ends[0] - ends[1]) <= 1e-9 * (1.0 + abs(ends[0]))
-    assert min(seen[False], seen[True]) >= 40
+    for trial in range(300):
+        n = int(rng.integers(3, 12))
+        A = np.vstack([np.eye(n), -np.eye(n)] * 4)
+        A = (A + 1e-9 * rng.normal(size=A.shape)) @ np.linalg.qr(rng.normal(size=(n, n)))[0]
+        b = np.ones(len(A)) + 1e-9 * rng.normal(size=len(A))
+        if trial % 2:
+            A, b = np.vstack([A, -A[:1]]), np.append(b, -b[0] - 1e-3)  # beyond the first face
+        c = A[: 2 * n].T @ rng.choice([0.0, 1.0, 2.0], size=2 * n)
+        simplex, rows = kernel_rows(A, b)
+        bound = simplex.bounded(c, rows, -np.inf, 1e-11, simplex.vertex_of(n))
+        expected = linprog(-c, A, b, bounds=[(None, None)] * n)
+        seen[expected.status] += 1
+        assert bound == (
+            pytest.approx(-expected.fun, abs=1e-7) if expected.x is not None else -np.inf
+        )
+    assert min(seen[0], seen[2]) == 150
 
 
 def test_compiled_bounds_count_only_what_multipliers_prove():
