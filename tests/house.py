@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 57_106,
     "modules of packages": 239,
-    "lines of tests": 48_980,
+    "lines of tests": 48_982,
     "lines of docs": 7_204,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -37,7 +37,7 @@ RISES = (
     "lines of tests, 49,028 to 49,035: loops that are called once; counts of many sets of faces",
     "lines of tests, 48,947 to 48,970: linear programs by another rule; golden on any processor",
     "lines of packages, 57,054 to 57,106: linear programs whose rows nearly coincide",
-    "lines of tests, 48,970 to 48,980: such programs, and shaken objects",
+    "lines of tests, 48,970 to 48,982: such programs, and shaken objects",
     "lines of docs, 7,196 to 7,204: how letters differ from the paper's; what it leaves open",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
