@@ -7,6 +7,7 @@ import gc
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, get_args
 
@@ -79,6 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
+        _check_working_folder()
         if "" in arguments:
             said = "an argument is empty, perhaps from a variable that is not set"
             raise FlagsError(f"{said}; leave the argument out, or give it a value")
@@ -109,6 +111,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _complain("interrupted", Exit.INTERRUPTED)
     return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
+
+
+def _check_working_folder() -> None:
+    try:
+        Path.cwd()
+    except OSError as error:  # nor could loops be compiled there
+        raise InputError("the working folder is gone; change to one that exists") from error
 
 
 def _dispatch(command: flags.Spoken) -> int:
