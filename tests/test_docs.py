@@ -61,7 +61,7 @@ def test_every_command_is_one(line, monkeypatch):
     assert wanted == Exit.USAGE or type(asked[0]) in commands.ACTIONS
 
 
-@pytest.mark.parametrize("page", [pytest.param("pictures", marks=pytest.mark.slow), "errors"])
+@pytest.mark.parametrize("page", ["errors"])
 def test_commands_end_as_the_page_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     lines = [line for block in blocks(PAGES[page], "sh") for line in block.splitlines()]
