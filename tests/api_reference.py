@@ -26,7 +26,7 @@ INTRODUCTION = """\
 # Python reference
 
 Made from the docstrings by `python -m tests.api_reference`. Conventions are in
-[reference.md](reference.md): SI units, the object's frame, normals into the object. Wherever
+[numbers.md](numbers.md): SI units, the object's frame, normals into the object. Wherever
 `positions` and `normals` are arguments, a grasp may stand in the place of `positions`; `normals` is
 then `None`, or left out where it has a default.
 """

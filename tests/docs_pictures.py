@@ -17,7 +17,21 @@ import grasp_core as gc
 import scenes
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
 from scenes.drawing.pictures import Drawing, grasp_figure
-from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, png_of
+from scenes.drawing.sheets import (
+    FINGERS,
+    GLASS,
+    INK,
+    Area,
+    Dots,
+    Line,
+    Sheet,
+    Words,
+    beside,
+    moved,
+    numbered,
+    outlined,
+    png_of,
+)
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.report.charts import (
@@ -75,6 +89,47 @@ def regions():
     body, grasp = best("octahedron", "regulus", FRICTION)
     found = gc.certify_regions(body, grasp, FRICTION, max_cones=1250)
     return grasp_figure(body, replace(grasp, regions=found.regions), FRICTION)
+
+
+def certificate():
+    """Contacts in a plane whose forces can balance, and contacts whose forces cannot."""
+    kept = planar(0.2, "force closure: forces in the cones balance")
+    lost = planar(-0.55, "none: every force turns the object to the left", turning=True)
+    return beside([kept, lost])
+
+
+def planar(aside, title, *, turning=False):
+    """Four fingers at the sides of a square, each beside the middle of its side by a share.
+
+    Opposite fingers push along one line, or all of them push the same way round if `turning`.
+    """
+    half, friction, middle = 95.0, 0.35, np.array([190.0, 190.0])
+    square = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    marks = [Area((middle + square,), GLASS, 0.25), outlined([middle + square], INK, 1.2)]
+    for finger, colour in enumerate(FINGERS):
+        normal = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)][finger])
+        along = np.array([-normal[1], normal[0]])
+        side = 1.0 if turning or finger < 2 else -1.0
+        at = middle - half * (normal + side * aside * along)
+        cone = [at + 80.0 * (normal + slope * friction * along) for slope in (-1, 1)]
+        marks += [Area((np.array([at, *cone]),), colour, 0.35), Dots(at[None], INK, 3.0)]
+        marks += numbered(at - 24.0 * normal, 11.0, str(finger), colour)
+        if not turning:
+            force = 62.0 * (normal + side * aside * along)
+            marks += arrow(np.array([at, at + force]), colour)
+    if turning:
+        angles = np.linspace(0.3, -4.4, 60)
+        marks += arrow(middle + 34.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1), INK)
+    name = Words(middle[0], 362.0, title, "middle", 14.0)
+    return Sheet(380.0, 380.0, title, (*marks, name))
+
+
+def arrow(path, colour):
+    """A line with a head at its end."""
+    end, along = path[-1], (path[-1] - path[-2]) / np.linalg.norm(path[-1] - path[-2])
+    across = np.array([-along[1], along[0]])
+    head = np.array([end + 10.0 * along, end + 5.0 * across, end - 5.0 * across])
+    return [Line((path,), colour, 2.5), Area((head,), colour)]
 
 
 def wrenches():
@@ -138,8 +193,10 @@ def kept_by_distance():
 
 PICTURES: dict[str, Callable[[], Sheet]] = {
     make.__name__: make
-    for make in (families, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced)
-}
+    for make in (
+        families, certificate, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced,
+    )
+}  # fmt: skip
 
 
 def main() -> None:

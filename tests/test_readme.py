@@ -15,7 +15,7 @@ from sim_validate.main import Command
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
-MATHEMATICS = (ROOT / "docs" / "mathematics.md").read_text()
+THEORY = (ROOT / "docs" / "theory.md").read_text()
 COMMANDS = (ROOT / "docs" / "commands.md").read_text()
 
 
@@ -37,7 +37,7 @@ def test_every_command_is_described():
 def test_the_gallery_shows_what_the_planner_finds():
     rows = re.findall(
         r"^\| `([\w-]+)` \| `([\w-]+)` \| (\w+) \| ([\d.]*)[ m]*\| ([\d.]+) \|",
-        MATHEMATICS,
+        THEORY,
         re.MULTILINE,
     )
     assert len(rows) == 5
