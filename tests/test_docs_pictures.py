@@ -36,7 +36,8 @@ def apart(figure, picture):
 
 
 def test_all_pictures_are_made_by_the_script():
-    assert {path.name for path in FOLDER.iterdir()} == {f"{name}.webp" for name in (*PICTURES, *PAGES)}
+    names = {f"{name}.webp" for name in (*PICTURES, *PAGES)}
+    assert {path.name for path in FOLDER.iterdir()} == names
 
 
 SIMULATED = {"fidelity"}

@@ -4,6 +4,7 @@ import re
 import shlex
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -36,7 +37,7 @@ def test_commands_print_what_pages_show_below_them(page, tmp_path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     exec(PART, {})  # noqa: S102 - it is what the page tells people to run
     found = FENCED.findall(page)
-    shown = [(line, below) for (language, line), (other, below) in zip(found, found[1:], strict=False)
+    shown = [(line, below) for (language, line), (other, below) in pairwise(found)
              if language == "sh" and other == "" and line.count("\n") == 1]  # fmt: skip
     assert shown
     for line, below in shown:
