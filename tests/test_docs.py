@@ -144,7 +144,7 @@ def test_links_lead_somewhere_and_every_page_is_linked():
     for path in (ROOT / "README.md", *DOCS, *NOTEBOOKS):
         for link in re.findall(r"\]\(([^)]+)\)", prose_of(path)):
             assert not link.startswith("http")
-            target = (path.parent / link.partition("#")[0]).resolve()
+            target = (path.parent / (link.partition("#")[0] or path.name)).resolve()
             assert target.is_file(), link
             linked.add(target)
     assert {page.resolve() for page in (*DOCS, *NOTEBOOKS)} <= linked
