@@ -151,7 +151,9 @@ def test_links_lead_somewhere_and_every_page_is_linked():
     assert {path.resolve() for path in (ROOT / "docs" / "pictures").iterdir()} <= linked
 
 
-NAMED = re.compile(r"`((?:grasp_core|scenes|sim_validate|tests)/[a-z][a-z0-9_./]+\.py)(?:::(\w+))?`")
+NAMED = re.compile(
+    r"`((?:grasp_core|scenes|sim_validate|tests)/[a-z][a-z0-9_./]+\.py)(?:::(\w+))?`"
+)
 
 
 def definitions_of(path):
