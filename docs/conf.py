@@ -4,7 +4,9 @@ The site asks nothing of a network: formulas are MathML, which browsers set them
 are those of the reader's machine.
 """
 
+import sys
 from importlib.metadata import version as version_of
+from pathlib import Path
 
 from docutils import nodes
 from docutils.utils.math import MathError
@@ -12,6 +14,9 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
+
+sys.path.insert(0, str(Path(__file__).parent))
+import api_reference
 
 project = "graspproof"
 version = release = version_of("graspproof")
@@ -46,8 +51,9 @@ html_show_sourcelink = False
 
 
 def setup(app: Sphinx) -> None:
-    """Have formulas written as MathML, by docutils."""
+    """Have formulas written as MathML, by docutils, and the page of all functions made."""
     app.add_html_math_renderer("mathml", (written_inline, None), (written_as_block, None))
+    app.connect("builder-inited", lambda app: api_reference.write(app.srcdir / "api" / "api.md"))
 
 
 def written_inline(writer: HTML5Translator, node: nodes.math) -> None:

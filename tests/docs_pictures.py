@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
@@ -199,10 +200,34 @@ PICTURES: dict[str, Callable[[], Sheet]] = {
 }  # fmt: skip
 
 
+def report() -> bytes:
+    """The first page of the report on the part of docs/start.md, as a browser shows it."""
+    from sim_validate.main import main as graspproof
+    from tests.browser import headless, opened
+
+    with TemporaryDirectory() as folder:
+        part = Path(folder) / "part.stl"
+        mesh = scenes.example_object("l-bracket").to_trimesh()
+        mesh.apply_scale(1000.0)
+        mesh.export(part)
+        words = ["run", str(part), "--unit", "mm", "--limit", "4", "--out", f"{folder}/out", "-q"]
+        assert graspproof(words) == 0
+        with headless(f"{folder}/profile") as browser:
+            opened(browser, Path(folder) / "out" / "report" / "index.html", width=1000)
+            size = {"width": 1000, "height": 1290, "deviceScaleFactor": 1, "mobile": False}
+            browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            return browser.get_screenshot_as_png()
+
+
+PAGES: dict[str, Callable[[], bytes]] = {"report": report}
+"""Pictures of pages, which need a browser."""
+
+
 def main() -> None:
-    for name in sys.argv[1:] or PICTURES:
+    for name in sys.argv[1:] or (*PICTURES, *PAGES):
         path = FOLDER / f"{name}.webp"
-        with Image.open(io.BytesIO(png_of(PICTURES[name]()))) as picture:
+        png = PAGES[name]() if name in PAGES else png_of(PICTURES[name]())
+        with Image.open(io.BytesIO(png)) as picture:
             picture.convert("RGB").save(path, quality=75, method=6)
         print(path)
 

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from scenes.drawing.sheets import png_of
-from tests.docs_pictures import FOLDER, PICTURES
+from tests.docs_pictures import FOLDER, PAGES, PICTURES
 from tests.scenes.drawing.whole import assert_whole
 
 BLOCK = 16
@@ -36,7 +36,8 @@ def apart(figure, picture):
 
 
 def test_all_pictures_are_made_by_the_script():
-    assert {path.name for path in FOLDER.iterdir()} == {f"{name}.webp" for name in PICTURES}
+    names = {f"{name}.webp" for name in (*PICTURES, *PAGES)}
+    assert {path.name for path in FOLDER.iterdir()} == names
 
 
 SIMULATED = {"fidelity"}

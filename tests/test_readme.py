@@ -1,22 +1,22 @@
-"""The README's example prints what it says; every command and the gallery are as pages say."""
+"""What the README and the first page of docs/ show is what a reader gets."""
 
-import math
 import re
+import shlex
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
-import grasp_core as gc
-import scenes
-from sim_validate.main import Command
+from sim_validate.main import main
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
-THEORY = (ROOT / "docs" / "theory.md").read_text()
-COMMANDS = (ROOT / "docs" / "commands.md").read_text()
+START = (ROOT / "docs" / "start.md").read_text()
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PART = next(code for language, code in FENCED.findall(START) if language == "python")
+"""The lines of Python that write the part of both pages."""
 
 
 def test_the_example_prints_what_it_says():
@@ -28,26 +28,20 @@ def test_the_example_prints_what_it_says():
     assert answer.stdout == said
 
 
-def test_every_command_is_described():
-    assert len(get_args(Command)) >= 9
-    for command in get_args(Command):
-        assert f"`graspproof {command.__name__.lower()}" in COMMANDS
-
-
-def test_the_gallery_shows_what_the_planner_finds():
-    rows = re.findall(
-        r"^\| `([\w-]+)` \| `([\w-]+)` \| (\w+) \| ([\d.]*)[ m]*\| ([\d.]+) \|",
-        THEORY,
-        re.MULTILINE,
-    )
-    assert len(rows) == 5
-    for name, grasp_id, family, disc_mm, critical in rows:
-        plan = gc.plan(
-            scenes.example_object(name),
-            math.tan(math.radians(10.0)),
-            families=(family,),
-            cones="normal",
-        )
-        (grasp,) = (grasp for grasp in plan.grasps if grasp.id == grasp_id)
-        assert f"{1e3 * grasp.radius:.2f}" == (disc_mm or "0.00")
-        assert grasp.critical_friction == pytest.approx(float(critical), abs=5e-5)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(README, id="README", marks=pytest.mark.slow), pytest.param(START, id="start")],
+)
+def test_commands_print_what_pages_show_below_them(page, tmp_path, monkeypatch, capsys):
+    """Pages leave out lines, for which `..` stands, and spaces around lines."""
+    monkeypatch.chdir(tmp_path)
+    exec(PART, {})  # noqa: S102 - it is what the page tells people to run
+    found = FENCED.findall(page)
+    shown = [(line, below) for (language, line), (other, below) in pairwise(found)
+             if language == "sh" and other == "" and line.count("\n") == 1]  # fmt: skip
+    assert shown
+    for line, below in shown:
+        words, _, code = line.partition("# exit code")
+        assert main(shlex.split(words)[1:]) == int(code or 0), line
+        lines = {each.strip() for said in capsys.readouterr() for each in said.splitlines()}
+        assert {each.strip() for each in below.splitlines()} - {".."} <= lines

@@ -1,4 +1,4 @@
-"""The page docs/api.md from docstrings: `python -m tests.api_reference` writes it again."""
+"""The site's page of every public function and class, from docstrings; `conf.py` has it written."""
 
 import ast
 import importlib
@@ -16,7 +16,6 @@ from grasp_core.settings import Settings
 from sim_validate.closure.verdict import HoldsWrenches
 from sim_validate.kit.files import AboutGrasps, ResultFile
 
-PAGE = Path(__file__).parent.parent / "docs" / "api.md"
 PACKAGES = {"grasp_core": "gc", "scenes": "scenes", "sim_validate": "sv"}
 UNTOLD = ("Key", "Shape", "Shown", "UNRECORDED", "FLAT")
 """Rules of types that the page leaves out."""
@@ -25,11 +24,18 @@ BASES = (ResultFile, AboutGrasps, HoldsWrenches)
 INTRODUCTION = """\
 # Python reference
 
-Made from the docstrings by `python -m tests.api_reference`. Conventions are in
-[numbers.md](numbers.md): SI units, the object's frame, normals into the object. Wherever
-`positions` and `normals` are arguments, a grasp may stand in the place of `positions`; `normals` is
-then `None`, or left out where it has a default.
+Every public function and class, from the docstrings. Units are SI, coordinates are the object's,
+and normals point into the object. Wherever `positions` and `normals` are arguments, a grasp may
+stand in the place of `positions`; `normals` is then `None`, or left out where it has a default.
 """
+
+
+def write(path: Path) -> None:
+    """Write the page, unless it is there already."""
+    text = page()
+    if not (path.is_file() and path.read_text(encoding="utf-8") == text):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
 
 
 def page() -> str:
@@ -91,6 +97,7 @@ class Shown(ast.NodeTransformer):
     """Leaves out of types what only files and tables need, and shapes, which are said in words."""
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """Reduce `Annotated` to what readers need."""
         self.generic_visit(node)
         if ast.unparse(node.value) != "Annotated" or not isinstance(node.slice, ast.Tuple):
             return node
@@ -111,7 +118,8 @@ def members_of(kind: type) -> Iterator[str]:
 def own_members_of(kind: type) -> Iterator[str]:
     """Members that a class declares itself."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
-    assert isinstance(tree, ast.ClassDef)
+    if not isinstance(tree, ast.ClassDef):
+        raise TypeError(kind)
     for part, after in zip(tree.body, [*tree.body[1:], None], strict=True):
         is_text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
         said = flowed(str(after.value.value)) if is_text else ""
@@ -130,8 +138,3 @@ def own_members_of(kind: type) -> Iterator[str]:
         else:
             continue
         yield f"* `{name}`" + (f": {said}" if said else "")
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
-    print(PAGE)
