@@ -61,7 +61,7 @@ def test_every_command_is_one(line, monkeypatch):
     assert wanted == Exit.USAGE or type(asked[0]) in commands.ACTIONS
 
 
-@pytest.mark.parametrize("page", [pytest.param("pictures", marks=pytest.mark.slow), "errors"])
+@pytest.mark.parametrize("page", [pytest.param("simulation", marks=pytest.mark.slow), "errors"])
 def test_commands_end_as_the_page_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     lines = [line for block in blocks(PAGES[page], "sh") for line in block.splitlines()]
@@ -189,7 +189,7 @@ def test_the_page_of_errors_lists_all_there_are():
     known = {name for name in vars(errors) if name.endswith("Error")} - {"GraspError"}
     assert set(listed("errors", "## In Python")) == known
     for outcome in Outcome:
-        assert f"`{outcome.value}`" in PAGES["physics"]
+        assert f"`{outcome.value}`" in PAGES["simulation"]
 
 
 def test_the_settings_of_a_dataset_are_all_shown(tmp_path):

@@ -39,7 +39,7 @@ def test_all_pictures_are_made_by_the_script():
     assert {path.name for path in FOLDER.iterdir()} == {f"{name}.webp" for name in PICTURES}
 
 
-SIMULATED = {"fidelity"}
+SIMULATED = {"fidelity", "trials"}
 
 
 @pytest.mark.parametrize(
