@@ -157,7 +157,7 @@ def test_the_fields_of_files_are_those_of_the_page(tmp_path):
 
 def test_the_page_of_executions_names_every_trial_fate_and_flag():
     page = PAGES["simulation"]
-    assert listed("execution", "### The trials") == list(KINDS)
+    assert listed("simulation", "### The trials") == list(KINDS)
     assert all(f"`{fate}`" in page for fate in get_args(Fate))
     for name in (field.name for field in fields(ChosenExecution) if field.name != "trials"):
         assert f"`--{name.replace('_', '-')}" in page, name
