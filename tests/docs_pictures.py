@@ -19,6 +19,7 @@ import scenes
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
 from scenes.drawing.pictures import Drawing, grasp_figure
 from scenes.drawing.sheets import (
+    BAD,
     FINGERS,
     GLASS,
     INK,
@@ -33,8 +34,12 @@ from scenes.drawing.sheets import (
     outlined,
     png_of,
 )
+from scenes.mujoco.held_scene import SAMPLE_S
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.execution.bench import HeldBench
+from sim_validate.execution.execute import Fingertips, run_trials
+from sim_validate.execution.predictions import planned
 from sim_validate.report.charts import (
     Agreement,
     fidelity_panel,
@@ -42,6 +47,7 @@ from sim_validate.report.charts import (
     motion_panels,
     wrench_figure,
 )
+from sim_validate.settings import KINDS, ExecutionSettings
 from tests.scenes.drawing.standing import standing
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
@@ -53,6 +59,7 @@ FAMILIES = (
     ("icosahedron", "regulus", 0.3, "tilted"),
 )
 FRICTION = 0.5
+MASSES_KG = (0.3, 1.0, 1.5)
 TITLE = 24.0
 """Height of a line for a title [pixels]."""
 
@@ -184,6 +191,44 @@ def misplaced():
     return Sheet(600.0, 350.0, "share kept", (*marks, *names, *below))
 
 
+def trials():
+    """How far an object moves in the hand over time, in the hardest trial of each kind."""
+    body = scenes.example_object("box")
+    grasp = gc.plan(body, FRICTION, limit=1).grasps[0]
+    runs = [hardest(body, grasp, mass_kg) for mass_kg in MASSES_KG]
+    marks = []
+    for place, kind in enumerate(KINDS):
+        left, top = 30.0 + 300.0 * (place % 3), 30.0 + 205.0 * (place // 3)
+        longest = max(float(run[kind][0][-1]) for run in runs)
+        panel = Panel(left, top, 250.0, 140.0, Scale(0.0, longest), Scale(0.0, 8.0))
+        marks += [*panel.frame(panel.x.ticks(4), (0.0, 2.0, 4.0, 6.0, 8.0)), panel.level(5.0, BAD)]
+        marks += [
+            panel.curve(*run[kind], colour, 1.8) for run, colour in zip(runs, FINGERS, strict=False)
+        ]
+        marks.append(Words(left, top - 14.0, f"{kind}: moved [mm]", "start", 13.0, bold=True))
+    key = [
+        Entry(f"{mass_kg:g} kg", colour)
+        for mass_kg, colour in zip(MASSES_KG, FINGERS, strict=False)
+    ]
+    marks.append(Words(870.0, 425.0, "time [s]", "end"))
+    below, _ = keyed([*key, Entry("lost beyond", BAD, "dashes")], 30.0, 425.0, 700.0)
+    return Sheet(900.0, 440.0, "six kinds of trials", (*marks, *below))
+
+
+def hardest(body, grasp, mass_kg):
+    """Simulate an execution: times and displacements [s, mm] of the worst trial of each kind."""
+    settings = ExecutionSettings(mass_kg=mass_kg).for_body(body)
+    holder = Fingertips(body, grasp.contacts, FRICTION)
+    scene, _, asked, _ = planned(holder, settings, holder.squeeze(settings))
+    found = {}
+    for trial, motion in run_trials(HeldBench(scene, lost_m=body.radius), asked).items():
+        away = motion.shifts[trial.begun :] - motion.shifts[trial.begun]
+        moved = 1000.0 * np.linalg.norm(away, axis=1)
+        if trial.kind not in found or moved.max() > found[trial.kind][1].max():
+            found[trial.kind] = SAMPLE_S * np.arange(len(moved)), moved
+    return found
+
+
 def kept_by_distance():
     """Read the table on misplaced objects, cell by cell."""
     lines = [*BENCHMARKS.read_text(encoding="utf-8").splitlines(), ""]
@@ -196,6 +241,7 @@ PICTURES: dict[str, Callable[[], Sheet]] = {
     make.__name__: make
     for make in (
         families, certificate, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced,
+        trials,
     )
 }  # fmt: skip
 

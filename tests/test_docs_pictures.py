@@ -40,7 +40,7 @@ def test_all_pictures_are_made_by_the_script():
     assert {path.name for path in FOLDER.iterdir()} == names
 
 
-SIMULATED = {"fidelity"}
+SIMULATED = {"fidelity", "trials"}
 
 
 @pytest.mark.parametrize(

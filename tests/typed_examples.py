@@ -32,7 +32,7 @@ EXCUSED = {f'Import "{name}" could not be resolved' for name in BROUGHT_ALONG}
 
 
 def examples(pages: Iterable[Path] = PAGES) -> dict[str, str]:
-    """Every block of Python, by a name such as `physics_line_16`."""
+    """Every block of Python, by a name such as `simulation_line_16`."""
     return {
         f"{page.stem.replace('-', '_')}_line_{text.count(chr(10), 0, block.start()) + 1}": block[1]
         for page in pages

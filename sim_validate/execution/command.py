@@ -46,7 +46,7 @@ EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
 """Figures whose meaning is said below their table."""
 ENOUGH_MEANS = (
     "enough: the least --push-n, with the --tip-stiffness-n-per-m that was used or the least that "
-    "it takes; docs/execution.md says what it does not promise"
+    "it takes; docs/simulation.md says what it does not promise"
 )
 SLIPS = "first slips, predicted/simulated"
 SLIPS_MEAN = (

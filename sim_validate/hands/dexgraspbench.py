@@ -211,7 +211,7 @@ def _record(found: Any) -> DexRecord:
     if not isinstance(found, dict):
         raise InputError(
             f"expected the dictionary of one grasp, got a {type(found).__name__}. Save each grasp "
-            f"as a file of its own with the fields {', '.join(WANTED)} (docs/protocols.md says "
+            f"as a file of its own with the fields {', '.join(WANTED)} (docs/hands.md says "
             "what they are)"
         )
     fields = cast("Mapping[str, Any]", found)
