@@ -61,7 +61,7 @@ def test_every_command_is_one(line, monkeypatch):
     assert wanted == Exit.USAGE or type(asked[0]) in commands.ACTIONS
 
 
-@pytest.mark.parametrize("page", [pytest.param("pictures", marks=pytest.mark.slow), "errors"])
+@pytest.mark.parametrize("page", [pytest.param("pictures", marks=pytest.mark.slow), "commands"])
 def test_commands_end_as_the_page_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     lines = [line for block in blocks(PAGES[page], "sh") for line in block.splitlines()]
@@ -182,12 +182,13 @@ def test_the_files_that_the_page_shows_are_accepted(tmp_path, monkeypatch):
 
 
 def test_the_page_of_errors_lists_all_there_are():
-    codes = re.findall(r"^\| (\d+) \|", PAGES["errors"], re.MULTILINE)
+    codes = re.findall(r"^\| (\d+) \|", PAGES["commands"], re.MULTILINE)
     assert sorted(map(int, codes)) == sorted(int(code) for code in Exit)
-    assert listed("errors", "## Meshes") == re.findall(r"`(GP-MESH-[\w-]+)`", PAGES["errors"])
-    assert set(listed("errors", "## Meshes")) == {reason.value for reason in gc.MeshRefusal}
+    refused = listed("files", "### Why a mesh is refused")
+    assert refused == re.findall(r"`(GP-MESH-[\w-]+)`", PAGES["files"])
+    assert set(refused) == {reason.value for reason in gc.MeshRefusal}
     known = {name for name in vars(errors) if name.endswith("Error")} - {"GraspError"}
-    assert set(listed("errors", "## In Python")) == known
+    assert set(listed("files", "## Errors in Python")) == known
     for outcome in Outcome:
         assert f"`{outcome.value}`" in PAGES["physics"]
 
