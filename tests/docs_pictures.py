@@ -11,12 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from PIL import Image
 
 import grasp_core as gc
 import scenes
+from scenes.drawing.painting import View
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
-from scenes.drawing.pictures import Drawing, grasp_figure
+from scenes.drawing.pictures import SIDE, Drawing, glass, grasp_figure, sheet_of
 from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, png_of
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
@@ -52,10 +54,7 @@ def families():
     """A grasp of each of the paper's families, side by side."""
     sheets = []
     for case in FAMILIES:
-        sheet = Drawing(*best(*case), case[2]).sheet()
-        title = Words(0.5 * sheet.width, 14.0, case[1], "middle", 16.0, bold=True)
-        marks = [moved(mark, np.array([0.0, TITLE])) for mark in sheet.marks]
-        sheets.append(Sheet(sheet.width, sheet.height + TITLE, case[1], (*marks, title)))
+        sheets.append(titled(Drawing(*best(*case), case[2]).sheet(), case[1]))
     return beside(sheets)
 
 
@@ -128,6 +127,41 @@ def misplaced():
     return Sheet(600.0, 350.0, "share kept", (*marks, *names, *below))
 
 
+def block(*, notched=False):
+    """The mesh of a tapered block [mm]; or with a notch in its upper edge, under a contact."""
+    bottom = [(x, y, 0.0) for x in (-30.0, 30.0) for y in (-20.0, 20.0)]
+    top = [(x, y, 35.0) for x in (-12.0, 24.0) for y in (-14.0, 14.0)]
+    mesh = trimesh.PointCloud(bottom + top).convex_hull
+    if not notched:
+        return mesh
+    cut = trimesh.creation.box(bounds=((-3.0, -20.0, 26.0), (13.0, -8.0, 46.0)))
+    return trimesh.boolean.difference([mesh, cut], engine="manifold")
+
+
+def changed():
+    """A block before and after somebody has cut a notch where a finger stood."""
+    before, after = (
+        gc.Polyhedron.from_mesh(0.001 * mesh.vertices, mesh.faces, name="block")
+        for mesh in (block(), block(notched=True))
+    )
+    plan = gc.plan(before, 0.4, limit=3)
+    drawing = Drawing(before, plan["c-0-1-2-3"], 0.4)
+    shapes, view = drawing.shapes(), View.of_angles(-60.0, 25.0, before)
+    sheets = []
+    for title, body in (("before", before), ("after: c-0-1-2-3 is gone", after)):
+        shown = (*glass(body), *shapes[len(glass(before)) :])
+        sheet = sheet_of(shown, before, view, title, numbers=drawing.numbers(), side=SIDE)
+        sheets.append(titled(sheet, title))
+    return beside(sheets)
+
+
+def titled(sheet, title):
+    """A sheet with a title above it."""
+    marks = [moved(mark, np.array([0.0, TITLE])) for mark in sheet.marks]
+    words = Words(0.5 * sheet.width, 14.0, title, "middle", 16.0, bold=True)
+    return Sheet(sheet.width, sheet.height + TITLE, title, (*marks, words))
+
+
 def kept_by_distance():
     """Read the table on misplaced objects, cell by cell."""
     lines = [*BENCHMARKS.read_text(encoding="utf-8").splitlines(), ""]
@@ -136,10 +170,8 @@ def kept_by_distance():
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[first:end]]
 
 
-PICTURES: dict[str, Callable[[], Sheet]] = {
-    make.__name__: make
-    for make in (families, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced)
-}
+MADE = families, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced, changed
+PICTURES: dict[str, Callable[[], Sheet]] = {make.__name__: make for make in MADE}
 
 
 def main() -> None:
