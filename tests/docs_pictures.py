@@ -16,10 +16,21 @@ from PIL import Image
 
 import grasp_core as gc
 import scenes
-from scenes.drawing.painting import View
+from scenes.drawing.painting import Shape, View, best_view
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
-from scenes.drawing.pictures import SIDE, Drawing, glass, grasp_figure, sheet_of
+from scenes.drawing.pictures import (
+    CONE_LENGTH,
+    SIDE,
+    Drawing,
+    cone_sides,
+    finger_size,
+    glass,
+    grasp_figure,
+    pin,
+    sheet_of,
+)
 from scenes.drawing.sheets import FINGERS, Dots, Sheet, Words, beside, moved, png_of
+from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.report.charts import (
@@ -162,6 +173,27 @@ def titled(sheet, title):
     return Sheet(sheet.width, sheet.height + TITLE, title, (*marks, words))
 
 
+def rows():
+    """A grasp and the negative controls that a dataset has beside it, with their contacts."""
+    body, grasp = best("wedge", "pencil", FRICTION)
+    size, view = finger_size(body), best_view(body, grasp)
+    cases = [("grasp", grasp.contacts, FRICTION)]
+    for each in negative_controls(body, grasp, FRICTION, seed=0):
+        cases.append((each.name, each.contacts, each.friction))
+    sheets = []
+    for name, contacts, friction in cases:
+        shapes = [*glass(body), Shape("contact", points=np.array([c.position for c in contacts]))]
+        for contact in contacts:
+            finger = int(np.linalg.norm(grasp.normals - contact.normal, axis=1).argmin())
+            shapes += pin(finger, contact.position, contact.normal, size)
+            sides = cone_sides(
+                contact.position, contact.normal, math.atan(friction), CONE_LENGTH * size
+            )
+            shapes.append(Shape("force cone", finger, polygons=sides))
+        sheets.append(titled(sheet_of(shapes, body, view, name, side=320), name))
+    return beside(sheets)
+
+
 def kept_by_distance():
     """Read the table on misplaced objects, cell by cell."""
     lines = [*BENCHMARKS.read_text(encoding="utf-8").splitlines(), ""]
@@ -170,7 +202,9 @@ def kept_by_distance():
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[first:end]]
 
 
-MADE = families, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced, changed
+MADE = (
+    families, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced, changed, rows,
+)  # fmt: skip
 PICTURES: dict[str, Callable[[], Sheet]] = {make.__name__: make for make in MADE}
 
 
