@@ -1,6 +1,6 @@
 """Exports the grasps of a plan as one file of another program: MoveIt messages or a glTF scene.
 
-docs/exports.md describes both. A moveit_msgs/Grasp is meant for one hand, so the four fingertips
+docs/files.md describes both. A moveit_msgs/Grasp is meant for one hand, so the four fingertips
 are taken as one, whose frame stands at the mean of the contacts and whose joints slide the
 fingertips. What such messages have no fields for is under `fingertips`.
 
@@ -258,7 +258,7 @@ def export_grasps(
     """Write the grasps of a plan for another program, as one file; equal plans give equal bytes.
 
     `moveit` is YAML with the fields of ROS messages, which needs the extra of that name, and `gltf`
-    a binary glTF scene; docs/exports.md describes them.
+    a binary glTF scene; docs/files.md describes them.
 
     Args:
         plan: A plan, as `gc.plan` or `gc.load_grasps` returns it; a slice or what `plan.filter`

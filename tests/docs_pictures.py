@@ -12,12 +12,24 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import trimesh
 from PIL import Image
 
 import grasp_core as gc
 import scenes
+from scenes.drawing.painting import Shape, View, best_view
 from scenes.drawing.panels import Entry, Panel, Scale, keyed
-from scenes.drawing.pictures import Drawing, grasp_figure
+from scenes.drawing.pictures import (
+    CONE_LENGTH,
+    SIDE,
+    Drawing,
+    cone_sides,
+    finger_size,
+    glass,
+    grasp_figure,
+    pin,
+    sheet_of,
+)
 from scenes.drawing.sheets import (
     BAD,
     FINGERS,
@@ -35,6 +47,7 @@ from scenes.drawing.sheets import (
     png_of,
 )
 from scenes.mujoco.held_scene import SAMPLE_S
+from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.bench import HeldBench
@@ -74,10 +87,7 @@ def families():
     """A grasp of each of the paper's families, side by side."""
     sheets = []
     for case in FAMILIES:
-        sheet = Drawing(*best(*case), case[2]).sheet()
-        title = Words(0.5 * sheet.width, 14.0, case[1], "middle", 16.0, bold=True)
-        marks = [moved(mark, np.array([0.0, TITLE])) for mark in sheet.marks]
-        sheets.append(Sheet(sheet.width, sheet.height + TITLE, case[1], (*marks, title)))
+        sheets.append(titled(Drawing(*best(*case), case[2]).sheet(), case[1]))
     return beside(sheets)
 
 
@@ -229,6 +239,62 @@ def hardest(body, grasp, mass_kg):
     return found
 
 
+def block(*, notched=False):
+    """The mesh of a tapered block [mm]; or with a notch in its upper edge, under a contact."""
+    bottom = [(x, y, 0.0) for x in (-30.0, 30.0) for y in (-20.0, 20.0)]
+    top = [(x, y, 35.0) for x in (-12.0, 24.0) for y in (-14.0, 14.0)]
+    mesh = trimesh.PointCloud(bottom + top).convex_hull
+    if not notched:
+        return mesh
+    cut = trimesh.creation.box(bounds=((-3.0, -20.0, 26.0), (13.0, -8.0, 46.0)))
+    return trimesh.boolean.difference([mesh, cut], engine="manifold")
+
+
+def changed():
+    """A block before and after somebody has cut a notch where a finger stood."""
+    before, after = (
+        gc.Polyhedron.from_mesh(0.001 * mesh.vertices, mesh.faces, name="block")
+        for mesh in (block(), block(notched=True))
+    )
+    plan = gc.plan(before, 0.4, limit=3)
+    drawing = Drawing(before, plan["c-0-1-2-3"], 0.4)
+    shapes, view = drawing.shapes(), View.of_angles(-60.0, 25.0, before)
+    sheets = []
+    for title, body in (("before", before), ("after: c-0-1-2-3 is gone", after)):
+        shown = (*glass(body), *shapes[len(glass(before)) :])
+        sheet = sheet_of(shown, before, view, title, numbers=drawing.numbers(), side=SIDE)
+        sheets.append(titled(sheet, title))
+    return beside(sheets)
+
+
+def titled(sheet, title):
+    """A sheet with a title above it."""
+    marks = [moved(mark, np.array([0.0, TITLE])) for mark in sheet.marks]
+    words = Words(0.5 * sheet.width, 14.0, title, "middle", 16.0, bold=True)
+    return Sheet(sheet.width, sheet.height + TITLE, title, (*marks, words))
+
+
+def rows():
+    """A grasp and the negative controls that a dataset has beside it, with their contacts."""
+    body, grasp = best("wedge", "pencil", FRICTION)
+    size, view = finger_size(body), best_view(body, grasp)
+    cases = [("grasp", grasp.contacts, FRICTION)]
+    for each in negative_controls(body, grasp, FRICTION, seed=0):
+        cases.append((each.name, each.contacts, each.friction))
+    sheets = []
+    for name, contacts, friction in cases:
+        shapes = [*glass(body), Shape("contact", points=np.array([c.position for c in contacts]))]
+        for contact in contacts:
+            finger = int(np.linalg.norm(grasp.normals - contact.normal, axis=1).argmin())
+            shapes += pin(finger, contact.position, contact.normal, size)
+            sides = cone_sides(
+                contact.position, contact.normal, math.atan(friction), CONE_LENGTH * size
+            )
+            shapes.append(Shape("force cone", finger, polygons=sides))
+        sheets.append(titled(sheet_of(shapes, body, view, name, side=320), name))
+    return beside(sheets)
+
+
 def kept_by_distance():
     """Read the table on misplaced objects, cell by cell."""
     lines = [*BENCHMARKS.read_text(encoding="utf-8").splitlines(), ""]
@@ -241,7 +307,7 @@ PICTURES: dict[str, Callable[[], Sheet]] = {
     make.__name__: make
     for make in (
         families, certificate, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced,
-        trials,
+        trials, changed, rows,
     )
 }  # fmt: skip
 

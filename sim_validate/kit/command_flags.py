@@ -248,7 +248,7 @@ class Export(Spoken):
     grasps: Positional[GraspsFile]
     to: Literal["moveit", "gltf"]
     """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
-    see docs/exports.md."""
+    see docs/files.md."""
     out: Annotated[Path, arg(aliases=("-o",))]
     """File to write, which ends in .yaml for moveit and .glb for gltf."""
     grasp: GraspId = None

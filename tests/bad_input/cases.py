@@ -23,7 +23,7 @@ class Case:
     name: str
     make: Make
     code: int
-    """Exit code that docs/errors.md promises."""
+    """Exit code that docs/commands.md promises."""
     says: tuple[str, ...]
     """In the message: the file or flag, the field, the remedy."""
     environment: tuple[tuple[str, str], ...] = ()
