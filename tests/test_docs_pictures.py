@@ -35,10 +35,6 @@ def apart(figure, picture):
     return np.abs(squares).max()
 
 
-def test_all_pictures_are_made_by_the_script():
-    assert {path.name for path in FOLDER.iterdir()} == {f"{name}.webp" for name in PICTURES}
-
-
 SIMULATED = {"fidelity"}
 
 
