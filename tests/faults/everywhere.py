@@ -1,6 +1,6 @@
 """A command, again and again, in processes that are struck at one step on files after another.
 
-    python -m tests.faults.everywhere kill|full|broken EVERY FOLDER WORD...
+    python -m tests.faults.everywhere kill|full EVERY FOLDER WORD...
 
 `OUT` among the words is a folder of its own each time: `FOLDER/whole` undisturbed, `FOLDER/0` and
 so on struck, each EVERY steps later than the one before. After a kill the same command runs once
@@ -18,7 +18,6 @@ from pathlib import Path
 
 from sim_validate.main import main
 
-NUMBERS = {"full": errno.ENOSPC, "broken": errno.EIO}
 STEPS = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod"}
 SYNC = "fsync"
 WRITING = os.O_WRONLY | os.O_RDWR
@@ -42,7 +41,7 @@ def strike_at(step, kind, folder, tell):
             if kind == "kill":
                 os.kill(os.getpid(), signal.SIGKILL)
             named = () if event == SYNC else (str(details[0]),)
-            raise OSError(NUMBERS[kind], os.strerror(NUMBERS[kind]), *named)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), *named)
 
     sys.addaudithook(strike)
     sync = os.fsync

@@ -1,6 +1,5 @@
 """Killed at any step: files are whole, and the same command again ends as if nothing had been."""
 
-import json
 import os
 import shutil
 import signal
@@ -24,36 +23,6 @@ def planned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("planned")
     assert main([*PLAN, "--out", str(folder)]) == 0
     return folder / "grasps.json"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "least", "every"),
-    [
-        ([*RUN, "--out", "OUT"], 1, 32),
-        ([*RUN, "--no-report", "--traces", "--out", "OUT"], 5, 4),
-        (["export", "GRASPS", "--to", "gltf", "-q", "--out", "OUT/a.glb"], 2, 1),
-        (["regions", "GRASPS", "--max-cones", "64", "-q", "--out", "OUT"], 2, 4),
-        (["baseline", "record", "GRASPS", "--jobs", "1", "-q", "-o", "OUT/a.baseline.json"], 2, 2),
-    ],
-)
-def test_what_is_there_is_whole_and_the_next_run_is_as_undisturbed(
-    words, least, every, planned, everywhere, tmp_path
-):
-    """A folder with a page, one without, a file, proofs, and a file in anybody's folder."""
-    words = [word.replace("GRASPS", str(planned)) for word in words]
-    codes = everywhere("kill", tmp_path, *words, every=every)
-    assert [code for code, _ in codes] == [-signal.SIGKILL] * (len(codes) - 1) + [0]
-    assert len(codes) > least
-    whole = contents(tmp_path / "whole")
-    for step in range(0, every * len(codes), every):
-        struck = tmp_path / f"{step}.struck"
-        for name, data in contents(struck).items() if struck.is_dir() else ():
-            assert UNFINISHED in name or data == whole[name], (step, name)
-        after = contents(tmp_path / str(step))
-        if words[0] in {"baseline", "export"}:  # in anybody's folder, where nothing is cleaned
-            after = {name: data for name, data in after.items() if UNFINISHED not in name}
-        assert after == whole, step
 
 
 @pytest.mark.slow
@@ -82,19 +51,6 @@ def test_what_a_killed_writer_left_goes_with_the_next_command(planned, tmp_path)
     assert main(["scene", str(planned), "--out", str(tmp_path), "-q"]) == 0
     left = {path.name for path in tmp_path.rglob("*") if path.is_file()}
     assert left == {"grasps.json", "c-0-1-2-3.xml", ".mine.json"}
-
-
-@pytest.mark.slow
-def test_a_report_of_what_a_kill_has_left_says_what_is_missing(planned, tmp_path, capsys):
-    shutil.copy(planned, tmp_path)
-    assert main(["validate", str(planned), "--out", str(tmp_path), "-q"]) == 0
-    verdicts = json.loads((tmp_path / "verdicts.json").read_text())
-    (tmp_path / "verdicts.json").write_text(json.dumps(verdicts | {"complete": False}))
-    assert main(["report", str(tmp_path), "-q"]) == 0
-    assert "the run was interrupted" in (tmp_path / "report" / "index.html").read_text()
-    (tmp_path / "grasps.json").unlink()
-    assert main(["report", str(tmp_path), "-q"]) == 4
-    assert "has no grasps.json" in capsys.readouterr().err
 
 
 @pytest.mark.slow
