@@ -1,13 +1,12 @@
-"""No space, or a disk that fails, at any step: one line that names a file, and whole files."""
+"""No space, or a disk that fails: one line that names a file, and whole files."""
 
 import shutil
 import subprocess
 import sys
-from itertools import count
 
 import pytest
 
-from grasp_core.files.text_files import UNFINISHED, write_parts
+from grasp_core.files.text_files import write_parts
 from tests.faults.conftest import CLI, ROOT, contents
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q", "--no-report"]
@@ -23,26 +22,6 @@ def unshared(script):
 def _can_mount(tmp_path):
     if not shutil.which("unshare") or unshared(READ_ONLY.format(tmp_path) + "true").returncode:
         pytest.skip("no file systems of our own here")
-
-
-@pytest.mark.slow
-def test_a_step_that_fails_is_said_with_its_file_and_earlier_files_are_whole(everywhere, tmp_path):
-    codes = everywhere("full", tmp_path, *RUN, "--traces", "--out", "OUT", every=3)
-    whole = contents(tmp_path / "whole")
-    assert len(codes) > 4
-    assert codes[-1] == [0, ""]
-    for step, (code, message) in zip(count(step=3), codes[:-1], strict=False):
-        if contents(tmp_path / str(step)) == whole and code == 0:
-            continue  # there was another way: of two to a nameless file, or of one over a rest
-        assert code == 4, (step, message)
-        assert "No space left" in message
-        assert f"{tmp_path / str(step)}" in message
-        assert len(message.splitlines()) == 1
-        assert UNFINISHED not in message
-        found = tmp_path / str(step)
-        kept = contents(found) if found.is_dir() else {}
-        # what verdicts say when their traces fail is that they are not complete
-        assert all(data == whole[name] for name, data in kept.items() if name != "verdicts.json")
 
 
 @pytest.mark.parametrize("failing", ["os.fsync", "pathlib.Path.replace", "pathlib.Path.chmod"])

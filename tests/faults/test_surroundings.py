@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -40,35 +39,6 @@ def test_surroundings_change_no_byte(usual, graspproof, tmp_path):
     done = graspproof(*RUN, "--out", str(tmp_path / "b"), env=together)
     assert (done.returncode, done.stderr) == (0, "")
     assert contents(tmp_path / "b") == usual
-
-
-NO_FOLDER = """
-import grasp_core.compiled
-grasp_core.compiled.folders = lambda _: ()
-"""
-"""A folder is found wherever tests can run, so that the list of folders is emptied."""
-CLOSED = """
-import grasp_core as gc
-from grasp_core.compiled import compiled, state_of
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS
-found = gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, 0.5)
-print(found.forces.tobytes().hex(), found.margin.hex())
-print(state_of(compiled("grasp_core.solvers.nearest_point_kernel").nearest))
-"""
-
-
-def said_by(script):
-    return subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-
-
-@pytest.mark.slow
-def test_where_no_folder_keeps_an_inner_loop_it_is_compiled_again():
-    there, here = said_by(NO_FOLDER + CLOSED), said_by(CLOSED)
-    assert (there.stderr, here.stderr) == ("", "")
-    *own, kept = here.stdout.splitlines()
-    assert (there.stdout.splitlines(), kept) == ([*own, "not kept"], "kept")
 
 
 def test_letters_that_a_terminal_does_not_have_are_spelled_out(graspproof, tmp_path):
