@@ -55,6 +55,7 @@ def test_the_first_steps_in_a_project_of_somebody_else(first_steps):
     assert "5 passed" in said
 
 
+@pytest.mark.slow
 def test_the_tests_of_the_page_pass(first_steps):
     project = first_steps(1)
     (project / "test_page.py").write_text(block(PAGE, "python"))
