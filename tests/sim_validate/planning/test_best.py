@@ -86,9 +86,9 @@ def planned(tmp_path, *flags):
 
 
 def test_optimised_grasps_are_better_and_their_file_says_by_how_much(tmp_path, capsys):
-    document, saved = planned(tmp_path, "wedge", "--limit", "2", "--optimize", "--ceiling", "20")
+    document, saved = planned(tmp_path, "wedge", "--limit", "1", "--optimize", "--ceiling", "20")
     moves = document["optimization"]
-    assert len(moves) == 2
+    assert len(moves) == 1
     for move in moves:
         before, after = move["ferrari_canny_before"], move["ferrari_canny_after"]
         assert before[0] < before[1] < after[0] < after[1]
@@ -97,7 +97,7 @@ def test_optimised_grasps_are_better_and_their_file_says_by_how_much(tmp_path, c
     qualities = [grasp.ferrari_canny[0] for grasp in saved.grasps]
     assert qualities == sorted(qualities, reverse=True)
     said = capsys.readouterr().out
-    assert "2 of 2 grasps improved; gain from " in said
+    assert "1 of 1 grasps improved; gain from " in said
     assert "upper bound" in said
 
 
@@ -113,11 +113,3 @@ def test_grasps_that_end_at_the_same_contacts_are_kept_once(tmp_path):
         for two in saved.grasps[:i]:
             places = [grasp.positions[np.argsort(grasp.faces)] for grasp in (one, two)]
             assert np.abs(places[0] - places[1]).max() > 0.01 * saved.body.radius
-
-
-def test_optimised_grasps_hold_in_simulation(tmp_path):
-    flags = ["tetrahedron", "--limit", "1", "--optimize", "--out", str(tmp_path)]
-    assert main(["run", *flags, "--no-report"]) == Exit.GOOD
-    verdicts = json.loads((tmp_path / "verdicts.json").read_text())
-    assert all(grasp["held"] for grasp in verdicts["verdicts"])
-    assert (tmp_path / "scenes" / "o-c-0-1-2-3.xml").exists()

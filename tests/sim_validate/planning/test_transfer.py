@@ -87,9 +87,6 @@ def test_its_grasps_go_on_from_there(folder, tmp_path):
     grasps = f"{out}/grasps.json"
     assert main(["validate", grasps, "--limit", "1", "--jobs", "1", "-q"]) == Exit.GOOD
     assert main(["analyze", grasps, "--jobs", "1", "-q"]) == Exit.GOOD
-    baseline = str(tmp_path / "new.baseline.json")
-    asked = ["--limit", "1", "--jobs", "1", "-q"]
-    assert main(["baseline", "record", grasps, "-o", baseline, *asked]) == Exit.GOOD
 
 
 def test_lost_grasps_end_with_1_and_no_grasp_at_all_with_5(folder, tmp_path, capsys):
