@@ -190,6 +190,25 @@ def test_a_part_in_a_baseline_that_is_not_the_recorded_one_is_refused(project):
         _ = suite_from_toml(project / "part.grasps.toml").compared
 
 
+def test_blessing_leaves_out_a_grasp_that_is_gone_and_says_so(project):
+    body = gc.load_polyhedron(project / "part.obj", unit="mm")
+    plan = gc.plan(body, 0.5)
+    high = next(grasp for grasp in plan.grasps if TOP in grasp.faces)
+    other = next(grasp for grasp in plan.grasps if TOP not in grasp.faces)
+    both = dataclasses.replace(plan, grasps=(high, other))
+    write_text(project / "grasps.json", plan_to_json(body, both))
+    toml = project / "part.grasps.toml"
+    write_text(toml, toml.read_text() + "[changed_part]\ndistance_m = 0.0005\n")
+    (project / "part.baseline.json").unlink()
+    edited(project)
+    code, said = run_pytest(project, "--grasp-bless", "--junitxml", "j.xml")
+    assert code == 0, said
+    kept = kept_in(project)
+    assert (kept[f"{other.id}.status"], kept[f"{high.id}.status"]) == ("blessed", "gone")
+    blessed = json.loads((project / "part.baseline.json").read_text())["grasps"]
+    assert [each["id"] for each in blessed] == [other.id]
+
+
 def test_marked_tests_run_on_the_changed_part_and_fail_for_what_is_gone(project):
     edited(project)
     write_text(
