@@ -40,6 +40,7 @@ def test_a_file_that_cannot_be_written_is_named_and_the_old_one_stays(
     assert contents(tmp_path) == {"a.json": b"old"}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_can_mount")
 def test_a_folder_that_takes_no_files_is_refused_before_the_work(tmp_path):
     words = " ".join(f"'{word}'" for word in [*CLI, *RUN, "--out", str(tmp_path)])

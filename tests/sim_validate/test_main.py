@@ -89,17 +89,6 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     assert (here / "graspproof-out" / "wedge" / "verdicts.json").exists()
 
 
-def test_plan_validate_and_scene_work_on_the_same_file(here, capsys):
-    assert main(["plan", "wedge", "--limit", "3", "--out", "p"]) == Exit.GOOD
-    assert main(["validate", "p/grasps.json", "--limit", "2", "--out", "v"]) == Exit.GOOD
-    assert main(["scene", "p/grasps.json", "--out", "s"]) == Exit.GOOD
-    assert len(list((here / "s").iterdir())) == 3
-    capsys.readouterr()
-    name = json.loads((here / "p" / "grasps.json").read_text())["grasps"][0]["id"]
-    assert main(["scene", "p/grasps.json", "--grasp", name]) == Exit.GOOD
-    assert capsys.readouterr().out == (here / "s" / f"{name}.xml").read_text()
-
-
 def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
     """To the last digit: whatever is simulated was planned with digits that solvers agree on."""
     monkeypatch.setattr(processes, "UNITS_PER_PROCESS", 2)
@@ -114,7 +103,8 @@ def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
 @pytest.mark.usefixtures("here")
 def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
     commands = {
-        "plan wedge --limit 1 --out p": 0, "report p": 0, "scene p/grasps.json --out s": 0,
+        "objects": 0, "plan wedge --limit 1 --out p": 0, "report p": 0,
+        "scene p/grasps.json --out s": 0,
         "plan box --families pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
     }  # fmt: skip
     for command, code in commands.items():
@@ -299,6 +289,9 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     saved = json.loads((here / "r" / "grasps.json").read_text())
     assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
     assert saved["finger"] == {"radius_m": 0.004, "approach_m": 0.03}
+    assert main(["validate", "r/grasps.json", "--out", "again"]) == Exit.GOOD
+    again = json.loads((here / "again" / "verdicts.json").read_text())["verdicts"][0]
+    assert again["scale"]["fingers"]["radius_m"] == 0.004
     assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
     said = capsys.readouterr().out
     assert "Its surface is curved: fingers may stand on 20 nearly flat" in said

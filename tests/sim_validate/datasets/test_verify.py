@@ -156,6 +156,7 @@ def test_with_other_rounding_verdicts_and_critical_frictions_count(copy):
     assert "critical_friction is" in fault
 
 
+@pytest.mark.slow
 def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
     for folder, sides in (("a", (0.04, 0.05, 0.06)), ("b", (0.04, 0.05, 0.07))):
         (tmp_path / folder).mkdir()

@@ -84,6 +84,7 @@ def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
     assert "no regions for 1 of 1 grasps: " in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, capsys):
     grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
     frictions = sorted(grasp["critical_friction"] for grasp in grasps)
@@ -161,6 +162,7 @@ def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
     assert not list((tmp_path / "proofs").iterdir())
 
 
+@pytest.mark.slow
 def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path):
     saved = grasps_from_json((folder / "grasps.json").read_text())
     asked = ["regions", str(folder / "grasps.json"), "--max-cones", "300", "--out", str(tmp_path)]

@@ -18,7 +18,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     task = {"wrenches": [{"name": "too much", "force_n": [0, 0, 90]}]}
     (folder / "task.json").write_text(json.dumps(task))
-    planned = ["plan", "screwdriver", "--limit", "2", "--out", str(folder), "-q"]
+    planned = ["plan", "screwdriver", "--limit", "1", "--out", str(folder), "-q"]
     assert main(planned) == Exit.GOOD
     trials = ("--wrenches", str(folder / "task.json"), "--seed", "3", "--repeats", "2")
     grasps = str(folder / "grasps.json")
