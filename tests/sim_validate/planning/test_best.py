@@ -86,9 +86,9 @@ def planned(tmp_path, *flags):
 
 
 def test_optimised_grasps_are_better_and_their_file_says_by_how_much(tmp_path, capsys):
-    document, saved = planned(tmp_path, "wedge", "--limit", "1", "--optimize", "--ceiling", "20")
+    document, saved = planned(tmp_path, "wedge", "--limit", "2", "--optimize", "--ceiling", "20")
     moves = document["optimization"]
-    assert len(moves) == 1
+    assert len(moves) == 2
     for move in moves:
         before, after = move["ferrari_canny_before"], move["ferrari_canny_after"]
         assert before[0] < before[1] < after[0] < after[1]
@@ -97,7 +97,7 @@ def test_optimised_grasps_are_better_and_their_file_says_by_how_much(tmp_path, c
     qualities = [grasp.ferrari_canny[0] for grasp in saved.grasps]
     assert qualities == sorted(qualities, reverse=True)
     said = capsys.readouterr().out
-    assert "1 of 1 grasps improved; gain from " in said
+    assert "2 of 2 grasps improved; gain from " in said
     assert "upper bound" in said
 
 
