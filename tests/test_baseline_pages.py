@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.files.records import keys
 from grasp_core.settings import for_users
-from sim_validate.baselines.baseline import Entry, ExecutedFigures
-from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import Suite, suite_from_toml
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -58,6 +55,7 @@ def test_the_first_steps_in_a_project_of_somebody_else(first_steps):
     assert "3 passed" in said
 
 
+@pytest.mark.slow
 def test_the_tests_of_the_page_pass(first_steps):
     project = first_steps(1)
     (project / "test_page.py").write_text(block(PAGE, "python"))
@@ -91,10 +89,3 @@ def test_all_settings_are_shown(tmp_path):
     assert suite.noise == dataclasses.replace(Noise(), friction=0.1)
     assert suite.survives
     assert suite.execution.trials == ("weight", "lift")
-
-
-def test_all_fields_and_all_answers_are_described():
-    for key in (*keys(Entry), *keys(ExecutedFigures)):
-        assert f"`{key}`" in PAGE
-    for status in Status:
-        assert f"`{status.value}`" in PAGE

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from scenes.drawing.sheets import png_of
-from tests.docs_pictures import FOLDER, PAGES, PICTURES
+from tests.docs_pictures import FOLDER, PICTURES
 from tests.scenes.drawing.whole import assert_whole
 
 BLOCK = 16
@@ -33,11 +33,6 @@ def apart(figure, picture):
     whole = difference[: rows * BLOCK, : columns * BLOCK]
     squares = whole.reshape(rows, BLOCK, columns, BLOCK, 3).mean(axis=(1, 3))
     return np.abs(squares).max()
-
-
-def test_all_pictures_are_made_by_the_script():
-    names = {f"{name}.webp" for name in (*PICTURES, *PAGES)}
-    assert {path.name for path in FOLDER.iterdir()} == names
 
 
 SIMULATED = {"fidelity", "trials"}

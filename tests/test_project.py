@@ -1,30 +1,19 @@
-"""Version, package page and what a wheel holds."""
+"""The package page and what a wheel holds."""
 
 import re
 import subprocess
 import sys
-import tomllib
 import zipfile
 from email import message_from_bytes
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-import yaml
 
 import grasp_core as gc
 
 ROOT = Path(__file__).parent.parent
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
-
-
-def test_the_version_stands_in_one_place_and_in_the_citation():
-    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
-    assert cited["version"] == gc.__version__
-    assert cited["license"] == PROJECT["license"]
-    assert "version" in PROJECT["dynamic"]
-    assert "version" not in PROJECT
 
 
 @pytest.mark.slow

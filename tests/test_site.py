@@ -1,6 +1,5 @@
 """The pages of docs/ become a site that can be read anywhere."""
 
-import json
 import re
 import shlex
 import subprocess
@@ -32,13 +31,9 @@ def site(tmp_path_factory):
     return folder
 
 
-def test_every_page_and_notebook_is_in_the_site_and_can_be_searched(site):
-    sources = [path.relative_to(DOCS) for kind in ("*.md", "*.ipynb") for path in DOCS.rglob(kind)]
-    index = (site / "searchindex.js").read_text()
-    found = json.loads(index.partition("(")[2].rpartition(")")[0])["docnames"]
-    assert sorted(found) == sorted(str(path.with_suffix("")) for path in sources)
-    for path in sources:
-        assert (site / path).with_suffix(".html").is_file()
+def test_every_page_and_notebook_is_in_the_site(site):
+    for path in (path for kind in ("*.md", "*.ipynb") for path in DOCS.rglob(kind)):
+        assert (site / path.relative_to(DOCS)).with_suffix(".html").is_file()
 
 
 def test_the_site_describes_every_public_function_and_class(site):

@@ -1,4 +1,3 @@
-import json
 import os
 import subprocess
 import sys
@@ -26,29 +25,6 @@ def graspproof():
         return subprocess.run(
             [*CLI, *words], env=environment, text=True, timeout=HANGING_S, check=False, **given
         )
-
-    return run
-
-
-@pytest.fixture(scope="session")
-def everywhere():
-    """Exit codes and messages of a command that is struck at one step after another."""
-
-    def run(kind, folder, *words, every=1):
-        command = [
-            sys.executable,
-            "-m",
-            "tests.faults.everywhere",
-            kind,
-            str(every),
-            str(folder),
-            *words,
-        ]
-        done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, timeout=HANGING_S, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
 
     return run
 

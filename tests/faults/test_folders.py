@@ -1,16 +1,21 @@
-"""Folders that are none, are taken, have strange names, or hold results of something else."""
+"""Folders that are taken, have strange names, or hold what others or killed commands left."""
 
 import fcntl
 import json
 import os
 import shutil
+import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 
+from grasp_core.files.text_files import UNFINISHED
 from sim_validate.kit.files import alone_in
 from sim_validate.main import main
-from tests.faults.conftest import contents
+from tests.faults.conftest import CLI, ROOT, contents
 
 PLAN = ["plan", "tetrahedron", "--families", "concurrent", "-q"]
 
@@ -24,14 +29,12 @@ def test_a_file_in_place_of_a_folder_is_refused(command, below, tmp_path, capsys
     assert contents(tmp_path) == {"file": b"mine"}
 
 
-NAMES = ["a" * 255, "a\nb", os.fsdecode(b"\xff\xfe")]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["a" * 255, "a\nb", os.fsdecode(b"\xff\xfe")])
 def test_strange_names_are_names(name, tmp_path, capsys):
     folder = tmp_path / name
-    assert main(["run", "tetrahedron", "--limit", "1", "--out", str(folder)]) == 0
+    assert main([*PLAN, "--out", str(folder)]) == 0
+    assert main(["report", str(folder)]) == 0
     assert (folder / "report" / "index.html").is_file()
     assert all(line.isprintable() for line in capsys.readouterr().out.splitlines())
 
@@ -56,23 +59,16 @@ def test_only_folders_that_were_made_for_nothing_go_again(tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-def test_a_new_plan_removes_what_was_told_of_another(tmp_path):
-    out = str(tmp_path)
-    assert main(["run", "tetrahedron", "--limit", "1", "--traces", "-q", "--out", out]) == 0
-    (tmp_path / "notes.txt").write_text("mine")
-    assert main([*PLAN, "--friction", "0.4", "--out", out]) == 0
-    assert set(contents(tmp_path)) == {"grasps.json", "notes.txt"}
-
-
-def test_results_about_ids_of_peoples_own_are_removed_as_well(tmp_path):
-    """Other files stay, even where they end as results do."""
+def test_a_new_plan_removes_results_about_another_and_nothing_else(tmp_path):
+    """Those about ids of people's own as well; other files stay, even if they end as results do."""
     out, grasps = str(tmp_path), tmp_path / "grasps.json"
     assert main([*PLAN, "--limit", "1", "--out", out]) == 0
     document = json.loads(grasps.read_text())
     document["grasps"][0]["id"] = "mine-1"
     grasps.write_text(json.dumps(document))
     assert main(["validate", str(grasps), "--traces", "-q", "--out", out]) == 0
-    assert main(["regions", str(grasps), "-q", "--out", out]) == 0
+    certify = ["regions", str(grasps), "--max-cones", "64", "-q"]
+    assert main([*certify, "--out", out]) == 0
     assert main(["scene", str(grasps), "-q", "--out", str(tmp_path / "scenes")]) == 0
     results = {"traces/mine-1.npz", "proofs/mine-1.npz", "scenes/mine-1.xml"}
     own = {"traces/own.npz", "proofs/own.npz", "scenes/own.xml"}
@@ -83,22 +79,54 @@ def test_results_about_ids_of_peoples_own_are_removed_as_well(tmp_path):
     assert set(contents(tmp_path)) == own | {"grasps.json"}
 
 
-@pytest.mark.slow
-def test_verdicts_of_other_grasps_are_noticed(tmp_path, capsys):
-    for name in ("tetrahedron", "wedge"):
-        out = str(tmp_path / name)
-        assert main(["run", name, "--limit", "1", "--no-report", "-q", "--out", out]) == 0
-    shutil.copy(tmp_path / "wedge" / "verdicts.json", tmp_path / "tetrahedron")
-    capsys.readouterr()
-    assert main(["report", str(tmp_path / "tetrahedron"), "-q"]) == 4
-    assert "is about another object" in capsys.readouterr().err
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("planned")
+    assert main([*PLAN, "--out", str(folder)]) == 0
+    return folder / "grasps.json"
+
+
+def test_what_a_killed_writer_left_goes_with_the_next_command(planned, tmp_path):
+    for part in ("", "scenes", "report", "report/grasps"):
+        (tmp_path / part).mkdir(exist_ok=True)
+        (tmp_path / part / f".a.json{UNFINISHED}x7y.json").write_text("{")
+        (tmp_path / part / f".report{UNFINISHED}x7y").mkdir()
+        (tmp_path / part / f".report{UNFINISHED}x7y" / "index.html").write_text("half")
+    shutil.copy(planned, tmp_path)
+    (tmp_path / ".mine.json").write_text("{}")
+    assert main(["scene", str(planned), "--out", str(tmp_path), "-q"]) == 0
+    left = {path.name for path in tmp_path.rglob("*") if path.is_file()}
+    assert left == {"grasps.json", "c-0-1-2-3.xml", ".mine.json"}
 
 
 @pytest.mark.slow
-def test_a_clock_that_jumps_changes_nothing(tmp_path, monkeypatch):
-    run = ["run", "tetrahedron", "--limit", "1", "-q", "--out"]
-    assert main([*run, str(tmp_path / "a")]) == 0
-    times = iter(range(10**9, 0, -(10**6)))
-    monkeypatch.setattr(time, "time", lambda: float(next(times, -1.0)))
-    assert main([*run, str(tmp_path / "b")]) == 0
-    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+@pytest.mark.skipif(sys.platform != "linux", reason="children are found in /proc")
+def test_processes_end_with_the_command_that_is_killed(tmp_path):
+    words = ["run", "icosahedron", "--limit", "200", "--jobs", "3", "--out", str(tmp_path), "-q"]
+    process = subprocess.Popen([*CLI, *words], env=os.environ | {"PYTHONPATH": str(ROOT)})
+    workers = set()
+    while len(workers) < 2 and process.poll() is None:
+        time.sleep(0.02)
+        workers = {child for child in children(process.pid) if seconds_worked(child) >= 1.0}
+    process.kill()
+    assert process.wait() == -signal.SIGKILL, "the command ended before two processes worked"
+    deadline = time.monotonic() + 60.0
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
+        assert time.monotonic() < deadline, "a process outlived the command"
+        time.sleep(0.2)
+
+
+def children(parent):
+    found = set()
+    for task in Path(f"/proc/{parent}/task").glob("*/children"):
+        found |= {int(word) for word in task.read_text().split()}
+    return found
+
+
+def seconds_worked(process):
+    """Processor time that a process has used; 0 for one that has ended."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -23,6 +23,7 @@ from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.patience import HANGING_S
 
 ROOT = Path(__file__).parent.parent.parent
+WORDS = {" ".join(line.split()[: COMMAND_WORDS.get(line.split()[0], 1)]) for line in EXAMPLES}
 
 
 @pytest.fixture
@@ -49,7 +50,8 @@ def test_run_writes_grasps_verdicts_and_scenes_and_tells(here, capsys):
 
 
 def test_a_second_run_leaves_nothing_of_the_first_behind(here):
-    assert main(["run", "box", "--limit", "1", "--out", "results", "-q"]) == Exit.GOOD
+    first = ["run", "tetrahedron", "--families", "concurrent", "--limit", "1"]
+    assert main([*first, "--out", "results", "-q"]) == Exit.GOOD
     kept = here / "results" / "scenes" / "mine.xml"
     kept.write_text("<mujoco/>")
     nothing = ["--cones", "normal", "--families", "concurrent", "--out", "results", "-q"]
@@ -87,17 +89,6 @@ def test_a_verdict_has_the_fields_that_users_rely_on(here, capsys):
     assert (here / "graspproof-out" / "wedge" / "verdicts.json").exists()
 
 
-def test_plan_validate_and_scene_work_on_the_same_file(here, capsys):
-    assert main(["plan", "wedge", "--limit", "3", "--out", "p"]) == Exit.GOOD
-    assert main(["validate", "p/grasps.json", "--limit", "2", "--out", "v"]) == Exit.GOOD
-    assert main(["scene", "p/grasps.json", "--out", "s"]) == Exit.GOOD
-    assert len(list((here / "s").iterdir())) == 3
-    capsys.readouterr()
-    name = json.loads((here / "p" / "grasps.json").read_text())["grasps"][0]["id"]
-    assert main(["scene", "p/grasps.json", "--grasp", name]) == Exit.GOOD
-    assert capsys.readouterr().out == (here / "s" / f"{name}.xml").read_text()
-
-
 def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
     """To the last digit: whatever is simulated was planned with digits that solvers agree on."""
     monkeypatch.setattr(processes, "UNITS_PER_PROCESS", 2)
@@ -112,13 +103,9 @@ def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
 @pytest.mark.usefixtures("here")
 def test_json_output_is_one_document_and_the_rest_goes_elsewhere(capsys):
     commands = {
-        "plan wedge --limit 1 --out p": 0, "inspect box": 0, "objects": 0,
-        "run tetrahedron --limit 1 --no-report": 0, "doctor": 0,
-        "report graspproof-out/tetrahedron": 0,
-        "run box --families pencil --cones normal": 5,
-        "plan box --families pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
+        "objects": 0, "plan wedge --limit 1 --out p": 0, "report p": 0,
         "scene p/grasps.json --out s": 0,
-        "scene p/grasps.json --grasp c-0-1-2-7": 0,
+        "plan box --families pencil --cones normal --out b": 5, "validate b/grasps.json": 5,
     }  # fmt: skip
     for command, code in commands.items():
         assert main([*command.split(), "--json"]) == code
@@ -242,6 +229,7 @@ def test_control_characters_in_a_name_do_not_reach_the_terminal(here, capsys):
     assert "\x1b[31m" not in shown.out + shown.err
 
 
+@pytest.mark.slow
 def test_graphics_that_are_not_here_are_named():
     code = "from sim_validate.main import run_and_exit; run_and_exit()"
     done = subprocess.run(
@@ -253,6 +241,7 @@ def test_graphics_that_are_not_here_are_named():
     assert "internal error" not in done.stderr
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_keeps_what_is_done(here):
     """SIGINT while simulating: exit code 130, a whole grasps.json, verdicts marked incomplete."""
     code = (
@@ -289,25 +278,20 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
 
     vertices, triangles = bumpy_ellipsoid(noise=0.001, subdivisions=3)
     trimesh.Trimesh(1e3 * vertices, triangles[5:], process=False).export(here / "scan.ply")
-    flags = ["--unit", "mm", "--patches.most", "10", "--limit", "2", "--out", "r"]
+    flags = ["--unit", "mm", "--patches.most", "10", "--limit", "1", "--out", "r"]
     fingers = ["--finger-radius-m", "0.004", "--approach-m", "0.03"]
-    assert main(["run", "scan.ply", *flags, *fingers]) == Exit.GOOD
+    assert main(["run", "scan.ply", *flags, *fingers, "--no-report"]) == Exit.GOOD
     shown = capsys.readouterr()
     assert "no finger is placed there" in shown.err
-    assert "2 of 2 grasps held" in shown.out
+    assert "1 of 1 grasps held" in shown.out
     verdict = json.loads((here / "r" / "verdicts.json").read_text())["verdicts"][0]
     assert verdict["scale"]["fingers"]["radius_m"] == 0.004
     saved = json.loads((here / "r" / "grasps.json").read_text())
     assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
     assert saved["finger"] == {"radius_m": 0.004, "approach_m": 0.03}
-    assert main(["validate", "r/grasps.json", "--limit", "1", "--out", "again"]) == Exit.GOOD
+    assert main(["validate", "r/grasps.json", "--out", "again"]) == Exit.GOOD
     again = json.loads((here / "again" / "verdicts.json").read_text())["verdicts"][0]
     assert again["scale"]["fingers"]["radius_m"] == 0.004
-    capsys.readouterr()
-    assert main(["inspect", "scan.ply", "--unit", "mm", "--json"]) == Exit.GOOD
-    facts = json.loads(capsys.readouterr().out)
-    assert facts["patches"]["most"] == 20
-    assert 0.0 < facts["largest_spread_deg"] <= 10.0
     assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
     said = capsys.readouterr().out
     assert "Its surface is curved: fingers may stand on 20 nearly flat" in said
@@ -391,9 +375,6 @@ def test_a_file_of_results_is_no_object(capsys, command):
     assert "validate` and `execute` read a grasps.json" in capsys.readouterr().err
 
 
-WORDS = {" ".join(line.split()[: COMMAND_WORDS.get(line.split()[0], 1)]) for line in EXAMPLES}
-
-
 @pytest.mark.parametrize("words", sorted(WORDS))
 def test_help_on_a_command_shows_examples_that_can_be_typed(monkeypatch, capsys, words):
     assert main([*words.split(), "--help"]) == Exit.GOOD
@@ -405,9 +386,3 @@ def test_help_on_a_command_shows_examples_that_can_be_typed(monkeypatch, capsys,
     for line in shown:
         assert main(shlex.split(line)[1:]) == Exit.GOOD
     assert len(asked) == len(shown) > 0
-
-
-def test_every_command_has_examples(capsys):
-    assert len(WORDS) == len(commands.ACTIONS)
-    assert main(["--help"]) == Exit.GOOD
-    assert "examples:" not in capsys.readouterr().out

@@ -47,6 +47,7 @@ def test_a_scene_of_which_mujoco_warns_leaves_nothing(noisy, empty, capfd):
     assert not list(empty.iterdir())
 
 
+@pytest.mark.slow
 def test_commands_write_where_they_are_told(empty, tmp_path):
     out, grasps = str(tmp_path / "out"), str(tmp_path / "out" / "grasps.json")
     assert main(["plan", "l-bracket", "--limit", "1", "--out", out, "-q"]) == Exit.GOOD

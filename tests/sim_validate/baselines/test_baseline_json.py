@@ -6,18 +6,15 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.figures import compared
 from grasp_core.files.text_files import write_text
 from sim_validate.baselines.baseline import (
     Baseline,
     Entry,
-    VerdictFigures,
     read_baseline,
     write_baseline,
 )
-from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.traces import Outcome
-from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, FIGURES, entry
+from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, entry
 from tests.sim_validate.rigs import grasps
 
 
@@ -64,15 +61,6 @@ def test_what_is_no_baseline_is_refused_with_the_field(tmp_path, text, message):
     with pytest.raises(gc.InputError, match=message) as raised:
         read_baseline(path)
     assert str(raised.value).startswith(f"{path}: ")
-
-
-def test_an_entry_keeps_the_figures_that_verdicts_declare():
-    kept = compared(VerdictFigures)
-    assert [each.name for each in kept] == [each.name for each in compared(Verdict)]
-    assert {each.name: each.of(FIGURES) for each in kept} == {
-        name: value for name, value in ENTRY.properties().items()
-        if name not in ("id", "contacts_sha256")
-    } | {"not_held": (), "noisy_not_held": (3, 50), "noisy_close": (7, 50)}  # fmt: skip
 
 
 def test_only_baselines_are_overwritten(tmp_path):

@@ -2,20 +2,15 @@
 
 import dataclasses
 import math
-from typing import Annotated
 
 import pytest
 
-from grasp_core.declared import Declared
-from grasp_core.figures import Compared, Kept, Shown, figure, keeps, less
-from sim_validate.baselines.baseline import Baseline, Entry, How, VerdictFigures, in_baselines
+from sim_validate.baselines.baseline import Baseline, Entry, How, VerdictFigures
 from sim_validate.baselines.compare import (
-    OTHER_PROCESSOR,
     OTHER_VERSIONS,
     Carried,
     Status,
     compare,
-    differing_figures,
     failing,
 )
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
@@ -288,64 +283,3 @@ def test_a_grasp_that_was_gone_already_when_the_baseline_was_written_is_the_same
     assert (other.id, other.status) == ("c-9-9-9-9", Status.SAME)
     (_, other) = compare(BEFORE, now(OTHER_PART), carried=gone)
     assert other.status is Status.GONE
-
-
-@dataclasses.dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Trial(Declared):
-    """What a class that nobody here knows declares of its figures."""
-
-    id: Annotated[str, Shown("trial", compared=None)]
-    grip: Annotated[float, Shown("grip")]
-    way_m: Annotated[float, Compared(less)]
-    load: Annotated[float | None, Compared(less, analysed=True)] = None
-    tips: Annotated[tuple[Declared, ...], Compared(less, "fingertips")] = ()
-
-    @figure
-    def stuck(self) -> Annotated[bool, Compared(less)]:
-        """Whether nothing slid."""
-        return self.grip > 1.0
-
-
-@keeps(in_baselines(Trial))
-class TrialFigures(Kept):
-    """The figures of a trial."""
-
-
-def differing(before, after, bands=OTHER_VERSIONS):
-    kept = [TrialFigures.of(each) for each in (before, after)]
-    return {
-        each.text.split(":")[0]: (each.worse, each.counts)
-        for each in differing_figures(*kept, bands)
-    }
-
-
-USUAL = Trial("a", 2.0, 0.1, 4.0)
-
-
-@pytest.mark.parametrize(
-    ("changed", "expected"),
-    [
-        ({"id": "b"}, {}),
-        ({"grip": 2.09}, {"grip": (True, False)}),
-        ({"grip": 2.11}, {"grip": (True, True)}),
-        ({"grip": 1.89}, {"grip": (True, True)}),
-        ({"grip": 0.9}, {"grip": (True, True), "stuck": (True, True)}),
-        ({"way_m": 0.1001}, {"way_m": (False, False)}),
-        ({"way_m": 0.09}, {"way_m": (True, True)}),
-        ({"load": 4.5}, {"load": (False, True)}),
-        ({"load": None}, {"load": (True, True)}),
-        ({"tips": (USUAL,)}, {"fingertips": (False, True)}),
-    ],
-)
-def test_what_a_class_declares_is_kept_and_compared_as_it_says(changed, expected):
-    """A figure that says nothing of it is like a simulated one, and each change of it is worse."""
-    assert differing(USUAL, dataclasses.replace(USUAL, **changed)) == expected
-
-
-def test_the_analysis_depends_less_on_rounding_than_the_simulation():
-    assert differing(USUAL, dataclasses.replace(USUAL, load=4.001), OTHER_PROCESSOR) == {
-        "load": (False, True)
-    }
-    assert differing(USUAL, dataclasses.replace(USUAL, grip=2.001), OTHER_PROCESSOR) == {
-        "grip": (True, False)
-    }

@@ -21,10 +21,10 @@ SMALL = DatasetConfig(
 LEARNED = DatasetConfig(
     objects=("tetrahedron", "wedge"), families=("concurrent",), limit=1,
     execution=sv.ExecutionSettings(
-        mass_kg=1.0, trials=("weight", "misplaced"), misplacements=2
+        mass_kg=1.0, trials=("weight", "misplaced"), misplacements=1
     ),
     learning=Learning(
-        friction_below=1, friction_near=2, friction_above=1, moved_out=2, mass_near=1, synthetic=1,
+        friction_below=1, friction_near=1, friction_above=1, moved_out=1, mass_near=1, synthetic=1,
         figures=("closure", "least_squeeze"), seeds=(7,), hand="leap",
     ),
 )  # fmt: skip

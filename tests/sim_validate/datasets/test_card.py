@@ -61,24 +61,6 @@ def test_the_header_says_where_each_table_and_split_is(folder):
     assert seen == set(folder.glob("data/*/*.parquet"))
 
 
-def test_every_column_is_documented_with_its_unit(folder):
-    _, body = split_card((folder / CARD).read_text())
-    count = 0
-    for name, columns in TABLES.items():
-        section = body.split(f"\n### {name}\n")[1].split("\n## ")[0].split("\n### ")[0]
-        rows = [
-            [cell.strip() for cell in line.strip("|").split("|")]
-            for line in section.splitlines()
-            if line.startswith("| `")
-        ]
-        assert [row[0] for row in rows] == [f"`{each.name}`" for each in columns]
-        for row, column in zip(rows, columns, strict=True):
-            assert row[2] == column.unit
-            assert row[3].startswith(column.meaning)
-            count += 1
-    assert count == sum(map(len, TABLES.values()))
-
-
 @pytest.mark.parametrize("text", HOSTILE)
 def test_words_of_the_user_stay_words(manifest, text):
     config = dataclasses.replace(SMALL, title=text, creator=text, url=text, license=text)

@@ -10,7 +10,7 @@ import pytest
 import sim_validate as sv
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from tests.sim_validate.datasets.engines import contents
+from tests.sim_validate.datasets.engines import contents, here
 
 pytest.importorskip("pyarrow")
 LIGHT = ("--frictions", "0.5", "--families", "concurrent", "--limit", "1")
@@ -20,7 +20,10 @@ OBJECTS = ("tetrahedron", "wedge")
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made") / "ds"
-    assert main(["dataset", "build", *OBJECTS, *LIGHT, "--out", str(folder), "-q"]) == Exit.GOOD
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("sim_validate.datasets.command.local_processes", here)
+        words = ["dataset", "build", *OBJECTS, *LIGHT, "--out", str(folder), "-q"]
+        assert main(words) == Exit.GOOD
     return folder
 
 
@@ -55,7 +58,6 @@ def test_a_changed_file_is_named(dataset, tmp_path, capsys):
 
 @pytest.mark.usefixtures("built_here")
 def test_a_toml_file_says_the_same_as_flags(dataset, tmp_path):
-    """The flags were given to a command that begins processes."""
     settings = tmp_path / "ds.toml"
     settings.write_text((dataset / "config.toml").read_text())
     folder = tmp_path / "ds"
@@ -69,9 +71,9 @@ def test_a_toml_file_says_the_same_as_flags(dataset, tmp_path):
 def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "bad.stl").write_text("solid nothing")
-    names = ["tetrahedron", str(tmp_path / "meshes"), *LIGHT, "--frictions", "0.4,0.5"]
+    names = ["tetrahedron", str(tmp_path / "meshes"), *LIGHT]
     code = main(["dataset", "build", *names, "--out", str(tmp_path / "ds")])
     assert code == Exit.PARTIAL
     assert "quarantine.jsonl" in capsys.readouterr().err
-    (first, second) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
-    assert json.loads(first)["object"] == json.loads(second)["object"]
+    (line,) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
+    assert json.loads(line)["object"].endswith("bad.stl")

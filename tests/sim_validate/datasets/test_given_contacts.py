@@ -11,7 +11,6 @@ import sim_validate
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.isaac import export
 from sim_validate.datasets.units import read_given
 from sim_validate.datasets.verify import verify
 from sim_validate.kit.exit_codes import Exit
@@ -24,7 +23,7 @@ BODY = example_object("wedge")
 
 @pytest.fixture(scope="module")
 def planned():
-    return gc.plan(BODY, 0.5, families=("concurrent",), limit=4).grasps
+    return gc.plan(BODY, 0.5, families=("concurrent",), limit=2).grasps
 
 
 def contacts_file(path, grasps):
@@ -47,17 +46,17 @@ def written(path, grasps):
     return contacts_file(path, [(each.id, each.positions, each.normals) for each in grasps])
 
 
-def judged(folder, path, **settings):
+def judged(folder, path, share=0.0, **settings):
     config = DatasetConfig(objects=("wedge",), contacts=str(path), **settings)
     build(config, folder, Here(), silent)
-    assert verify(folder, 1.0) == []
+    assert verify(folder, share) == []
     grasps = sim_validate.load_dataset(folder)["grasps"]
     mine = grasps["label"] == "given"
     return {name: column[mine] for name, column in grasps.items()}
 
 
 def test_planned_grasps_that_come_back_are_judged_as_they_were(planned, tmp_path):
-    found = judged(tmp_path / "ds", written(tmp_path / "g.json", planned))
+    found = judged(tmp_path / "ds", written(tmp_path / "g.json", planned), share=1.0)
     assert list(found["name"]) == [grasp.id for grasp in planned]
     assert found["held"].all()
     assert found["force_closed"].all()
@@ -133,8 +132,8 @@ def test_three_contacts_and_two_objects_are_refused(tmp_path):
 def test_a_bad_row_is_named_by_its_file_and_its_number(planned, tmp_path):
     points = np.array([grasp.positions for grasp in planned])
     normals = np.array([grasp.normals for grasp in planned])
-    long = normals * np.array([1, 2, 1, 1])[:, None, None]
-    rows = zip("abcd", points, long, strict=True)
+    long = normals * np.array([1, 2])[:, None, None]
+    rows = zip("ab", points, long, strict=True)
     with pytest.raises(
         gc.InputError, match=r"g.json: grasps\[1\].contacts\[\d\].normal: its length"
     ):
@@ -148,21 +147,3 @@ def test_a_bad_row_is_named_by_its_file_and_its_number(planned, tmp_path):
     (tmp_path / "g.json").write_text(json.dumps(document))
     with pytest.raises(gc.InputError, match=r"g.json: grasps\[1\] \(c\): friction: remove it"):
         read_given(tmp_path / "g.json")
-
-
-def test_judged_grasps_are_exported_with_what_could_not_be_tried(planned, tmp_path):
-    good = planned[0]
-    off = good.positions + 1.0
-    path = contacts_file(
-        tmp_path / "g.json", [("a", good.positions, good.normals), ("b", off, good.normals)]
-    )
-    judged(tmp_path / "ds", path)
-    assert export(tmp_path / "ds", tmp_path / "isaac", None, silent).files == 1
-    arrays = sim_validate.load_dataset(tmp_path / "ds")["grasps"]
-    given = arrays["label"] == "given"
-    for name in ("held", "force_closed"):
-        np.testing.assert_array_equal(arrays[name][given], [1.0, np.nan])
-    points, normals = arrays["contact_points_m"][given], arrays["contact_normals"][given]
-    again = contacts_file(tmp_path / "again.json", zip("ab", points, normals, strict=True))
-    again = judged(tmp_path / "again", again)
-    np.testing.assert_array_equal(again["held"], [1.0, np.nan])

@@ -1,12 +1,25 @@
+"""Tables of a unit of work, as columns and as files."""
+
+import math
+
 import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.figures import figures
+from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import columns as parquet
-from sim_validate.datasets.columns import Column, each_batch, parquet_bytes, read_table
+from sim_validate.datasets.columns import (
+    Column,
+    agrees,
+    each_batch,
+    parquet_bytes,
+    read_table,
+)
 from sim_validate.datasets.config import KEYS, DatasetConfig
-from sim_validate.datasets.rows import TABLES
+from sim_validate.datasets.rows import TABLES, GraspRow
 from sim_validate.datasets.units import body_of, made_of, split_of, units_of
+from sim_validate.engine.traces import HoldVerdict
 
 pytest.importorskip("pyarrow")
 
@@ -17,14 +30,10 @@ def unit():
     return unit
 
 
-def cells_made(unit):
-    made = made_of(unit, body_of(unit)).rows
-    return {name: made.cells(name, columns) for name, columns in TABLES.items()}
-
-
 @pytest.fixture(scope="module")
 def rows(unit):
-    return cells_made(unit)
+    made = made_of(unit, body_of(unit)).rows
+    return {name: made.cells(name, columns) for name, columns in TABLES.items()}
 
 
 @pytest.fixture
@@ -80,11 +89,10 @@ def test_tables_are_read_as_they_were_written(rows, written):
                     assert np.shape(row[column.name]) == column.shape
 
 
-def test_files_do_not_depend_on_the_order_of_rows_nor_on_when_they_are_made(unit, rows):
+def test_files_do_not_depend_on_the_order_of_rows(rows):
     for name in TABLES:
         once = parquet_bytes(name, rows[name], TABLES)
         assert parquet_bytes(name, rows[name][::-1], TABLES) == once
-        assert parquet_bytes(name, cells_made(unit)[name], TABLES) == once
 
 
 def test_no_flipped_bit_in_a_page_changes_rows_in_silence(written):
@@ -135,3 +143,20 @@ def test_files_that_claim_too_much_are_refused_before_they_are_read(written, mon
     monkeypatch.setattr(parquet, "MOST_ROWS", 1)
     with pytest.raises(gc.InputError, match=r"claims [0-9]+ rows, .* limits are 1 and"):
         read_table(written["trials"], "trials", TABLES)
+
+
+def test_every_figure_of_a_verdict_and_its_trials_is_a_column():
+    of_grasps, of_trials = ({each.name for each in TABLES[name]} for name in ("grasps", "trials"))
+    told_otherwise = {"id", "predicted_critical_friction"}
+    assert {each.name for each in figures(Verdict)} - told_otherwise <= of_grasps
+    assert {
+        each.name for kind in (HoldVerdict, WrenchVerdict) for each in figures(kind)
+    } <= of_trials
+
+
+def test_numbers_agree_as_far_as_their_fields_say():
+    assert agrees(GraspRow, "mass_kg", 1.0, 1.0 + 1e-7)
+    assert not agrees(GraspRow, "mass_kg", 1.0, 1.0 + 1e-5)
+    assert not agrees(GraspRow, "load_multiple", 1.0, 1.0 + 1e-7)
+    assert agrees(GraspRow, "predicted_loss", None, math.inf)
+    assert not agrees(GraspRow, "mass_kg", None, 1.0)

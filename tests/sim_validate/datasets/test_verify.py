@@ -13,7 +13,7 @@ from scenes.example_objects import example_object
 from sim_validate import load_dataset
 from sim_validate.datasets.build import build
 from sim_validate.datasets.open_dataset import mesh_text, read_manifest, write_manifest
-from sim_validate.datasets.verify import drawn, verify
+from sim_validate.datasets.verify import verify
 from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
 from tests.sim_validate.datasets.engines import Here, contents, silent
@@ -22,10 +22,12 @@ from tests.sim_validate.datasets.forging import forged, relisted
 pytest.importorskip("pyarrow")
 
 
-def test_one_byte_changed_in_any_file_is_named(dataset, tmp_path):
-    files = [path for path in contents(dataset) if path != "manifest.json"]
-    assert len(files) >= 5
-    for path in files:
+def test_one_byte_changed_in_a_file_of_any_kind_is_named(dataset, tmp_path):
+    """One file of each folder."""
+    names = [path for path in contents(dataset) if path != "manifest.json"]
+    files = {path.rpartition("/")[0] or path: path for path in names}
+    assert len(files) >= 7
+    for path in files.values():
         spoiled = shutil.copytree(dataset, tmp_path / "spoiled")
         data = bytearray((spoiled / path).read_bytes())
         if data:
@@ -84,16 +86,11 @@ def leaning(rows):
     ],
 )
 def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
-    forged(copy, name, len)
-    assert verify(copy) == []
     forged(copy, name, change)
     assert any(message in fault for fault in verify(copy))
 
 
-def test_all_of_it_comes_out_again(dataset):
-    assert verify(dataset, 1.0) == []
-
-
+@pytest.mark.slow
 def test_a_dataset_of_tiny_triangles_verifies(tmp_path):
     """A fine mesh of an object of 3 mm, turned: areas of 5e-9 square metres."""
     solid = example_object("tetrahedron")
@@ -116,8 +113,23 @@ def shifted(rows, column):
     row[column] *= 1.0 + 1e-4
 
 
+def left_out(folder):
+    """Remove a grasp, and all that was made from it, from the tables."""
+    (first, *_) = rows_of(folder, "grasps")
+    gone = first["grasp_id"]
+
+    def is_kept(row):
+        of_it = gone in (row["grasp_id"], row.get("control_of"))
+        return not (of_it or row["grasp_id"].startswith(f"{gone}:"))
+
+    for name in ("grasps", "trials"):
+        forged(folder, name, lambda rows: rows.__setitem__(slice(None), filter(is_kept, rows)))
+    return gone
+
+
 def test_what_comes_out_otherwise_is_named(copy):
-    """Five changes in one dataset, each of which is named."""
+    """Five changes in one dataset and a grasp that was left out, each of which is named."""
+    gone = left_out(copy)
     changes = [
         ("objects", lambda rows: shifted(rows, "volume_m3"), "volume_m3 is"),
         ("grasps", lambda rows: shifted(rows, "ferrari_canny_lower_n"), "ferrari_canny_lower_n is"),
@@ -131,34 +143,20 @@ def test_what_comes_out_otherwise_is_named(copy):
     faults = verify(copy, 1.0)
     for _, _, message in changes:
         assert any(message in fault for fault in faults), message
+    assert any(gone in fault and "has no row" in fault for fault in faults)
 
 
-@pytest.mark.parametrize("change", [{"arithmetic": "another"}, {"versions": {"mujoco": "3.0.0"}}])
-def test_with_other_rounding_verdicts_and_critical_frictions_count(copy, change):
-    write_manifest(copy, dataclasses.replace(read_manifest(copy), **change))
+def test_with_other_rounding_verdicts_and_critical_frictions_count(copy):
+    """And all the rest comes out again."""
+    write_manifest(copy, dataclasses.replace(read_manifest(copy), arithmetic="another"))
     forged(copy, "trials", lambda rows: shifted(rows, "displacement_m"))
     forged(copy, "grasps", lambda rows: shifted(rows, "ferrari_canny_lower_n"))
-    assert verify(copy, 1.0) == []
     forged(copy, "grasps", lambda rows: shifted(rows, "critical_friction"))
-    faults = verify(copy, 1.0)
-    assert any("critical_friction is" in fault for fault in faults), faults
+    (fault,) = verify(copy, 1.0)
+    assert "critical_friction is" in fault
 
 
-def test_a_grasp_that_was_left_out_is_named(copy):
-    (first, *_) = rows_of(copy, "grasps")
-    gone = first["grasp_id"]
-
-    def kept(row):
-        return gone not in (row["grasp_id"], row.get("control_of")) and not row[
-            "grasp_id"
-        ].startswith(f"{gone}:")
-
-    for name in ("grasps", "trials"):
-        forged(copy, name, lambda rows: rows.__setitem__(slice(None), list(filter(kept, rows))))
-    assert verify(copy) == []
-    assert any(gone in fault and "has no row" in fault for fault in verify(copy, 1.0))
-
-
+@pytest.mark.slow
 def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
     for folder, sides in (("a", (0.04, 0.05, 0.06)), ("b", (0.04, 0.05, 0.07))):
         (tmp_path / folder).mkdir()
@@ -170,8 +168,6 @@ def test_objects_of_the_same_file_name_are_told_apart(tmp_path):
     built = build(config, tmp_path / "ds", Here(), silent)
     assert built.manifest.quarantined == 1
     assert verify(tmp_path / "ds", 1.0) == []
-    forged(tmp_path / "ds", "trials", lambda rows: shifted(rows, "displacement_m"))
-    assert any("displacement_m" in fault for fault in verify(tmp_path / "ds", 1.0))
 
 
 def test_what_is_quarantined_has_no_rows(copy):
@@ -189,15 +185,6 @@ def test_settings_that_are_not_the_manifests_are_named(copy):
     path.write_text(path.read_text().replace("limit = 2", "limit = 3"))
     relisted(copy, path)
     assert any("not the configuration" in fault for fault in verify(copy))
-
-
-def test_a_larger_sample_holds_a_smaller_one():
-    units = [(f"{i:064x}", 0.5) for i in range(100)]
-    some, more = drawn(units, 0.1, seed=3), drawn(units, 0.25, seed=3)
-    assert (len(some), len(more)) == (10, 25)
-    assert more[:10] == some
-    assert drawn(units, 0.1, seed=4) != some
-    assert len(drawn(units, 0.001)) == 1
 
 
 @pytest.mark.parametrize(

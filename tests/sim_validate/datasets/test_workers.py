@@ -1,7 +1,6 @@
 import dataclasses
 import errno
 import itertools
-import os
 import time
 
 import pytest
@@ -39,12 +38,11 @@ def burn(*_):
     sum(itertools.repeat(1))  # one call that never gives the interpreter back
 
 
-@pytest.mark.parametrize("name", ["mujoco", "code_sha256"])
-def test_a_worker_with_another_version_refuses_and_the_run_ends(tmp_path, monkeypatch, name):
-    other = dict(provenance()) | {name: "0.0.1"}
+def test_a_worker_with_another_version_refuses_and_the_run_ends(tmp_path, monkeypatch):
+    other = dict(provenance()) | {"code_sha256": "0.0.1"}
     asked_first = iter([other])
     monkeypatch.setattr(workers, "provenance", lambda: next(asked_first, provenance()))
-    with pytest.raises(WorkerError, match=rf"version of {name}: .* instead of 0\.0\.1"):
+    with pytest.raises(WorkerError, match=r"version of code_sha256: .* instead of 0\.0\.1"):
         build(CONFIG, tmp_path / "ds", Here(), silent)
     monkeypatch.undo()
     assert build(CONFIG, tmp_path / "ds", Here(), silent).made == 1
@@ -64,18 +62,17 @@ def test_rows_that_do_not_arrive_end_the_run(staging):
         drive(units_of(CONFIG), staging, Elsewhere(), silent)
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO])
-def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path, code):
+def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path):
     config = dataclasses.replace(CONFIG, frictions=(0.4, 0.5))
 
     def full(_):
         if len(engine.submitted) == 2:
-            raise OSError(code, os.strerror(code))
+            raise OSError(errno.ENOSPC, "No space left")
 
     engine = Here(full)
-    with pytest.raises(OSError, match=os.strerror(code)) as raised:
+    with pytest.raises(OSError, match="No space left") as raised:
         build(config, tmp_path / "ds", engine, silent)
-    assert raised.value.errno == code
+    assert raised.value.errno == errno.ENOSPC
     again = Here()
     assert build(config, tmp_path / "ds", again, silent).made == 1
     assert len(again.submitted) == 1
@@ -126,6 +123,7 @@ def test_a_fault_of_ours_with_one_object_does_not_stop_the_others(tmp_path, monk
     assert "internal error: ZeroDivisionError: a bug" in left_out
 
 
+@pytest.mark.slow
 def test_a_process_that_never_ends_is_ended(staging):
     with local_processes(1) as engine:
         for never in (sleep, burn):

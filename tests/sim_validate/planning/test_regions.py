@@ -22,7 +22,7 @@ NAMES = ("axes", "codes", "forces")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("regions")
     assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
-    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "1000"]
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "300"]
     asked += ["--out", str(folder), "-q"]
     assert main(asked) == Exit.GOOD
     return folder
@@ -64,7 +64,7 @@ def test_the_proofs_can_be_checked_from_their_files(folder):
 def test_one_grasp_with_a_reserve(folder, capsys):
     name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
     asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--json"]
-    asked += ["--max-cones", "1000"]
+    asked += ["--max-cones", "300"]
     assert main([*asked, "--reserve", ".4"]) == Exit.GOOD
     found = json.loads(capsys.readouterr().out)
     (grasp,) = found["grasps"]
@@ -84,10 +84,11 @@ def test_where_nothing_can_be_proved_it_is_said(folder, capsys):
     assert "no regions for 1 of 1 grasps: " in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_grasps_that_are_not_closed_do_not_stop_the_others(folder, tmp_path, capsys):
     grasps = json.loads((folder / "grasps.json").read_text())["grasps"]
     frictions = sorted(grasp["critical_friction"] for grasp in grasps)
-    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "8000", "--out", str(tmp_path)]
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "2000", "--out", str(tmp_path)]
     between = str(0.99 * frictions[2])
     assert main([*asked, "--friction", between]) == Exit.NEGATIVE
     assert "no regions for 1 of 3 grasps: not in force closure" in capsys.readouterr().out
@@ -122,6 +123,7 @@ def test_files_give_back_the_regions_and_their_proof(folder):
             assert region.inscribed_radius == pytest.approx(told["inscribed_radius_m"])
 
 
+@pytest.mark.slow
 def test_plans_may_come_with_certified_regions(tmp_path, folder):
     asked = ["plan", "wedge", "--limit", "3", "--regions", "--out", str(tmp_path), "-q"]
     assert main(asked) == Exit.GOOD
@@ -149,16 +151,8 @@ def ring_around(contact, radius):
 
 
 def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
-    asked = [
-        "run",
-        "tetrahedron",
-        "--limit",
-        "1",
-        "--families",
-        "concurrent",
-        "--out",
-        str(tmp_path),
-    ]
+    asked = ["run", "tetrahedron", "--limit", "1", "--families", "concurrent"]
+    asked += ["--out", str(tmp_path)]
     assert main([*asked, "--regions", "--no-report", "-q"]) == Exit.GOOD
     (grasp,) = json.loads((tmp_path / "grasps.json").read_text())["grasps"]
     assert grasp["regions"][0]["kind"] == "certified"
@@ -168,9 +162,10 @@ def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
     assert not list((tmp_path / "proofs").iterdir())
 
 
+@pytest.mark.slow
 def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path):
     saved = grasps_from_json((folder / "grasps.json").read_text())
-    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "1000", "--out", str(tmp_path)]
+    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "300", "--out", str(tmp_path)]
     assert main([*asked, "--edge-clearance-m", "0.006", "-q"]) == Exit.GOOD
     near = 0
     for grasp in saved.grasps:

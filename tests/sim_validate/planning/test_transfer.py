@@ -87,42 +87,6 @@ def test_its_grasps_go_on_from_there(folder, tmp_path):
     grasps = f"{out}/grasps.json"
     assert main(["validate", grasps, "--limit", "1", "--jobs", "1", "-q"]) == Exit.GOOD
     assert main(["analyze", grasps, "--jobs", "1", "-q"]) == Exit.GOOD
-    baseline = str(tmp_path / "new.baseline.json")
-    asked = ["--limit", "1", "--jobs", "1", "-q"]
-    assert main(["baseline", "record", grasps, "-o", baseline, *asked]) == Exit.GOOD
-
-
-def test_by_hand_its_contacts_are_judged_alike(folder, tmp_path, capsys):
-    """A contacts file, made of the positions in transfer.json, in the command `analyze`."""
-    out = tmp_path / "new"
-    transfer(folder, "hole.obj", "--out", str(out), "-q", "--distance-m", "0.01")
-    capsys.readouterr()
-    record = json.loads((out / "transfer.json").read_text())
-    body = gc.load_polyhedron(folder / "hole.obj", unit="mm")
-    placed = [each for each in record["grasps"] if each["after"] is not None]
-    contacts = {
-        "grasps": [
-            {
-                "id": each["id"],
-                "contacts": [contact["contact"] for contact in each["contacts"]],
-            }
-            for each in placed
-        ],
-        "friction": record["friction"],
-        "center_m": body.center_of_mass.tolist(),
-        "torque_scale_m": body.radius,
-    }
-    path = write_text(tmp_path / "contacts.json", json.dumps(contacts))
-    main(["analyze", str(path), "--json", "--jobs", "1"])
-    by_hand = json.loads(capsys.readouterr().out)["grasps"]
-    assert len(by_hand) == len(placed) >= 4
-    for each, hand in zip(placed, by_hand, strict=True):
-        assert (each["new_id"] is not None) == hand["closed"]
-        after = each["after"]
-        assert after["critical_friction"] == pytest.approx(hand["critical_friction"], abs=1e-7)
-        np.testing.assert_allclose(
-            after["ferrari_canny"], hand["ferrari_canny_l1_n"], rtol=1e-6, atol=1e-9
-        )
 
 
 def test_lost_grasps_end_with_1_and_no_grasp_at_all_with_5(folder, tmp_path, capsys):

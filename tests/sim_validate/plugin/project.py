@@ -34,7 +34,9 @@ def test_it_does_not(assert_stable):
 def run_pytest(folder, *arguments):
     """Run pytest inside this process, which spares its start; its exit code and what it printed."""
     said = io.StringIO()
-    line = ["-p", "no:cacheprovider", "-p", "no:faulthandler", "-p", "no:hypothesispytest"]
+    left_out = ("cacheprovider", "faulthandler", "hypothesispytest", "unraisableexception",
+                "threadexception")  # fmt: skip
+    line = [word for name in left_out for word in ("-p", f"no:{name}")]
     with pytest.MonkeyPatch.context() as patched, contextlib.redirect_stdout(said):
         for name in [name for name in os.environ if "PYTEST" in name]:
             patched.delenv(name)

@@ -114,23 +114,6 @@ def test_a_grasp_that_the_changed_part_does_not_have_fails_and_is_gone(project):
     assert "graspproof transfer" in said
 
 
-def test_a_grasp_that_is_better_fails_only_where_that_is_strict(project):
-    """The baseline says that the grasp needed more friction than it does on the changed part."""
-    edited(project)
-    needed = first_grasp(predicted_critical_friction=0.2, simulated_critical_friction=0.2)
-    record = changed(project / "part.baseline.json", needed)
-    code, said = run_pytest(project, "--junitxml", "j.xml")
-    assert code == 0, said
-    kept = kept_in(project)
-    assert kept["status"] == "improved"
-    name = record["grasps"][0]["id"]
-    better = f"  {name} better than in the baseline: predicted_critical_friction: 0.2 -> 0."
-    assert any(text.startswith(better) for text in said.splitlines())
-    toml = project / "part.grasps.toml"
-    write_text(toml, "strict = true\n" + toml.read_text())
-    assert run_pytest(project)[0] == 1
-
-
 def test_a_grasp_that_is_worse_fails_and_the_face_that_moved_is_named(project):
     edited(project)
     changed(project / "part.baseline.json", first_grasp(limit_n=1e3))
@@ -166,43 +149,34 @@ def test_blessing_a_changed_part_writes_its_hash_and_then_everything_is_the_same
     assert f"part.obj has changed since its baseline was written: {moved}" in finding.reasons[0]
 
 
-def test_the_planned_part_put_back_after_a_blessed_change_is_judged_like_any_other(project, capsys):
+def test_the_planned_part_put_back_after_a_blessed_change_is_judged_like_any_other(project):
     """It is the one shape on which grasps need not be carried over."""
-    part = project / "part.obj"
+    part, toml = project / "part.obj", project / "part.grasps.toml"
     original = part.read_text()
     edited(project)
-    assert run_pytest(project, "--grasp-bless")[0] == 0
+    suite_from_toml(toml).bless()
     write_text(part, original)
-    code, said = run_pytest(project, "--junitxml", "j.xml")
-    assert code == 0, said
-    kept = kept_in(project)
-    assert kept["status"] == "within bands"
+    suite = suite_from_toml(toml)
+    (finding,) = suite.tested(suite.ids[0]).findings
+    assert finding.status is Status.WITHIN
     moved = "face 3 moved 1.00 mm inward"
-    assert f"{part} has changed since its baseline was written: {moved}" in kept["mesh_note"]
-    baseline = str(project / "part.baseline.json")
-    assert main(["baseline", "check", baseline]) == Exit.GOOD
-    said = " ".join(capsys.readouterr().out.split())
-    assert "1 within bands" in said
-    assert moved in said
-    changed(project / "part.baseline.json", first_grasp(limit_n=1e3))
-    code, said = run_pytest(project)
-    assert code == 1
-    assert "worse on the changed part: " in said
+    assert f"part.obj has changed since its baseline was written: {moved}" in finding.reasons[0]
 
 
 def test_grasps_that_are_planned_again_are_not_compared_with_a_blessed_change(project):
     """Then the ids may name other contacts, so the baseline is of another object."""
     part = edited(project)
-    assert run_pytest(project, "--grasp-bless")[0] == 0
+    suite_from_toml(project / "part.grasps.toml").bless()
     edited(project)
     body = gc.load_polyhedron(part, unit="mm")
     name = json.loads((project / "grasps.json").read_text())["grasps"][0]["id"]
     plan = gc.plan(body, 0.5, families=("concurrent",))
     plan = dataclasses.replace(plan, grasps=(plan[name],))
     write_text(project / "grasps.json", plan_to_json(body, plan))
-    code, said = run_pytest(project)
-    assert code == 1
-    assert "the object is another one" in said
+    suite = suite_from_toml(project / "part.grasps.toml")
+    (finding,) = suite.tested(suite.ids[0]).findings
+    assert finding.status is Status.NOT_COMPARABLE
+    assert "the object is another one" in finding.reasons[0]
 
 
 def test_a_part_in_a_baseline_that_is_not_the_recorded_one_is_refused(project):
@@ -216,12 +190,12 @@ def test_a_part_in_a_baseline_that_is_not_the_recorded_one_is_refused(project):
         _ = suite_from_toml(project / "part.grasps.toml").compared
 
 
-def test_a_grasp_that_was_gone_when_it_was_blessed_stays_gone_without_a_failure(project):
+def test_blessing_leaves_out_a_grasp_that_is_gone_and_says_so(project):
     body = gc.load_polyhedron(project / "part.obj", unit="mm")
     plan = gc.plan(body, 0.5)
-    high = [grasp for grasp in plan.grasps if TOP in grasp.faces][:1]
-    other = [grasp for grasp in plan.grasps if TOP not in grasp.faces][:1]
-    both = dataclasses.replace(plan, grasps=(*high, *other))
+    high = next(grasp for grasp in plan.grasps if TOP in grasp.faces)
+    other = next(grasp for grasp in plan.grasps if TOP not in grasp.faces)
+    both = dataclasses.replace(plan, grasps=(high, other))
     write_text(project / "grasps.json", plan_to_json(body, both))
     toml = project / "part.grasps.toml"
     write_text(toml, toml.read_text() + "[changed_part]\ndistance_m = 0.0005\n")
@@ -230,13 +204,9 @@ def test_a_grasp_that_was_gone_when_it_was_blessed_stays_gone_without_a_failure(
     code, said = run_pytest(project, "--grasp-bless", "--junitxml", "j.xml")
     assert code == 0, said
     kept = kept_in(project)
-    assert (kept[f"{other[0].id}.status"], kept[f"{high[0].id}.status"]) == ("blessed", "gone")
-    assert [
-        e["id"] for e in json.loads((project / "part.baseline.json").read_text())["grasps"]
-    ] == [other[0].id]
-    code, said = run_pytest(project)
-    assert code == 0, said
-    assert "2 passed" in said
+    assert (kept[f"{other.id}.status"], kept[f"{high.id}.status"]) == ("blessed", "gone")
+    blessed = json.loads((project / "part.baseline.json").read_text())["grasps"]
+    assert [each["id"] for each in blessed] == [other.id]
 
 
 def test_marked_tests_run_on_the_changed_part_and_fail_for_what_is_gone(project):
@@ -268,46 +238,37 @@ def test_a_changed_part_is_refused_where_that_is_asked_for(project):
     part = edited(project)
     code, said = run_pytest(project, "--junitxml", "j.xml")
     assert code == 1
-    assert "1 failed" in said
     assert f"{part}: this is not the mesh that {project / 'grasps.json'} was planned on" in said
     assert f"graspproof plan {part}" in said
     assert "Traceback" not in said
-    kept = kept_in(project)
-    assert kept["status"] == "not comparable"
+    assert kept_in(project)["status"] == "not comparable"
 
 
-def test_where_there_is_no_part_it_is_said_that_a_copy_was_tested(project):
+def test_where_there_is_no_part_a_copy_is_tested_or_it_fails_where_that_is_asked_for(project):
     (project / "part.obj").unlink()
     code, said = run_pytest(project, "--junitxml", "j.xml")
     assert code == 0, said
     note = f"{project / 'grasps.json'}: the mesh that it holds was tested"
     assert said.count(note) == 1
     assert kept_in(project)["mesh_note"].startswith(note)
-
-
-def test_a_missing_part_fails_where_that_is_asked_for(project):
     toml = project / "part.grasps.toml"
     write_text(toml, toml.read_text() + '[changed_part]\nmissing = "fail"\n')
-    assert run_pytest(project)[0] == 0
-    (project / "part.obj").unlink()
     code, said = run_pytest(project, "--junitxml", "j.xml")
     assert code == 1
     assert "the mesh file that its grasps were planned from, 'part'" in said
-    assert "is missing" in said
     assert kept_in(project)["status"] == "not comparable"
     with pytest.raises(ChangedPartError, match="is missing"):
         grasp_cases(project, ["grasps.json"], {"changed_part": {"missing": "fail"}})
 
 
-@pytest.mark.parametrize("digits", [15, 8])
-def test_a_part_saved_in_another_unit_is_said_to_be(project, digits):
-    """With fifteen digits the solid is the very same one, with eight nearly."""
+def test_a_part_saved_in_another_unit_is_said_to_be(project):
+    """With eight digits the solid is nearly the same one."""
     part = project / "part.obj"
     write_text(part, part.read_text().replace("\n", "\n# edited\n", 1))
     edited(project, 1.0 / 3.0)  # so that no number is round
-    assert run_pytest(project, "--grasp-bless")[0] == 0
+    suite_from_toml(project / "part.grasps.toml").bless()
     assert json.loads((project / "part.baseline.json").read_text())["unit"] == "mm"
-    rescaled(project, 1e-3, digits)
+    rescaled(project, 1e-3, 8)
     code, said = run_pytest(project, "--junitxml", "j.xml")
     assert code == 0, said
     note = kept_in(project)["mesh_note"]
@@ -403,17 +364,9 @@ def test_commands_carry_grasps_over_and_name_the_face(project, capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert "1 gone" in said
     assert f"{FACE} moved 1.00 mm outward" in said
-    assert main(["baseline", "record", grasps, "-o", baseline, "-q"]) == Exit.GOOD
-    capsys.readouterr()
-    assert main(["baseline", "check", baseline]) == Exit.GOOD
-    assert "1 same" in capsys.readouterr().out
-    other = str(project / "part.obj")
-    assert main(["baseline", "check", baseline, "--object", other, "-q"]) == Exit.GOOD
     before = (project / "part.baseline.json").read_text()
-    edited(project)
-    asked = ["--changed-part.distance-m", "0.0005"]
-    assert main(["baseline", "record", grasps, "-o", baseline, *asked]) == Exit.INPUT
-    assert main(["baseline", "check", baseline, "--bless", "-q", *asked]) == Exit.INPUT
+    assert main(["baseline", "record", grasps, "-o", baseline, *near]) == Exit.INPUT
+    assert main(["baseline", "check", baseline, "--bless", "-q", *near]) == Exit.INPUT
     assert (project / "part.baseline.json").read_text() == before
 
 

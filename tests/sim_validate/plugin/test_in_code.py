@@ -4,7 +4,7 @@ import re
 
 from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json
-from tests.sim_validate.plugin.project import CODE, copied, properties_in, run_pytest
+from tests.sim_validate.plugin.project import copied, properties_in, run_pytest
 
 MARKED = """
 import pytest
@@ -33,7 +33,7 @@ BOX = "\n".join(
 DEMANDS = """
 import pytest
 
-pytestmark = pytest.mark.grasp(object="wedge")
+pytestmark = pytest.mark.grasp(object="wedge", limit=1)
 
 def test_good_enough(grasp_case, assert_stable):
     assert_stable(grasp_case, min_margin=0.3, repeats=3, min_pass_rate=0.5)
@@ -104,16 +104,6 @@ def test_more_can_be_asked_for(tmp_path):
     assert "of 8 held (" in said
 
 
-def test_assert_stable_in_code(tmp_path):
-    write_text(tmp_path / "test_mine.py", CODE)
-    code, said = run_pytest(tmp_path, "-v", "--junitxml", "j.xml")
-    assert code == 1
-    assert "1 failed, 1 passed" in said
-    assert "push [0.0, 0.0, 900.0" in said
-    assert "predicted limit" in said
-    assert ".predicted_critical_friction" in (tmp_path / "j.xml").read_text()
-
-
 BAD_DEMANDS = [
     ("assert_stable(grasp_case, min_pass_rate=0.9)", "as `repeats`"),
     ("assert_stable(grasp_case, repeats=2, min_pass_rate=80)", "from 0 up to 1, got 80"),
@@ -142,13 +132,11 @@ def test_other_frictions_and_grasps_from_anywhere(tmp_path):
         tmp_path / "test_it.py",
         """
 import pytest
-@pytest.mark.grasp(object='wedge')
+@pytest.mark.grasp(object='wedge', limit=1)
 def test_it(grasp_case, assert_stable):
     body, grasp = grasp_case.body, grasp_case.grasp
     assert assert_stable(grasp_case, friction=0.3).friction == 0.3
-    assert assert_stable(body, grasp).friction == 0.5
     assert assert_stable(body, grasp, 0.4).friction == 0.4
-    assert assert_stable(body, grasp, friction=0.4).friction == 0.4
 """,
     )
     code, said = run_pytest(tmp_path)

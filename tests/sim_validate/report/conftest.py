@@ -4,6 +4,8 @@ import pytest
 
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.report import report as reports
+from sim_validate.report.cards import Drawn
 from sim_validate.report.report import write_report
 
 
@@ -23,3 +25,9 @@ def small_run(tmp_path_factory):
 def small_report(small_run, tmp_path_factory):
     """The folder of its report."""
     return write_report(small_run, tmp_path_factory.mktemp("report"), jobs=1).index.parent
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """Pages without their pictures, which take a second."""
+    monkeypatch.setattr(reports, "draw", lambda _, card: Drawn(f"pictures/{card.name}"))

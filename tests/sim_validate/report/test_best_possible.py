@@ -43,6 +43,7 @@ def test_each_page_says_the_share_that_its_grasp_reaches_of_the_bound(folder):
     assert len(re.findall(r'data-share="', index)) == report.drawn
 
 
+@pytest.mark.slow
 def test_other_measures_are_named(tmp_path):
     words = ["plan", "tetrahedron", "--limit", "1", "--best", "--gap", "0.4", "--jobs", "1"]
     assert main([*words, "--measure", "weight", "--out", str(tmp_path), "-q"]) == 0

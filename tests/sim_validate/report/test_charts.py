@@ -94,15 +94,6 @@ def test_a_map_covers_equal_areas_equally():
         assert area == pytest.approx(0.5 * step**2 * math.cos(latitude), rel=1e-2)
 
 
-def test_a_map_is_of_unit_vectors_with_x_in_the_middle():
-    ways = directions_of_map()
-    np.testing.assert_allclose(np.linalg.norm(ways, axis=2), 1.0)
-    rows, columns, _ = ways.shape
-    np.testing.assert_allclose(ways[rows // 2, columns // 2], [1.0, 0.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(ways[:, 0], ways[:, -1], atol=1e-12)
-    np.testing.assert_allclose(on_map(np.zeros(1), np.zeros(1)), 0.0, atol=1e-12)
-
-
 def test_the_map_shows_what_is_resisted(wedge):
     body, grasp = wedge
     shown = margins(Drawing(body, grasp, FRICTION), 7.0)
@@ -145,13 +136,6 @@ def test_pushes_balance_the_wrench(wedge, trial):
     atol = lever * np.linalg.norm(forces, axis=1).sum()
     assert atol < 0.05 * np.linalg.norm(wrench[3:])
     np.testing.assert_allclose(torque, -wrench[3:], rtol=0.0, atol=atol)
-
-
-def test_friction_is_lowered_at_time_zero(trial):
-    watched = trial.watched
-    assert len(watched.times_s) == len(watched.friction) == len(watched.pushes_n)
-    np.testing.assert_array_equal(watched.friction > FRICTION, watched.times_s <= 0.0)
-    assert watched.times_s[-1] == pytest.approx(trial.watched.trace.times_s[-1])
 
 
 def test_friction_used_is_one_where_a_finger_slips():
@@ -278,22 +262,10 @@ def test_the_pixels_of_a_map_are_where_its_directions_are():
         assert -1.0 + 2.0 * (level + 0.5) / LEVELS == pytest.approx(value, abs=slack)
 
 
-@pytest.mark.parametrize("kind", ["wrenches", "margins", "motion", "fidelity"])
-def test_labels_of_charts_are_whole(kind, wedge, trial):
-    pairs = ((0.013, 0.013), (0.4, 0.41))
-    sheets = {
-        "wrenches": lambda: wrench_panels(Drawing(*wedge, FRICTION)),
-        "margins": lambda: margin_panels(Drawing(*wedge, FRICTION), 10.0),
-        "motion": lambda: motion_panels(trial, 1e-5),
-        "fidelity": lambda: [
-            fidelity_panel(Agreement("critical friction", pairs)),
-            fidelity_panel(Agreement("b", ((1e-4, 1e-4), (0.5, 0.7)))),
-            fidelity_panel(Agreement("largest wrench [N], torques over grasp size", ((3.0, 3.1),))),
-        ],
-    }[kind]()  # fmt: skip
-    assert len(sheets) >= 2
-    for sheet in sheets:
-        assert_whole(sheet)
+@pytest.mark.parametrize("pairs", [((0.013, 0.013), (0.4, 0.41)), ((1e-4, 1e-4), (0.5, 0.7))])
+def test_labels_of_fidelity_are_whole(pairs):
+    """Of the other charts see `tests/test_docs_pictures.py`."""
+    assert_whole(fidelity_panel(Agreement("largest wrench [N], torques over grasp size", pairs)))
 
 
 def test_a_thinned_curve_misses_no_point_by_a_fifth_of_a_pixel():

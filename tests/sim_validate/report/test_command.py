@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import scenes
-from scenes.drawing import clips, sheets
-from sim_validate.kit.command_flags import CLIPS, PICTURES
+from scenes.drawing import clips
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report import command as view_command
@@ -90,11 +89,6 @@ def test_what_cannot_be_shown_is_refused(wedge_plan, tmp_path, monkeypatch, caps
     assert main(["view", str(wedge_plan), *flags]) == Exit.USAGE
     assert says in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-def test_endings_of_flags_are_those_that_can_be_written():
-    assert {ending[1:] for ending in PICTURES} == set(sheets.FORMATS)
-    assert set(CLIPS) == set(clips.FORMATS)
 
 
 def test_fingers_come_in_along_their_ways_and_stay():

@@ -30,8 +30,6 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject
 from sim_validate.main import main
 from sim_validate.report import cards
-from sim_validate.report import report as reports
-from sim_validate.report.cards import Drawn
 from sim_validate.report.report import write_report
 from sim_validate.report.run_folder import runs_in, said_of_both
 from sim_validate.report.sections import execute_command
@@ -94,12 +92,6 @@ def report(run):
 @pytest.fixture
 def copy(run, tmp_path):
     return shutil.copytree(run, tmp_path / "copy")
-
-
-@pytest.fixture
-def no_pictures(monkeypatch):
-    """Pages without their pictures, which take a second."""
-    monkeypatch.setattr(reports, "draw", lambda _, card: Drawn(f"pictures/{card.name}"))
 
 
 def cells_of(page, heading):

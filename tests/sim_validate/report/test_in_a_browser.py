@@ -1,7 +1,6 @@
 """Reports work in a browser, on a desk and on a phone, by day and by night."""
 
 import json
-import shutil
 
 import pytest
 
@@ -19,8 +18,6 @@ from tests.browser import (
     requests_of,
 )
 from tests.scenes.drawing.standing import GRASP, run_with_hand
-from tests.sim_validate.changing import changed
-from tests.sim_validate.report.test_report import EVIL
 
 pytestmark = [pytest.mark.slow, needs_browser]
 
@@ -30,14 +27,6 @@ def browser(tmp_path_factory):
     driver = headless(tmp_path_factory.mktemp("profile"))
     yield driver
     driver.quit()
-
-
-@pytest.fixture(scope="module")
-def evil_report(small_run, tmp_path_factory):
-    """A report whose object has a name that would run as a script."""
-    folder = shutil.copytree(small_run, tmp_path_factory.mktemp("evil") / "run")
-    changed(folder / "grasps.json", lambda each: each["object"].update(name=EVIL))
-    return write_report(folder, jobs=1).index.parent
 
 
 def errors_of(browser):
@@ -75,14 +64,6 @@ def test_the_policy_of_the_pages_stops_what_would_leave_them(browser, small_repo
     )
     said = [entry["message"] for entry in browser.get_log("browser")]
     assert any("Content Security Policy" in line for line in said)
-
-
-def test_a_name_is_no_script(browser, evil_report):
-    for path in pages_of(evil_report):
-        opened(browser, path)
-        assert browser.title != "taken"
-        assert "<script>document.title" in browser.execute_script("return document.body.innerText")
-        assert browser.get_log("browser") == []
 
 
 def cards(browser):
@@ -154,28 +135,6 @@ def test_the_grasp_turns_zooms_and_hides_its_parts(browser, small_report):
     assert errors_of(browser) == []
 
 
-def test_a_hand_turns_and_can_be_hidden(browser, shown):
-    from selenium.webdriver import Keys
-    from selenium.webdriver.common.by import By
-
-    opened(browser, shown["hand"])
-    canvas = browser.find_element(By.TAG_NAME, "canvas")
-    pictures = [browser.execute_script(PIXELS)]
-    canvas.send_keys(Keys.ARROW_LEFT)
-    pictures.append(browser.execute_script(PIXELS))
-    boxes = {label.text.strip(): label.find_element(By.TAG_NAME, "input")
-             for label in browser.find_elements(By.CSS_SELECTOR, ".stage label")}  # fmt: skip
-    assert {name for name, box in boxes.items() if not box.is_selected()} >= {"finger", "focus"}
-    boxes["hand"].click()
-    pictures.append(browser.execute_script(PIXELS))
-    boxes["finger"].click()
-    pictures.append(browser.execute_script(PIXELS))
-    assert len({picture[0] for picture in pictures}) == len(pictures)
-    assert pictures[2][1] < 0.7 * pictures[1][1]  # links and palm are most of what is drawn
-    assert pictures[3][1] > pictures[2][1]
-    assert errors_of(browser) == []
-
-
 @pytest.fixture(scope="module")
 def shown(small_report, small_run, tmp_path_factory):
     """The three kinds of pages, and those of a report with a hand."""
@@ -196,12 +155,20 @@ WIDTHS = (390, 1280)
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_everything_is_on_the_screen(browser, shown, kind, width):
+def test_everything_is_on_the_screen_and_can_be_read_by_day_and_by_night(
+    browser, shown, kind, width
+):
     """Nothing is cut off, and neither a page nor a table scrolls sideways."""
-    opened(browser, shown[kind], width=width, touch=width < 500)
-    browser.execute_script(
-        "document.querySelectorAll('details').forEach((e) => { e.open = true; })"
-    )
+    for dark in (False, True):
+        opened(browser, shown[kind], width=width, dark=dark, touch=width < 500)
+        browser.execute_script(
+            "document.querySelectorAll('details').forEach((e) => { e.open = true; })"
+        )
+        found = browser.execute_script(CONTRASTS, "body *:not(script):not(style)")
+        assert len(found) > 20
+        assert [text for contrast, text in found if contrast < READABLE] == []
+        light = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
+        assert (light == "rgb(255, 255, 255)") != dark
     assert browser.execute_script("return document.documentElement.scrollWidth") <= width
     assert browser.execute_script(CLIPPED) == []
     small = browser.execute_script(
@@ -220,21 +187,6 @@ def test_what_is_cut_off_is_noticed(browser, shown):
     )
     said = browser.execute_script(CLIPPED)
     assert [each.partition(":")[0] for each in said] == ["off the screen", "off its chart"]
-
-
-@pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("kind", KINDS)
-def test_text_can_be_read_by_day_and_by_night(browser, shown, kind, width, dark):
-    opened(browser, shown[kind], width=width, dark=dark, touch=width < 500)
-    browser.execute_script(
-        "document.querySelectorAll('details').forEach((e) => { e.open = true; })"
-    )
-    found = browser.execute_script(CONTRASTS, "body *:not(script):not(style)")
-    assert len(found) > 20
-    assert [text for contrast, text in found if contrast < READABLE] == []
-    light = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
-    assert (light == "rgb(255, 255, 255)") != dark
 
 
 def test_tables_sort_by_a_heading_and_with_keys(browser, shown):

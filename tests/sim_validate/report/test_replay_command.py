@@ -5,12 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+import sim_validate as sv
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.changing import slipped
-
-NOISE = ("--noise.shift", ".02", "--noise.turn-deg", "3", "--noise.friction", ".3")
 
 
 @pytest.fixture(scope="module")
@@ -19,9 +18,9 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     task = {"wrenches": [{"name": "too much", "force_n": [0, 0, 90]}]}
     (folder / "task.json").write_text(json.dumps(task))
-    planned = ["plan", "screwdriver", "--limit", "2", "--out", str(folder), "-q"]
+    planned = ["plan", "screwdriver", "--limit", "1", "--out", str(folder), "-q"]
     assert main(planned) == Exit.GOOD
-    trials = ("--wrenches", str(folder / "task.json"), "--seed", "3")
+    trials = ("--wrenches", str(folder / "task.json"), "--seed", "3", "--repeats", "2")
     grasps = str(folder / "grasps.json")
     assert main(["validate", grasps, *trials, "--out", str(folder), "-q"]) == Exit.NEGATIVE
     return folder
@@ -40,7 +39,7 @@ def verdicts_in(folder):
     return json.loads((folder / "verdicts.json").read_text())["verdicts"]
 
 
-def test_verdicts(folder, replay):
+def test_verdicts_their_controls_and_repeats(folder, replay):
     verdict = verdicts_in(folder)[0]
     found = replay(folder, "--grasp", verdict["id"])
     assert (found["wrench"], found["recorded_outcome"]) == ("too much", "slipped")
@@ -51,36 +50,13 @@ def test_verdicts(folder, replay):
         for key in ("outcome", "displacement_m", "predicted_limit", "required_friction"):
             assert found[key] == trial[key]
         assert found["recorded_outcome"] == trial["outcome"]
-
-
-def test_controls(folder, replay):
-    verdict = verdicts_in(folder)[0]
-    assert len(verdict["controls"]) >= 3
-    for control in verdict["controls"]:
-        name, first = control["name"], control["trials"][0]
-        found = replay(folder, "--grasp", verdict["id"], "--control", name)
-        assert found["name"] == f"{verdict['id']}:{name}"
-        assert found["displacement_m"] == first["displacement_m"]
-        assert found["recorded_outcome"] == first["outcome"]
-        assert found["predicted_limit"] is None
-
-
-def test_repeats_with_noise(folder, replay, tmp_path):
-    grasps = (folder / "grasps.json", "--limit", "1")
-    repeats = ("--repeats", "12", *NOISE, "--out", tmp_path, "-q")
-    assert main(["validate", *map(str, (*grasps, *repeats))]) == Exit.GOOD
-    verdict = verdicts_in(tmp_path)[0]
-    about = (tmp_path, "--grasps", folder / "grasps.json", "--grasp", verdict["id"])
-    failed = [each for each in verdict["robustness"]["trials"] if each["wrench"]]
-    assert failed
-    for each in failed[:2]:
-        found = replay(*about, "--trial", each["number"])
-        assert found["reason"] == each["reason"]
-        assert found["recorded_outcome"] == each["outcome"]
-    repeats = verdict["robustness"]["trials"]
-    held = next(each["number"] for each in repeats if each["outcome"] == "held")
-    found = replay(*about, "--trial", held, "--wrench", "+force_x")
-    assert found["recorded_outcome"] == "held"
+    control, repeat = verdict["controls"][0], verdict["robustness"]["trials"][0]
+    found = replay(folder, "--grasp", verdict["id"], "--control", control["name"])
+    assert found["name"] == f"{verdict['id']}:{control['name']}"
+    assert found["displacement_m"] == control["trials"][0]["displacement_m"]
+    assert found["recorded_outcome"] == control["trials"][0]["outcome"]
+    found = replay(folder, "--grasp", verdict["id"], "--trial", repeat["number"])
+    assert found["recorded_outcome"] == repeat["outcome"]
 
 
 def test_files_are_written(folder, replay, tmp_path, monkeypatch):
@@ -113,13 +89,27 @@ def test_a_trial_that_ends_otherwise_than_recorded_is_negative(folder, tmp_path,
 @pytest.mark.usefixtures("built_here")
 def test_dataset_rows(tmp_path, replay, capsys):
     out = tmp_path / "ds"
-    assert main(["dataset", "build", "wedge", "--limit", "1", "--out", str(out), "-q"]) == Exit.GOOD
+    assert (
+        main(
+            [
+                "dataset",
+                "build",
+                "wedge",
+                "--families",
+                "concurrent",
+                "--limit",
+                "1",
+                "--out",
+                str(out),
+                "-q",
+            ]
+        )
+        == Exit.GOOD
+    )
     capsys.readouterr()
-    import sim_validate as sv
-
     tables = sv.load_dataset(out)
     rows = tables["grasps"]
-    assert len(rows["grasp_id"]) >= 6
+    assert len(rows["grasp_id"]) >= 2
     for name, outcome in zip(rows["grasp_id"], rows["outcome"], strict=True):
         found = replay(out, "--grasp", name)
         trials = [row for row, of in enumerate(tables["trials"]["grasp_id"]) if of == name]
@@ -160,23 +150,3 @@ def test_other_contacts_under_the_same_id_are_refused(folder, tmp_path, capsys):
     grasps = str(folder / "grasps.json")
     assert main(["replay", str(path), "--grasp", first.id, "--grasps", grasps]) == Exit.INPUT
     assert "have changed since these results" in capsys.readouterr().err
-
-
-def test_a_wrench_with_a_minus_sign_is_named_with_an_equals_sign(folder, replay):
-    name = verdicts_in(folder)[0]["id"]
-    assert replay(folder, "--grasp", name, "--wrench=-force_x")["wrench"] == "-force_x"
-
-
-def test_a_trial_that_diverges_is_replayed_as_far_as_it_goes(folder, tmp_path, replay):
-    """A gigantic wrench: no clip of what is no number, and no crash."""
-    task = tmp_path / "task.json"
-    huge = {"name": "huge", "force_n": [0, 0, 1e9]}
-    task.write_text(json.dumps({"wrenches": [huge]}))
-    grasps = str(folder / "grasps.json")
-    asked = ("--wrenches", str(task), "--limit", "1", "--out", str(tmp_path), "-q")
-    assert main(["validate", grasps, *asked]) == Exit.NEGATIVE
-    (verdict,) = verdicts_in(tmp_path)
-    about = ("--grasps", grasps, "--grasp", verdict["id"], "--wrench", "huge")
-    found = replay(tmp_path, *about, "--out", tmp_path / "out")
-    assert found["outcome"] == "diverged"
-    assert (tmp_path / "out" / "trace.csv").is_file()
