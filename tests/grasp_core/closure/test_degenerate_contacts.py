@@ -73,14 +73,14 @@ def test_contacts_named_twice_change_nothing():
     seen = Counter()
     for body in BODIES:
         rng = np.random.default_rng(5)
-        for _ in range(40):
+        for _ in range(15):
             positions, normals = BODIES[body](rng, 4)
             twice = np.append(rng.permutation(4), rng.integers(4, size=rng.integers(1, 6)))
             closed = answer(positions, normals, 0.6)
             assert answer(positions[twice], normals[twice], 0.6) is closed
             seen[closed] += 1
-    assert seen[True] >= 40
-    assert seen[False] >= 40
+    assert seen[True] >= 15
+    assert seen[False] >= 15
     assert seen[None] == 0
 
 
@@ -100,14 +100,14 @@ def test_contacts_nearly_in_a_degenerate_place_are_undecided_only_where_rounding
     """Displaced by a thousandth of their size, and by less and less down to far below rounding."""
     rng, seen, undecided = np.random.default_rng(7), Counter(), []
     for away in 10.0 ** np.arange(-17.0, -2.0):
-        for _ in range(20):
+        for _ in range(8):
             points, normals = BODIES["sphere"](rng, 5)
             near = NEARLY[where](rng, points) + away * rng.normal(size=points.shape)
             closed = answer(near, normals, rng.choice([0.3, 1.0, 3.0]))
             seen[closed] += 1
             undecided += [away] * (closed is None)
     assert all(1e-15 < away < 1e-5 for away in undecided)
-    assert min(seen[True], seen[False]) >= 50
+    assert min(seen[True], seen[False]) >= 20
     assert seen[None] <= 0.25 * seen.total()
 
 

@@ -10,7 +10,7 @@ from grasp_core.closure.decision import _decided_by_programs, _decided_quickly
 from grasp_core.closure.proofs import ContactCones, proves_closure, refutes_closure
 
 
-def contact_sets(count=400, seed=0):
+def contact_sets(count=120, seed=0):
     """Three to twelve contacts on roundish objects."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
@@ -23,7 +23,7 @@ def contact_sets(count=400, seed=0):
         yield ContactCones.at(arms, normals, np.full(k, 10.0 ** rng.uniform(-2.0, 0.5)))
 
 
-def degenerate_sets(count=400, seed=1):
+def degenerate_sets(count=120, seed=1):
     """Two contacts, contacts in a plane, and contacts that push alike."""
     rng = np.random.default_rng(seed)
     for place in range(count):
@@ -54,7 +54,7 @@ def test_degenerate_contacts_have_the_margins_of_the_programs():
             assert quick.closed == slow.closed
             scale = max(1.0, float(contacts.friction[0]))
             assert quick.margin == pytest.approx(slow.margin, rel=1e-5, abs=1e-7 * scale)
-    assert answered >= 50
+    assert answered >= 15
 
 
 def test_compiled_code_answers_as_the_programs_do():
@@ -71,9 +71,9 @@ def test_compiled_code_answers_as_the_programs_do():
         else:
             assert refutes_closure(contacts, quick.twist)
             np.testing.assert_allclose(quick.twist, slow.twist, rtol=1e-3, atol=1e-4)
-    assert seen[True] >= 100
-    assert seen[False] >= 100
-    assert seen[None] <= 8
+    assert seen[True] >= 30
+    assert seen[False] >= 30
+    assert seen[None] <= 2
 
 
 @pytest.mark.parametrize("margin", [0.01, -0.01])

@@ -12,7 +12,7 @@ from grasp_core.closure.proofs import ContactCones, proves_closure, refutes_clos
 from tests.grasp_core.soft_cones import OPPOSITE
 from tests.judges import random_contacts
 
-CASES = 60
+CASES = 20
 CLOSE = 1e-6
 """Distance from the critical friction, relative to it, at which certificates are asked for: twenty
 times the width of the interval."""
