@@ -164,6 +164,7 @@ def test_swapping_the_foci_of_the_counterexample_closes_every_corner_choice():
     assert worst == pytest.approx(0.01097, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
     """At the centres of all discs the forces along the normals balance, and nearly all random
     contacts are closed too: only a search over the borders shows what the printed program does.
@@ -208,7 +209,7 @@ def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
     friction = math.tan(theta)
     printed, independent, unclosed, corrected = 0, 0, 0, 0
     for name in ("random-16-1", "random-20-7", "random-30-1"):
-        for quad, cones in paired_quadruples(name, theta, 160):
+        for quad, cones in paired_quadruples(name, theta, 50):
             normals = [piece.normal for piece in quad]
             loose = printed_regulus(quad, cones, LEAST_DEPTH)
             if loose is None:
@@ -222,10 +223,10 @@ def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
                 assert fourth_singular_value(placed.positions, placed.forces) < TOLERANCE
                 assert gc.force_closure(placed.positions, normals, friction).closed
                 corrected += 1
-    assert printed >= 80
+    assert printed >= 25
     assert independent >= 0.98 * printed
     assert unclosed >= 0.3 * printed
-    assert corrected >= 80
+    assert corrected >= 25
 
 
 def regulus_lines(rng):
@@ -249,7 +250,7 @@ def assembled(u, n, c, lengths, xyz):
 def test_only_equal_pitch_makes_the_four_lines_dependent():
     """The paper: "clearly linearly dependent". They are with l_2 = l_1 y_1 x_2 / (x_1 y_2)."""
     rng, loose, pitched = np.random.default_rng(0), [], []
-    for _ in range(1000):
+    for _ in range(200):
         u, n, c, lengths, xyz = regulus_lines(rng)
         loose.append(fourth_singular_value(*assembled(u, n, c, lengths, xyz)))
         (x1, y1, _), (x2, y2, _) = xyz
@@ -257,4 +258,3 @@ def test_only_equal_pitch_makes_the_four_lines_dependent():
         pitched.append(fourth_singular_value(*assembled(u, n, c, equal, xyz)))
     assert min(loose) > 10 * TOLERANCE
     assert max(pitched) < DEPENDENT
-    assert len(loose) == len(pitched) == 1000
