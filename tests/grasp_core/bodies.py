@@ -7,6 +7,8 @@ from tests.judges import TETRAHEDRON, random_rotation
 ROUNDING = 1e-9
 """Imbalance of forces whose normal parts sum to one, and work along a twist of unit size: a
 million rounding errors, as contacts may lie a thousand times their distance from the origin."""
+OPPOSITE = np.array([[-0.05, 0, 0], [0.05, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])
+"""Two contacts that push towards each other."""
 
 
 def box_faces(low, high):

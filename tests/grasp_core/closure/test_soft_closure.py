@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from tests.grasp_core.soft_cones import OPPOSITE
+from tests.grasp_core.bodies import OPPOSITE
 from tests.judges import random_contacts, random_rotation
 from tests.tampering import exact_closure
 

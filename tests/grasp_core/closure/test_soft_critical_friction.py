@@ -9,7 +9,7 @@ import grasp_core as gc
 from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.critical_friction import soft_ends
 from grasp_core.closure.proofs import ContactCones, proves_closure, refutes_closure
-from tests.grasp_core.soft_cones import OPPOSITE
+from tests.grasp_core.bodies import OPPOSITE
 from tests.judges import random_contacts
 
 CASES = 20

@@ -30,15 +30,15 @@ def cases():
 
 
 def test_no_sampled_load_slips_before_the_worst_and_the_worst_does():
-    """10,000 directions on the ellipsoid's surface and 2,000 places inside it, for each set."""
+    """2,000 directions on the ellipsoid's surface and 500 places inside it, for each set."""
     rng = np.random.default_rng(0)
     for _, loads, reactions in cases():
         angles, scales = reactions.worst_angles()
         contact = int(scales.argmin())
         scale = scales[contact]
         assert scale > 0.0
-        z = directions(10_000, rng, loads.axes.shape[1])
-        z[:2_000] *= rng.uniform(size=(2_000, 1))
+        z = directions(2_000, rng, loads.axes.shape[1])
+        z[:500] *= rng.uniform(size=(500, 1))
         slack = 1e-9 * np.abs(reactions.start).max()
         assert margins(reactions, scale * z).min() >= -slack
         worst = reactions.worst_of(contact, angles[contact])
@@ -49,14 +49,14 @@ def test_no_sampled_load_slips_before_the_worst_and_the_worst_does():
 def test_any_reactions_have_their_worst_angle_found():
     """Random rows, also of few or no changes, against a fine grid."""
     rng = np.random.default_rng(3)
-    grid = np.tile(np.linspace(0.0, 2.0 * np.pi, 3_601), (1_000, 1))
-    change = rng.normal(size=(1_000, 3, 4)) * rng.choice([0.0, 0.01, 1.0], size=(1_000, 3, 1))
-    start = np.column_stack([rng.uniform(0.2, 2.0, 1_000), 0.1 * rng.normal(size=(1_000, 2))])
-    reactions = Reactions(start, change, rng.choice([0.0, 0.05, 0.5, 2.0], size=1_000))
+    grid = np.tile(np.linspace(0.0, 2.0 * np.pi, 3_601), (300, 1))
+    change = rng.normal(size=(300, 3, 4)) * rng.choice([0.0, 0.01, 1.0], size=(300, 3, 1))
+    start = np.column_stack([rng.uniform(0.2, 2.0, 300), 0.1 * rng.normal(size=(300, 2))])
+    reactions = Reactions(start, change, rng.choice([0.0, 0.05, 0.5, 2.0], size=300))
     _, found = reactions.worst_angles()
     brute = reactions.scales(grid).min(axis=1)
     held = np.isfinite(brute) & (brute > 0.0)
-    assert held.sum() > 400
+    assert held.sum() > 120
     assert found[held] == pytest.approx(brute[held], rel=1e-4)
     assert (found[held] <= brute[held] * (1.0 + 1e-12)).all()
     assert (found[brute == np.inf] == np.inf).all()
@@ -88,7 +88,7 @@ def test_the_worst_load_is_the_first_slip_of_the_linear_model():
         found = first_slip(grip, load, model="linear")
         assert found.multiple == pytest.approx(scales[contact], rel=2e-6)
         tested += 1
-    assert tested == 12
+    assert tested == 6
 
 
 def test_a_weight_in_any_direction_is_a_ball_of_forces():

@@ -70,7 +70,7 @@ def closed_contacts(seed):
 def test_no_finger_pushes_less_than_with_the_deepest_forces():
     """Those are balanced and in the cones as well, so their least push cannot be larger."""
     tested = 0
-    for seed in range(200):
+    for seed in range(40):
         given_contacts = closed_contacts(seed)
         if given_contacts is None:
             continue
@@ -80,7 +80,7 @@ def test_no_finger_pushes_less_than_with_the_deepest_forces():
         deepest = pushes(gc.force_closure(positions, normals, friction).forces, normals)
         assert pushes(forces, normals).min() >= deepest.min() / deepest.max() - 1e-7
         tested += 1
-    assert tested >= 60
+    assert tested >= 12
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)
