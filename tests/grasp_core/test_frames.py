@@ -77,8 +77,3 @@ def test_an_angle_that_was_written_is_read_as_it_was():
         assert abs(kept - angle) <= math.ulp(angle)
         changed += math.radians(math.degrees(kept)) != kept
     assert changed > 100  # the plain conversion would miss so many
-
-
-def test_round_numbers_of_degrees_are_converted_as_usual():
-    for degrees in (0.0, 10.0, 45.0, 90.0, 1e-9):
-        assert radians_of(degrees) == math.radians(degrees)
