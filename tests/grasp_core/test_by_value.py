@@ -44,7 +44,8 @@ def results(body, plan):
     return [
         body, plan, grasp, squeeze, payload, gc.first_slip(squeeze.grip, squeeze.load),
         gc.force_closure(grasp, friction=FRICTION), gc.force_closure(grasp, friction=0.01),
-        gc.critical_friction_interval(grasp), gc.certify_regions(body, grasp, FRICTION),
+        gc.critical_friction_interval(grasp),
+        gc.certify_regions(body, grasp, FRICTION, max_cones=64),
         gc.ferrari_canny(grasp, friction=FRICTION, torque_scale=body.radius),
         scenes.build_scene(body, grasp, FRICTION), sv.validate(body, grasp, FRICTION),
         gc.transfer(body, body, [grasp], FRICTION),

@@ -89,17 +89,6 @@ def test_no_first_slip_is_above_the_closure_limit(most):
     assert tested >= 15
 
 
-def test_linear_forces_balance_at_rest_where_tips_do_not_roll():
-    """The comparison with the closure limit of the contacts at rest is exact for point tips."""
-    for i, grip in enumerate(planned_grips(stiffness=1000.0, tip_radius_m=0.0)):
-        for load in loads_of(grip, 4, np.random.default_rng(i)):
-            found = gc.first_slip(grip, load, model="linear", max_push_n=20.0)
-            left = grasp_map(grip.arms) @ found.forces.ravel() + found.multiple * load
-            assert np.abs(left).max() < 1e-9 * np.abs(found.forces).sum()
-            (held,) = gc.wrench_limits(grip.arms, grip.normals, 0.5, [load], max_normal_force=20.0)
-            assert found.multiple <= held.limit * (1.0 + 1e-6)
-
-
 def test_a_grip_that_was_not_made_as_one_is_refused():
     grip = opposed_grip(push=5.0)
     with pytest.raises(gc.InputError, match=r"as gc\.grip makes it"):

@@ -65,14 +65,6 @@ def test_payloads_of_other_motors_are_no_certificate():
     assert not dataclasses.replace(found, fixed=carrying).verify()
 
 
-def test_a_payload_with_motors_without_joints_changes_no_bit():
-    plain = gc.payload(box(), opposed(), 0.4, max_push_n=10.0)
-    nothing = gc.Motors.of(np.zeros((0, 12)), 1.0)
-    without = gc.payload(box(), opposed(), 0.4, max_push_n=10.0, motors=nothing)
-    assert without.free == plain.free
-    assert dataclasses.replace(without.fixed, motors=None) == plain.fixed
-
-
 def test_contacts_that_hold_nothing_have_no_payload():
     found = gc.payload(box(), opposed(), 0.0, max_push_n=10.0)
     assert found.mass_kg == found.free.lower == 0.0

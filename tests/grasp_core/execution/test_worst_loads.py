@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.loads import Reactions
 from tests.grasp_core.execution.held import directions, planned_grips
 
@@ -75,20 +74,6 @@ def test_multipliers_prove_below_the_worst_scale_and_none_do_above():
         for factor in np.geomspace(1e-3, 1e3, 200):
             assert not reactions.survives(above, factor * best)
         assert not reactions.survives(0.5 * scale, -best)
-
-
-def test_the_worst_load_is_the_first_slip_of_the_linear_model():
-    tested = 0
-    for grip, loads, reactions in cases():
-        if loads.offset.any():
-            continue
-        angles, scales = reactions.worst_angles()
-        contact = int(scales.argmin())
-        load = loads.axes @ reactions.worst_of(contact, angles[contact])
-        found = first_slip(grip, load, model="linear")
-        assert found.multiple == pytest.approx(scales[contact], rel=2e-6)
-        tested += 1
-    assert tested == 6
 
 
 def test_a_weight_in_any_direction_is_a_ball_of_forces():

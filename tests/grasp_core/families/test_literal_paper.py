@@ -7,7 +7,6 @@ the constructions back.
 """
 
 import math
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -16,7 +15,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
 from grasp_core.families.placements import LEAST_RADIUS
-from grasp_core.families.placing import CELL_A, CONSTRUCTIONS
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.families.regulus_kernel import LEAST_DEPTH
 from tests.grasp_core.families.disc_borders import descended_margin
 from tests.grasp_core.families.printed_paper import (
@@ -53,28 +52,6 @@ def in_a_safe_cell(quad, discs):
         for i, p, r in zip(PAIR, quad, discs.radii, strict=True)
     ]
     return gap >= -TOLERANCE or -gap <= min(reach) + TOLERANCE
-
-
-@pytest.mark.parametrize(
-    ("theta_deg", "printed"), [(5.0, 0.071225), (10.0, 0.134850), (15.0, 0.192237)]
-)
-def test_on_the_tetrahedron_the_printed_pencil_program_prefers_the_wrong_order(theta_deg, printed):
-    """The proved radius is rho0 tan(theta / 2), with rho0 = 1 / sqrt(3) for vertices at distance
-    sqrt(3); the printed program gains almost three times that by crossing the foci over.
-    """
-    theta, scale = math.radians(theta_deg), math.sqrt(3.0)
-    pairings = list(paired_quadruples("tetrahedron", theta))
-    assert len(pairings) == 3
-    for quad, cones in pairings:
-        discs = printed_pencil(quad, theta)
-        assert scale * discs.radii[0] == pytest.approx(printed, abs=1e-6)
-        assert focus_gap(quad, discs.foci) < -1.0
-        assert not in_a_safe_cell(quad, discs)
-        proved = replace(CONSTRUCTIONS["pencil"], patterns=CELL_A[None]).place(quad, cones)
-        assert proved is not None
-        # half of the least gap puts each focus 1 / sqrt(3) of it nearer to its faces
-        depth = 1.0 / scale - 0.5 * LEAST_RADIUS
-        assert scale * proved.merit == pytest.approx(depth * math.tan(theta / 2.0), abs=TOLERANCE)
 
 
 COUNTEREXAMPLE_THETA = math.radians(5.0)
