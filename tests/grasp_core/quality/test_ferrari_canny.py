@@ -166,15 +166,6 @@ def test_turning_moving_reordering_and_units_change_nothing():
         tested += 1
 
 
-def test_friction_may_differ_between_contacts_and_more_is_never_worse():
-    one = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, [0.3, 0.3, 0.3, 0.6], torque_scale=1.0)
-    less = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0)
-    more = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.6, torque_scale=1.0)
-    assert less.lower <= one.upper
-    assert one.lower <= more.upper
-    assert less.upper < more.lower
-
-
 def test_a_full_store_gives_wider_bounds_that_hold(monkeypatch):
     monkeypatch.setattr(module, "MOST_SIMPLICES", 500)
     rough = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0)

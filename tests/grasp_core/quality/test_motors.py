@@ -57,64 +57,6 @@ def test_limits_are_proved_and_those_of_the_definition():
     assert limited >= 8
 
 
-def test_strong_motors_change_nothing():
-    rng = np.random.default_rng(2)
-    positions, normals = random_contacts(rng)
-    wrenches = rng.normal(size=(5, 6))
-    strong = gc.Motors.of(rng.normal(size=(16, 12)), 1e4)
-    plain = gc.wrench_limits(positions, normals, 0.6, wrenches, max_normal_force=3.0)
-    moved = gc.wrench_limits(positions, normals, 0.6, wrenches, max_normal_force=3.0, motors=strong)
-    assert [found.limit for found in moved] == pytest.approx(
-        [found.limit for found in plain], rel=1e-6, abs=1e-6
-    )
-
-
-def test_limits_rise_with_torque_in_proportion_and_a_dead_joint_only_lowers_them():
-    rng = np.random.default_rng(3)
-    tested = 0
-    while tested < 3:
-        positions, normals = random_contacts(rng)
-        if not gc.force_closure(positions, normals, 0.6).closed:
-            continue
-        levers, wrench = hand_of(rng, 4, 1.0, joints=4, lever_m=1.0).levers, rng.normal(size=6)
-
-        def limit(torques, positions=positions, normals=normals, levers=levers, wrench=wrench):
-            return gc.wrench_limits(
-                positions,
-                normals,
-                0.6,
-                [wrench],
-                max_normal_force=1e3,
-                motors=gc.Motors.of(levers, torques),
-            )[0].limit
-
-        dead = np.ones(len(levers))
-        dead[0] = 1e-6
-        assert limit(2.0) == pytest.approx(2.0 * limit(1.0), rel=1e-5)
-        assert limit(dead) <= limit(1.0) * (1.0 + 1e-5)
-        tested += 1
-
-
-def test_a_limit_of_other_motors_or_with_other_multipliers_does_not_verify():
-    rng = np.random.default_rng(4)
-    refused = 0
-    while refused < 9:
-        positions, normals = random_contacts(rng)
-        if not gc.force_closure(positions, normals, 0.6).closed:
-            continue
-        motors, wrench = hand_of(rng, 4, 1.0, joints=4, lever_m=1.0), rng.normal(size=6)
-        given = {"max_normal_force": 3.0, "motors": motors}
-        (found,) = gc.wrench_limits(positions, normals, 0.6, wrench[None], **given)
-        if np.abs(motors.torques(found.forces) / motors.limits).max() < 1.0 - 1e-4:
-            continue
-        weaker = gc.Motors(motors.levers, 0.99 * motors.limits, 0.99 * motors.gravity)
-        stronger = gc.Motors(motors.levers, 1.01 * motors.limits, motors.gravity)
-        assert found.verify(positions, normals, 0.6, **given)
-        for others in (weaker, stronger, None):
-            assert not found.verify(positions, normals, 0.6, max_normal_force=3.0, motors=others)
-            refused += 1
-
-
 def test_motors_in_any_orientation_give_up_what_their_links_ask_in_the_worst():
     """One joint carries up to 0.05 of its 0.3 N m, the other sqrt(3) / 4 of its newton metre."""
     weights = np.array([[0.0, -0.03, 0.04], [0.25, 0.25, 0.25]])

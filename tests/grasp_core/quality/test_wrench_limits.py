@@ -76,13 +76,6 @@ def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
     assert tested == 6
 
 
-def test_limits_scale_with_force_and_inversely_with_the_wrench():
-    wrench = np.array([1.0, 2, 3, 0.1, 0.2, 0.3])
-    one = limit(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench, 1.0)
-    ten = limit(TETRA_CENTERS, TETRA_NORMALS, 0.5, wrench / 2, 5.0)
-    assert ten == pytest.approx(10 * one, rel=1e-6)
-
-
 def test_friction_may_differ_between_contacts():
     """A force across the line of two fingers, at the second one: only that finger resists it."""
     positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
