@@ -132,7 +132,7 @@ def closure(c):
 
 
 def interval(c):
-    """Both ends of a critical friction are proved, without rounding, by what is shown beside them."""
+    """Both ends of a critical friction are proved, without rounding, by what is beside them."""
     x, n, lower, upper = c.positions, c.normals, c.lower, c.upper
     if not contacts_make_sense(x, n, np.zeros(len(x))) or not 0.0 <= lower <= upper:
         return False

@@ -14,14 +14,6 @@ from tests.judges import (
     random_contacts,
 )
 
-AROUND_Z = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, -1]])
-"""(x, y, z) -> (-y, x, -z): a quarter turn with a reflection."""
-
-
-def turned(point, normal):
-    images = [np.linalg.matrix_power(AROUND_Z, k) for k in range(4)]
-    return np.array([R @ point for R in images]), np.array([R @ normal for R in images])
-
 
 def test_face_centres_of_a_tetrahedron_are_closed_at_any_friction():
     for friction in (1e-3, 0.1, 0.5, 2.0):
@@ -32,32 +24,37 @@ def test_face_centres_of_a_tetrahedron_are_closed_at_any_friction():
     assert gc.critical_friction(TETRA_CENTERS, TETRA_NORMALS) == 0.0
 
 
-@pytest.mark.parametrize(("s", "h"), [(0.2, 0.3), (0.4, 0.0), (0.4, 0.7), (0.05, -0.5)])
-def test_four_sides_of_a_box(s, h):
-    """Contacts (rho, s, h) and their images need |s| / rho."""
-    positions, normals = turned(np.array([1.0, s, h]), np.array([-1.0, 0, 0]))
-    assert gc.critical_friction(positions, normals) == pytest.approx(s, rel=1e-7)
+QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+MIRRORED = QUARTER * [1, 1, -1]
+"""A quarter turn about z, and with a reflection across it: (x, y, z) -> (-y, x, -z)."""
 
 
-@pytest.mark.parametrize("beta_deg", [10.0, 20.0, 30.0])
-def test_four_sides_of_a_frustum(beta_deg):
-    beta = math.radians(beta_deg)
-    spin = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    normal = np.array([-math.cos(beta), 0, -math.sin(beta)])
-    images = [np.linalg.matrix_power(spin, k) for k in range(4)]
-    positions = np.array([R @ [1.0, 0, 0] for R in images])
-    normals = np.array([R @ normal for R in images])
-    assert gc.critical_friction(positions, normals) == pytest.approx(math.tan(beta), rel=1e-7)
+def images(way, point, normal):
+    turns = [np.linalg.matrix_power(way, k) for k in range(4)]
+    return np.array([R @ point for R in turns]), np.array([R @ normal for R in turns])
 
 
-@pytest.mark.parametrize(
-    ("a", "h", "w", "expected"), [(0.2, 1, 2, 0.3), (0.5, 0.8, 2, 0.0), (0.1, 0.5, 1, 0.3)]
-)
-def test_parallel_faces(a, h, w, expected):
+def on_a_frustum(beta):
+    return images(QUARTER, [1.0, 0, 0], [-math.cos(beta), 0, -math.sin(beta)])
+
+
+def on_parallel_faces(a, h, w):
     """Two and two opposite contacts in one plane; a third pair of axes closes nothing."""
     positions = np.array([[-w / 2, a, 0], [-w / 2, -a, 0], [w / 2, h + a, 0], [w / 2, h - a, 0]])
-    normals = np.array([[1.0, 0, 0], [1, 0, 0], [-1, 0, 0], [-1, 0, 0]])
-    assert gc.critical_friction(positions, normals) == pytest.approx(expected, abs=1e-7)
+    return positions, np.array([[1.0, 0, 0], [1, 0, 0], [-1, 0, 0], [-1, 0, 0]])
+
+
+INWARD = [-1.0, 0, 0]
+KNOWN = [(images(MIRRORED, [1.0, s, h], INWARD), s)  # on the sides of a box: |s| / rho
+         for s, h in ((0.2, 0.3), (0.4, 0.0), (0.4, 0.7), (0.05, -0.5))]  # fmt: skip
+KNOWN += [(on_a_frustum(beta), math.tan(beta)) for beta in np.radians([10.0, 20.0, 30.0])]
+KNOWN += [(on_parallel_faces(0.2, 1, 2), 0.3), (on_parallel_faces(0.5, 0.8, 2), 0.0),
+          (on_parallel_faces(0.1, 0.5, 1), 0.3)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("contacts", "expected"), KNOWN)
+def test_critical_frictions_are_those_of_closed_forms(contacts, expected):
+    assert gc.critical_friction(*contacts) == pytest.approx(expected, rel=1e-7, abs=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +141,7 @@ def test_zero_friction_is_decided_for_any_number_of_contacts():
 
 def test_the_boundary_itself_is_refuted():
     """Exactly critical: forces exist only on the cones, and a twist touches all of them."""
-    positions, normals = turned(np.array([1.0, 0.25, 0.5]), np.array([-1.0, 0, 0]))
+    positions, normals = images(MIRRORED, [1.0, 0.25, 0.5], INWARD)
     certificate = gc.force_closure(positions, normals, 0.25)
     assert not certificate.closed
     assert certificate.verify()

