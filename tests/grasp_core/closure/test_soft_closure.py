@@ -78,17 +78,6 @@ def test_more_torsion_never_loses_closure_and_motions_change_nothing():
     assert closed >= 5
 
 
-def test_torsion_of_zero_changes_no_field():
-    rng = np.random.default_rng(7)
-    for count in (2, 3, 4, 5):
-        x, n, mu, _ = drawn(rng, count)
-        plain, zero = gc.force_closure(x, n, mu), gc.force_closure(x, n, mu, torsion_m=0.0)
-        assert plain == zero
-        assert plain.torsion_m is None
-        assert plain.torques is None
-        assert repr(plain) == repr(zero)
-
-
 def test_torsion_without_friction_is_refused():
     with pytest.raises(gc.InputError, match="torsion_m must be zero where friction is"):
         gc.force_closure(*OPPOSITE, 0.0, torsion_m=0.01)
