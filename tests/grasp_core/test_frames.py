@@ -30,7 +30,10 @@ def test_poses_at_contacts_are_right_handed_with_z_along_the_normal(body):
 
 
 def test_fingers_that_go_along_z_from_their_poses_arrive_at_the_contacts(body):
-    for planned, finger in ((gc.plan(body, limit=5), None), (gc.plan(body, finger=FINGER), FINGER)):
+    for planned, finger in (
+        (gc.plan(body, limit=5), None),
+        (gc.plan(body, limit=5, finger=FINGER), FINGER),
+    ):
         assert len(planned) > 1
         for grasp in planned:
             poses = grasp.approach_poses(0.02)

@@ -84,6 +84,7 @@ def test_masses_are_proved_and_true_by_definition():
         found = carried_mass(hand)
         assert found.verify()
         assert hand_payloads.payload(found)
+        assert hand_payloads.held(hand, found.weakest) <= found.upper * (1.0 + PROGRAM)
         assert 0.0 < found.lower <= found.upper <= found.lower * (1.0 + GAP) * (1.0 + PROGRAM)
 
 

@@ -89,8 +89,8 @@ def test_a_contact_off_the_true_surface_is_refused(planned):
 
 
 def test_the_free_method_works_on_curved_surfaces_and_proves_nothing_there():
-    plan = gc.plan(curved_body(subdivisions=3), FRICTION, families="free", limit=2)
-    assert len(plan.grasps) == 2
+    plan = gc.plan(curved_body(subdivisions=3), FRICTION, families="free", limit=1)
+    assert len(plan.grasps) == 1
     assert not plan.absences
     for grasp in plan.grasps:
         assert gc.force_closure(grasp, friction=FRICTION).verify()
