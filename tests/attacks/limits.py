@@ -18,10 +18,10 @@ from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.quality.wrench_limits import body_of
 from tests.attacks.searching import Attack, cycled, power, tiny
 from tests.tampering import table
-from tests.tampering.exact_closure import conic, locals_of, unit_arms
+from tests.tampering.exact_closure import unit_arms
 from tests.tampering.hand_payloads import held
 from tests.tampering.squeezes import GRAVITY, largest_scale, responding
-from tests.tampering.wrench_bounds import scaled, torques_of
+from tests.tampering.wrench_bounds import largest_multiple, torques_of
 
 SEEDS = 12
 SURE = 1e-5
@@ -34,19 +34,12 @@ def limit(seed):
     c = table.wrench_limit(seed) if seed % 2 else on_a_line(seed)
     x, n, most = c.positions, c.normals, c.max_normal_force
     mu = np.full(len(x), c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
-    arms, size = unit_arms(x)
+    _, size = unit_arms(x)
     w = c.found.wrench
     load = np.append(w[:3], (w[3:] - np.cross(x.mean(axis=0) - c.center, w[:3])) / size)
-    torques, room = torques_of(c.motors, n, most)
-    k, length = len(x), np.linalg.norm(load)
-    A = np.zeros((6 + k + len(room) + 3 * k, 3 * k + 1))
-    A[:6, :-1], A[:6, -1] = locals_of(arms, n, mu), load / length
-    A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
-    A[6 + k : -3 * k, :-1] = torques @ scaled(mu)
-    A[-3 * k :, :-1] = -np.eye(3 * k)
-    b = np.r_[np.zeros(6), np.ones(k), room, np.zeros(3 * k)]
-    best = most * conic(np.append(np.zeros(3 * k), -1.0), A, b, 6, k + len(room), k).x[-1] / length
-    return c, best, SURE * most * k * np.sqrt(1.0 + mu.max() ** 2) / length
+    best = largest_multiple(x, n, mu, np.zeros(len(x)), load, torques_of(c.motors, n, most), most)
+    off = SURE * most * len(x) * np.sqrt(1.0 + mu.max() ** 2) / np.linalg.norm(load)
+    return c, best, off
 
 
 def on_a_line(seed):

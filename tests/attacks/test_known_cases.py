@@ -53,8 +53,8 @@ def test_a_border_around_zero_is_proved_in_any_order_of_its_corners():
 def test_no_sliver_raises_a_quality():
     """Whole certificates, whose lower bound is above a support."""
     ways = [wrench_sets.doubled_slivers, wrench_sets.thin_borders]
-    found = attacked(wrench_sets.QUALITY, 500)
-    assert min(found.tries[way.__name__] for way in ways) > 20
+    found = attacked(wrench_sets.QUALITY, 200)
+    assert min(found.tries[way.__name__] for way in ways) > 10
     assert found.raised == []
     assert found.accepted == []
 
@@ -123,7 +123,7 @@ def test_no_short_twist_opens_closed_contacts():
 
 @pytest.mark.parametrize(
     ("attack", "tries"),
-    [(contacts.CLOSURE, 800), (contacts.SOFT, 400), (limits.HAND, 600), (limits.SQUEEZE, 200)],
+    [(contacts.CLOSURE, 200), (contacts.SOFT, 100), (limits.HAND, 150), (limits.SQUEEZE, 60)],
 )
 def test_nothing_short_proves_anything(attack, tries):
     """Twists, facets and multipliers down to the smallest number there is."""

@@ -6,7 +6,6 @@ import numpy as np
 import trimesh
 
 MM = 1e-3
-ORIENTATIONS = 20
 KINDS = ("auto", "planar", "patches")
 """Kinds of faces that are asked for."""
 

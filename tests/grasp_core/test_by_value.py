@@ -26,12 +26,12 @@ class Value(ByValue):
 
 @pytest.fixture(scope="module")
 def body():
-    return scenes.example_object("wedge")
+    return scenes.example_object("tetrahedron")
 
 
 @pytest.fixture(scope="module")
 def plan(body):
-    return gc.plan(body, FRICTION)
+    return gc.plan(body, FRICTION, limit=3)
 
 
 @pytest.fixture(scope="module")
@@ -44,12 +44,10 @@ def results(body, plan):
     return [
         body, plan, grasp, squeeze, payload, gc.first_slip(squeeze.grip, squeeze.load),
         gc.force_closure(grasp, friction=FRICTION), gc.force_closure(grasp, friction=0.01),
-        gc.critical_friction_interval(grasp), gc.certify_regions(body, grasp, FRICTION),
+        gc.critical_friction_interval(grasp),
+        gc.certify_regions(body, grasp, FRICTION, max_cones=64),
         gc.ferrari_canny(grasp, friction=FRICTION, torque_scale=body.radius),
-        gc.quality_ceiling(body, grasp.faces, FRICTION), gc.best_grasp(body, FRICTION, gap=0.6),
-        scenes.build_scene(body, grasp, FRICTION),
-        sv.validate(body, grasp, FRICTION),
-        sv.execute(body, grasp, FRICTION, mass_kg=0.2),
+        scenes.build_scene(body, grasp, FRICTION), sv.validate(body, grasp, FRICTION),
         gc.transfer(body, body, [grasp], FRICTION),
     ]  # fmt: skip
 
@@ -105,14 +103,6 @@ def test_a_result_with_another_number_is_another_result(results):
                 assert other != result, (type(result), each.name)
                 changed += 1
     assert changed > 20
-
-
-def test_grasps_planned_twice_are_equal_and_figures_are_computed_only_if_compared(body, plan):
-    again = gc.plan(body, FRICTION)
-    assert hash(again[0]) == hash(plan[0])
-    assert plan[0] != plan[1]
-    assert again == plan
-    assert again.grasps[3].critical_friction == plan[3].critical_friction
 
 
 def test_public_dataclasses_with_arrays_are_compared_by_value():

@@ -1,6 +1,5 @@
 """How inner loops are declared, kept, and loaded where numba is as it should be, and where not."""
 
-import ast
 import os
 import shutil
 import subprocess
@@ -82,11 +81,6 @@ def test_a_numba_that_cannot_be_loaded_is_named_with_what_to_do(monkeypatch, err
         compiled.__wrapped__(KERNEL)
 
 
-def test_a_kernel_that_does_not_exist_is_no_fault_of_numba():
-    with pytest.raises(ModuleNotFoundError, match="no_kernel"):
-        compiled.__wrapped__("grasp_core.solvers.no_kernel")
-
-
 def said_in(folder, script, **settings):
     """What a script says that finds the package in a folder."""
     done = subprocess.run(
@@ -97,7 +91,7 @@ def said_in(folder, script, **settings):
     return done.stdout.split()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def copies(tmp_path_factory):
     """Two folders with the same package, as two environments have it."""
     folder = tmp_path_factory.mktemp("environments")
@@ -109,30 +103,23 @@ def copies(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
-def test_another_environment_finds_what_one_has_compiled(variable, copies, tmp_path):
-    there = {"NUMBA_CACHE_DIR": "", variable: str(tmp_path)}
+def test_another_environment_finds_what_one_has_compiled_until_what_it_calls_is_changed(
+    copies, tmp_path
+):
+    there = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(tmp_path)}
     hits, kept, path = said_in(copies / "one", SCRIPT, **there)
     assert (hits, kept) == ("0", "True")
     assert Path(path).is_relative_to(tmp_path / "graspproof")
     assert said_in(copies / "two", SCRIPT, **there) == ["1", "True", path]
-
-
-def test_a_change_of_what_a_kernel_calls_has_both_compiled_again(copies, tmp_path):
-    there = {"NUMBA_CACHE_DIR": str(tmp_path)}
-    *_, path = said_in(copies / "one", SCRIPT, **there)
     text = copies / "two" / (CALLED.replace(".", "/") + ".py")
-    before = text.read_text()
-    text.write_text(before.replace("\n\n\n", "\n\n\nCHANGED = True\n\n\n", 1))
-    try:
-        hits, _, other = said_in(copies / "two", SCRIPT, **there)
-    finally:
-        text.write_text(before)
+    text.write_text(text.read_text().replace("\n\n\n", "\n\n\nCHANGED = True\n\n\n", 1))
+    hits, _, other = said_in(copies / "two", SCRIPT, **there)
     assert hits == "0"
     assert Path(other).name != Path(path).name
     assert Path(other).name.startswith(f"{CALLER}-")
 
 
+@pytest.mark.slow
 def test_without_optimization_code_runs_without_a_word(tmp_path):
     """Numba keeps no such code, as it holds addresses of its process."""
     there = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_OPT": "0"}
@@ -185,23 +172,3 @@ def test_folders_that_others_remove_meanwhile_do_not_matter(monkeypatch, tmp_pat
     assert not is_kept(KERNEL)
     (copy.parent / "own.py.nbi").touch()
     assert is_kept(KERNEL)
-
-
-def test_loops_that_are_compiled_where_they_are_called_are_called_once_and_divide_alike():
-    declared, calls = {}, []
-    for path in sorted(ROOT.glob("[gs]*/**/*_kernel.py")):
-        module, tree = ".".join(path.relative_to(ROOT).with_suffix("").parts), path.read_text()
-        functions = [n for n in ast.parse(tree).body if isinstance(n, ast.FunctionDef)]
-        imports = [n for n in ast.parse(tree).body if isinstance(n, ast.ImportFrom)]
-        known = {a.name: f"{n.module}.{a.name}" for n in imports for a in n.names}
-        known |= {n.name: f"{module}.{n.name}" for n in functions}
-        for function in functions:
-            declared[known[function.name]] = " ".join(map(ast.unparse, function.decorator_list))
-            called = [n.func.id for n in ast.walk(function) if isinstance(n, ast.Call)
-                      and isinstance(n.func, ast.Name) and n.func.id in known]  # fmt: skip
-            calls += [(known[name], known[function.name]) for name in called]
-    once = {name: how for name, how in declared.items() if "once=True" in how}
-    assert len(once) > 50
-    for name, how in once.items():
-        (caller,) = [caller for called, caller in calls if called == name]
-        assert ("numpy" in how) == ("numpy" in declared[caller]), (name, caller)

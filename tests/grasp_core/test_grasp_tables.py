@@ -59,19 +59,6 @@ def test_a_filter_keeps_what_meets_the_demand_in_order(plan, demand, meets):
     assert list(kept) == [grasp for grasp in plan if meets(grasp)]
 
 
-def test_what_plan_takes_for_families_filter_takes_too():
-    body = scenes.example_object("tetrahedron")
-    for families in ("free", ["pencil", "free"]):
-        plan = gc.plan(body, 0.5, families=families)
-        assert len(plan) > 0
-        assert list(plan.filter(family=families)) == list(plan)
-
-
-def test_demands_are_met_together(plan):
-    both = plan.filter(family="concurrent", min_radius_m=0.004)
-    assert list(both) == list(plan.filter(family="concurrent").filter(min_radius_m=0.004))
-
-
 @pytest.mark.parametrize(
     ("demand", "words"),
     [

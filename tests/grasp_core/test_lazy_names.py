@@ -39,13 +39,6 @@ def test_what_a_type_checker_sees_is_what_there_is(package):
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_no_name_is_hidden_by_a_module(package):
-    """Importing a module makes it an attribute of its package, in place of what has its name."""
-    modules = {path.stem for path in (ROOT / package).iterdir() if path.suffix in {"", ".py"}}
-    assert not modules & {name for _, name, _ in stub(package)}
-
-
-@pytest.mark.parametrize("package", PACKAGES)
 def test_a_wrong_name_is_an_attribute_error(package):
     with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'grasps_of'"):
         _ = import_module(package).grasps_of

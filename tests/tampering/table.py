@@ -5,7 +5,7 @@ A class with `verify` that is not in `TABLE` fails `test_the_table_is_complete`.
 
 import dataclasses
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -47,24 +47,17 @@ class Row:
 
 
 def placed(rng):
-    """Contacts of some size and place, with frictions."""
+    """Contacts of some size and place, with frictions, and without torsion."""
     count = int(rng.integers(2, 8))
     x, n = random_contacts(rng, count, rng.choice([0.3, 0.7, 2.0]))
     same = rng.uniform() < 0.6
     mu = rng.choice(FRICTIONS) if same else rng.choice(FRICTIONS, size=count)
-    return rng.choice(SIZES) * (x + rng.choice([0.0, 3.0]) * rng.normal(size=3)), n, mu
-
-
-def closure(seed):
-    try:
-        return gc.force_closure(*placed(np.random.default_rng(seed)))
-    except gc.UndecidedError:
-        return None
+    return rng.choice(SIZES) * (x + rng.choice([0.0, 3.0]) * rng.normal(size=3)), n, mu, 0.0
 
 
 def soft(rng):
     """Contacts of which some have torsion, with frictions above zero where they have."""
-    x, n, mu = placed(rng)
+    x, n, mu, _ = placed(rng)
     mu = np.full(len(x), mu) if np.ndim(mu) == 0 else mu
     size = float(np.ptp(x, axis=0).max())
     mu_t = size * rng.choice([0.0, 0.01, 0.1, 0.5], size=len(x))
@@ -72,8 +65,8 @@ def soft(rng):
     return x, n, np.where(mu_t > 0.0, np.maximum(mu, 0.05), mu), mu_t
 
 
-def soft_closure(seed):
-    x, n, mu, mu_t = soft(np.random.default_rng(seed))
+def closure(seed, contacts=placed):
+    x, n, mu, mu_t = contacts(np.random.default_rng(seed))
     try:
         return gc.force_closure(x, n, mu, torsion_m=mu_t)
     except gc.UndecidedError:
@@ -81,7 +74,7 @@ def soft_closure(seed):
 
 
 def friction_interval(seed):
-    x, n, _ = placed(np.random.default_rng(seed))
+    x, n, _, _ = placed(np.random.default_rng(seed))
     return gc.critical_friction_interval(x, n)
 
 
@@ -106,34 +99,24 @@ def absence(seed):
     return found if isinstance(found, Absence) else None
 
 
-def quality(seed):
+def quality(seed, contacts=placed):
     rng = np.random.default_rng(seed)
-    x, n, mu = placed(rng)
+    x, n, mu, mu_t = contacts(rng)
     size = float(np.ptp(x, axis=0).max())
     return gc.ferrari_canny(
         x, n, mu, center=x.mean(axis=0), torque_scale=size, norm=rng.choice(["l1", "linf"]).item(),
-        gap=0.1,
+        gap=0.1, torsion_m=mu_t,
     )  # fmt: skip
 
 
 def resisted(seed):
     """The weight, or a task, on contacts that are not closed where chance will have it."""
     rng = np.random.default_rng(seed)
-    x, n, mu = placed(rng)
+    x, n, mu, _ = placed(rng)
     size = float(np.ptp(x, axis=0).max())
     wrenches = WrenchSet.of(x, n, mu, center=x.mean(axis=0), torque_scale=size)
     task = Measure("task", rng.normal(size=(3, 6)))
     return resisted_loads(wrenches, Measure("weight") if seed % 2 else task, 0.1)
-
-
-def soft_quality(seed):
-    rng = np.random.default_rng(seed)
-    x, n, mu, mu_t = soft(rng)
-    size = float(np.ptp(x, axis=0).max())
-    return gc.ferrari_canny(
-        x, n, mu, center=x.mean(axis=0), torque_scale=size, norm=rng.choice(["l1", "linf"]).item(),
-        gap=0.1, torsion_m=mu_t,
-    )  # fmt: skip
 
 
 def ceiling(seed):
@@ -196,31 +179,20 @@ class Limited:
         )  # fmt: skip
 
 
-def wrench_limit(seed):
+def wrench_limit(seed, contacts=placed):
+    """With motors, every other one that has no torsion."""
     rng = np.random.default_rng(seed)
-    x, n, mu = placed(rng)
+    x, n, mu, mu_t = contacts(rng)
     size, largest = float(np.ptp(x, axis=0).max()), float(10.0 ** rng.uniform(-1, 2))
     center = x.mean(axis=0) + size * rng.normal(size=3)
     load = rng.normal(size=6) * np.repeat([1.0, size], 3)
     given = {
         "max_normal_force": largest,
         "center": center,
-        "motors": motors(rng, len(x), largest) if seed % 2 else None,
+        "motors": motors(rng, len(x), largest) if seed % 2 and not np.any(mu_t) else None,
     }
-    (found,) = gc.wrench_limits(x, n, mu, load[None], **given)
-    return Limited(found, x, n, mu, largest, center, given["motors"])
-
-
-def soft_wrench_limit(seed):
-    rng = np.random.default_rng(seed)
-    x, n, mu, mu_t = soft(rng)
-    size, largest = float(np.ptp(x, axis=0).max()), float(10.0 ** rng.uniform(-1, 2))
-    center = x.mean(axis=0) + size * rng.normal(size=3)
-    load = rng.normal(size=6) * np.repeat([1.0, size], 3)
-    (found,) = gc.wrench_limits(
-        x, n, mu, load[None], max_normal_force=largest, center=center, torsion_m=mu_t
-    )
-    return Limited(found, x, n, mu, largest, center, None, mu_t)
+    (found,) = gc.wrench_limits(x, n, mu, load[None], torsion_m=mu_t, **given)
+    return Limited(found, x, n, mu, largest, center, given["motors"], mu_t)
 
 
 def motors(rng, count, largest):
@@ -333,11 +305,11 @@ TABLE = {
     ),
     "WrenchLimit": Row(wrench_limit, lambda c, _: wrench_bounds.wrench_limit(c)),
     "a closure certificate with torsion": Row(
-        soft_closure, lambda c, _: exact_closure.closure(c), 2.0
+        partial(closure, contacts=soft), lambda c, _: exact_closure.closure(c), 2.0
     ),
-    "a quality with torsion": Row(soft_quality, wrench_bounds.quality),
+    "a quality with torsion": Row(partial(quality, contacts=soft), wrench_bounds.quality),
     "a wrench limit with torsion": Row(
-        soft_wrench_limit, lambda c, _: wrench_bounds.wrench_limit(c)
+        partial(wrench_limit, contacts=soft), lambda c, _: wrench_bounds.wrench_limit(c)
     ),
     "BestSqueeze": Row(best_squeeze, lambda c, _: squeezes.squeeze(c), 0.8),
     "CutTree": Row(cut_tree, best_grasps.proof, 0.8),

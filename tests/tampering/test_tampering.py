@@ -124,7 +124,8 @@ def test_the_table_is_complete():
     found = set()
     for package in (grasp_core, scenes, sim_validate):
         for path in Path(package.__file__).parent.rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            text = path.read_text(encoding="utf-8")
+            for node in ast.walk(ast.parse(text if "def verify(" in text else "")):
                 if isinstance(node, ast.ClassDef):
                     names = {part.name for part in node.body if isinstance(part, ast.FunctionDef)}
                     found |= {node.name} if "verify" in names else set()

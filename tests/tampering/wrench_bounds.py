@@ -119,15 +119,7 @@ def wrench_limit(c):
     load = np.append(found.wrench[:3], (found.wrench[3:] - lever) / size)
     length = np.linalg.norm(load)
     torques, room = torques_of(c.motors, n, largest)
-    hard = np.arange(4 * k) % 4 < 3
-    A = np.zeros((6 + k + len(room) + 4 * k, 4 * k + 1))
-    A[:6, :-1], A[:6, -1] = soft_locals(x, n, mu, mu_t), load / length
-    A[6 + np.arange(k), 4 * np.arange(k)] = 1.0
-    A[6 + k : -4 * k, np.flatnonzero(hard)] = torques @ scaled(mu)
-    A[-4 * k :, :-1] = -np.eye(4 * k)
-    b = np.r_[np.zeros(6), np.ones(k), room, np.zeros(4 * k)]
-    solved = conic(np.append(np.zeros(4 * k), -1.0), A, b, 6, k + len(room), k)
-    best = largest * solved.x[-1] / length
+    best = largest_multiple(x, n, mu, mu_t, load, (torques, room), largest)
     f, m = found.forces / largest, np.zeros(k)
     if mu_t.any():
         m = found.torques / largest
@@ -149,6 +141,20 @@ def wrench_limit(c):
         and (torques @ local_of(f, n) <= room + 1e-6 * weight * strong).all()
         and np.linalg.norm(left) <= 1e-6 * weight and scale_error <= 2e-6
     )  # fmt: skip
+
+
+def largest_multiple(x, n, mu, mu_t, load, motors, largest):
+    """How much of a load at unit size, (6,), contacts resist within rows of torques and room."""
+    k, length, (torques, room) = len(x), np.linalg.norm(load), motors
+    hard = np.arange(4 * k) % 4 < 3
+    A = np.zeros((6 + k + len(room) + 4 * k, 4 * k + 1))
+    A[:6, :-1], A[:6, -1] = soft_locals(x, n, mu, mu_t), load / length
+    A[6 + np.arange(k), 4 * np.arange(k)] = 1.0
+    A[6 + k : -4 * k, np.flatnonzero(hard)] = torques @ scaled(mu)
+    A[-4 * k :, :-1] = -np.eye(4 * k)
+    b = np.r_[np.zeros(6), np.ones(k), room, np.zeros(4 * k)]
+    solved = conic(np.append(np.zeros(4 * k), -1.0), A, b, 6, k + len(room), k)
+    return largest * solved.x[-1] / length
 
 
 def torques_of(motors, n, largest):

@@ -9,9 +9,12 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.proofs import ContactCones, proves_closure, refutes_closure
-from tests.grasp_core.bodies import BODIES, holds, moved
+from tests.grasp_core.bodies import BODIES, moved
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
+ROUNDING = 1e-9
+"""Imbalance of forces whose normal parts sum to one, and work along a twist of unit size: a
+million rounding errors, as contacts may lie a thousand times their distance from the origin."""
 X, Y, Z = np.eye(3)
 CORNERS = np.array([X + Y, Y - X, -X - Y, X - Y])
 TRIANGLE = np.array([X, -0.5 * X + 0.8 * Y, -0.5 * X - 0.8 * Y])
@@ -33,6 +36,25 @@ DEGENERATE = {
     "good ones repeated": (TETRA_CENTERS[REPEATED], TETRA_NORMALS[REPEATED], True),
 }
 """Contacts, and whether they are in closure at any positive friction: or else at none."""
+
+
+def holds(certificate):
+    """The certificate re-checked here: balanced forces in the cones, or a twist against them."""
+    x, n, mu = certificate.positions, certificate.normals, certificate.friction
+    if certificate.closed:
+        f = certificate.forces
+        across = np.linalg.norm(np.cross(n, f), axis=1)
+        along = np.einsum("ki,ki->k", f, n)
+        inside = np.where(mu > 0.0, mu * along - across, along) > 0.0
+        torque = np.cross(x - x.mean(axis=0), f).sum(axis=0) / np.ptp(x, axis=0).max()
+        slack = across[mu == 0.0].max(initial=0.0)
+        return inside.all() and max(slack, *np.abs(f.sum(axis=0)), *np.abs(torque)) < ROUNDING
+    a, b = np.split(certificate.separating_wrench, 2)
+    velocities = a + np.cross(b, x)
+    away = -np.einsum("ki,ki->k", velocities, n)
+    work = mu * np.linalg.norm(np.cross(n, velocities), axis=1) - away
+    speed = np.linalg.norm(a) + np.linalg.norm(b) * np.linalg.norm(x, axis=1).max()
+    return (a.any() or b.any()) and work.max() <= ROUNDING * speed
 
 
 def answer(positions, normals, friction):
@@ -73,14 +95,14 @@ def test_contacts_named_twice_change_nothing():
     seen = Counter()
     for body in BODIES:
         rng = np.random.default_rng(5)
-        for _ in range(40):
+        for _ in range(15):
             positions, normals = BODIES[body](rng, 4)
             twice = np.append(rng.permutation(4), rng.integers(4, size=rng.integers(1, 6)))
             closed = answer(positions, normals, 0.6)
             assert answer(positions[twice], normals[twice], 0.6) is closed
             seen[closed] += 1
-    assert seen[True] >= 40
-    assert seen[False] >= 40
+    assert seen[True] >= 15
+    assert seen[False] >= 15
     assert seen[None] == 0
 
 
@@ -100,14 +122,14 @@ def test_contacts_nearly_in_a_degenerate_place_are_undecided_only_where_rounding
     """Displaced by a thousandth of their size, and by less and less down to far below rounding."""
     rng, seen, undecided = np.random.default_rng(7), Counter(), []
     for away in 10.0 ** np.arange(-17.0, -2.0):
-        for _ in range(20):
+        for _ in range(8):
             points, normals = BODIES["sphere"](rng, 5)
             near = NEARLY[where](rng, points) + away * rng.normal(size=points.shape)
             closed = answer(near, normals, rng.choice([0.3, 1.0, 3.0]))
             seen[closed] += 1
             undecided += [away] * (closed is None)
     assert all(1e-15 < away < 1e-5 for away in undecided)
-    assert min(seen[True], seen[False]) >= 50
+    assert min(seen[True], seen[False]) >= 20
     assert seen[None] <= 0.25 * seen.total()
 
 

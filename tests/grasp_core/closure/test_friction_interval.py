@@ -7,55 +7,114 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-import clarabel
 import numpy as np
 import pytest
-from scipy import sparse
 
 import grasp_core as gc
-from grasp_core.closure.contacts import contact_frames, grasp_map
 from grasp_core.closure.friction_interval import FRICTIONLESS
 from scenes.example_objects import example_object
+from tests.grasp_core.bodies import BODIES, moved
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
-from tests.grasp_core.grid_contacts import contact_sets
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
-from tests.tampering.changes import forged
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+from tests.tampering.exact_closure import locals_of, margin_of, unit_arms
 
 WIDTH = 1e-7
 """Of an interval, in units of the larger of 1 and its upper end, that is bounded."""
 CLEAR = 1e-6
-"""Margins of the interior-point method farther from zero say which side it is on: a thousand times
-what it leaves."""
+"""Margins of the interior-point method farther from zero say which side it is on: fifty times what
+it leaves."""
 LARGEST_FRICTION = 1e3
 X, Y, Z = np.eye(3)
 
+# Contacts with whole-number coordinates are as degenerate as contacts get, and what holds for them
+# holds exactly: on boxes, an L, a T and a cross, and on nothing at all.
+AXES = np.vstack([np.eye(3), -np.eye(3)])
+ARMS = {
+    "box": [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)],
+    "L": [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (0, 2, 0)],
+    "T": [(-1, 0, 0), (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 2, 0)],
+    "cross": [(0, 0, 0), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0)],
+}
+"""Cubes with sides of two, by their centres in such units."""
+COUNTS, SHARES = (2, 3, 4, 5, 6), (0.04, 0.1, 0.66, 0.1, 0.1)
+"""How many contacts, and how often."""
 
-def clarabel_margin(positions, normals, friction):
-    """Largest t such that balanced forces, normal parts summing to one, are t inside all cones.
 
-    With exact circular cones. Below zero where nothing balances; None where that is not solved, or
-    the wrenches do not span.
-    """
-    arms = positions - positions.mean(axis=0)
-    arms /= np.linalg.norm(arms, axis=1).max() or 1.0
-    frames, k = contact_frames(normals), len(normals)
-    G = np.einsum("wki,kij->wkj", grasp_map(arms).reshape(6, k, 3), frames).reshape(6, 3 * k)
-    if np.linalg.svd(G, compute_uv=False)[-1] < CLEAR:
-        return None
-    A = np.zeros((7 + 3 * k, 3 * k + 1))
-    A[:6, :-1], A[6, :-1:3] = G, 1.0
-    A[7:, :-1] = -np.diag(np.tile([friction, 1.0, 1.0], k))
-    A[7::3, -1] = 1.0
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    answer = clarabel.DefaultSolver(
-        sparse.csc_matrix((3 * k + 1, 3 * k + 1)), np.eye(3 * k + 1)[-1] * -1.0,
-        sparse.csc_matrix(A), np.eye(len(A))[6],
-        [clarabel.ZeroConeT(7)] + [clarabel.SecondOrderConeT(3)] * k, settings,
-    ).solve()  # fmt: skip
-    if str(answer.status) == "PrimalInfeasible":
-        return -math.inf
-    return answer.x[-1] if str(answer.status) == "Solved" else None
+def surface(cubes):
+    """Corners and middles of the outer faces of cubes with their inward normals, (n, 3) each."""
+    places, normals = [], []
+    for cube in cubes:
+        for axis, side in ((axis, side) for axis in range(3) for side in (-1, 1)):
+            beside = np.array(cube)
+            beside[axis] += side
+            if tuple(beside.tolist()) in cubes:
+                continue
+            for u, v in ((u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)):
+                offset = np.zeros(3)
+                offset[axis], offset[axis - 2], offset[axis - 1] = side, u, v
+                places.append(2 * np.array(cube) + offset)
+                normals.append(-side * np.eye(3)[axis])
+    return np.array(places, dtype=float), np.array(normals)
+
+
+SURFACES = {name: surface(cubes) for name, cubes in ARMS.items()}
+
+
+def anywhere(rng, count, reach=1):
+    points = rng.integers(-reach, reach + 1, size=(count, 3)).astype(float)
+    return points, AXES[rng.integers(6, size=count)]
+
+
+def on_a_solid(rng, count):
+    points, normals = SURFACES[rng.choice([*SURFACES])]
+    chosen = rng.integers(len(points), size=count)
+    return points[chosen], normals[chosen]
+
+
+def on_a_line(rng, count):
+    points, normals = anywhere(rng, count)
+    direction = AXES[rng.integers(6)] + rng.integers(-1, 2) * AXES[rng.integers(6)]
+    return points[:1] + rng.integers(-2, 3, size=(count, 1)) * direction, normals
+
+
+def in_a_plane(rng, count):
+    points, normals = anywhere(rng, count, reach=2)
+    points[:, rng.integers(3)] = 0.0
+    return points, normals
+
+
+def repeated(rng, count):
+    points, normals = anywhere(rng, count)
+    chosen = rng.integers(max(2, count - 1), size=count)
+    return points[chosen], normals[chosen]
+
+
+GRIDS = (on_a_solid, on_a_solid, on_a_solid, on_a_solid, anywhere, on_a_line, in_a_plane, repeated)
+
+
+def scattered(rng, count):
+    """On a body or about a point, now and then turned, moved and of another size."""
+    body = rng.choice([*BODIES, "none"])
+    if body == "none":
+        return random_contacts(rng, count, spread=rng.uniform(0.2, 1.6))
+    points, normals = BODIES[body](rng, count)
+    size = 10.0 ** rng.uniform(-3.0, 3.0)
+    return moved(rng, points, normals, size) if rng.uniform() < 0.3 else (points, normals)
+
+
+def contact_sets(count, seed):
+    """Contacts and whether they are on a grid, every other time: (positions, normals, bool)."""
+    rng = np.random.default_rng(seed)
+    for i in range(count):
+        contacts, grid = int(rng.choice(COUNTS, p=SHARES)), i % 2 == 1
+        sampler = GRIDS[rng.integers(len(GRIDS))] if grid else scattered
+        yield *sampler(rng, contacts), grid
+
+
+def spans(positions, normals, friction):
+    """Whether the wrenches of the cones span everything, by far."""
+    wrenches = locals_of(unit_arms(positions)[0], normals, friction)
+    return np.linalg.svd(wrenches, compute_uv=False)[-1] > CLEAR * max(1.0, friction[0])
 
 
 def judge_exactly(seen, found):
@@ -69,14 +128,15 @@ def judge_exactly(seen, found):
         seen["open exactly"] += 1
 
 
-def judge_by_clarabel(seen, found):
+def judge_by_margin(seen, found):
     """Not open anywhere above the interval, and not closed anywhere below."""
     contacts = found.positions, found.normals
     for friction in (1.01 * found.upper, 1.0 + found.upper, 0.99 * found.lower, 0.5 * found.lower):
         if not 1e-3 < friction < 10.0:
             continue
-        margin, above = clarabel_margin(*contacts, friction), friction > found.upper
-        if margin is not None and abs(margin) > CLEAR:
+        above, full = friction > found.upper, np.full(len(found.normals), friction)
+        margin = margin_of(*contacts, full)
+        if spans(*contacts, full) and abs(margin) > CLEAR:
             assert (margin > 0.0) == above
             seen["closed by margin" if above else "open by margin"] += 1
 
@@ -90,7 +150,7 @@ AT_LEAST = {
 
 def test_every_interval_is_proved_narrow_and_as_independent_judges_say():
     seen = Counter()
-    for positions, normals, grid in contact_sets(250, seed=21):
+    for positions, normals, grid in contact_sets(120, seed=21):
         found = gc.critical_friction_interval(positions, normals)
         assert found.verify()
         upper = gc.critical_friction(positions, normals)
@@ -106,8 +166,8 @@ def test_every_interval_is_proved_narrow_and_as_independent_judges_say():
         seen["finite"] += 0.0 < upper < math.inf
         if grid:
             judge_exactly(seen, found)
-        judge_by_clarabel(seen, found)
-    assert all(seen[what] >= share * 250 for what, share in AT_LEAST.items()), seen
+        judge_by_margin(seen, found)
+    assert all(seen[what] >= share * 120 for what, share in AT_LEAST.items()), seen
 
 
 def test_no_batch_is_lost_to_contacts_that_no_friction_closes():
@@ -118,11 +178,11 @@ def test_no_batch_is_lost_to_contacts_that_no_friction_closes():
     assert gc.critical_friction_interval(positions[0], normals[0]).lower == math.inf
     tested = 0
     for count in (2, 3, 4, 5, 6):
-        sets = [(p, n) for p, n, _ in contact_sets(300, seed=23) if len(p) == count]
+        sets = [(p, n) for p, n, _ in contact_sets(120, seed=23) if len(p) == count]
         found = gc.critical_frictions(*(np.array(each) for each in zip(*sets, strict=True)))
         assert not np.isnan(found).any()
         tested += len(found)
-    assert tested == 300
+    assert tested == 120
 
 
 def test_what_force_closure_proves_enough_is_never_called_too_little():
@@ -137,16 +197,16 @@ def test_what_force_closure_proves_enough_is_never_called_too_little():
 @pytest.mark.parametrize("name", ["l-bracket", "cross", "box"])
 def test_grasps_whose_margin_grows_with_a_power_of_the_friction_need_none(name):
     """Sides along three axes: any friction holds them, or a friction that shows."""
-    grasps = gc.plan(example_object(name), 0.5, limit=20).grasps
+    grasps = gc.plan(example_object(name), 0.5, limit=8).grasps
     found = [gc.critical_friction_interval(grasp) for grasp in grasps]
     assert all(each.verify() and each.upper - each.lower <= FRICTIONLESS for each in found)
-    assert len(found) >= 10
+    assert len(found) == 8
 
 
 def test_up_to_four_rounds_of_pushes_leave_nothing_to_search():
     """Each new contact is pushed by what is left of the friction of those before it."""
     seen = Counter()
-    for positions, normals, grid in contact_sets(1500, seed=24):
+    for positions, normals, grid in contact_sets(900, seed=24):
         if grid and len(positions) == 4 and gc.critical_friction(positions, normals) == 0.0:
             found = gc.critical_friction_interval(positions, normals)
             pushes = np.sort(np.einsum("ki,ki->k", found.forces, normals) / found.forces.max())
@@ -156,36 +216,17 @@ def test_up_to_four_rounds_of_pushes_leave_nothing_to_search():
     assert min(seen[0], seen[1], seen[2]) >= 3, seen
 
 
-def test_bits_that_do_not_matter_do_not_matter():
-    """The same contacts in another order, of another size and turned, some of them by rounding.
-
-    Thresholds of turned contacts differ by rounding too, which a degenerate one multiplies.
-    """
-    rng, tested = np.random.default_rng(25), 0
-    for positions, normals, _ in contact_sets(120, seed=26):
-        upper = gc.critical_friction(positions, normals)
-        order, turn = rng.permutation(len(positions)), np.eye(3)[:, rng.permutation(3)]
-        for again in (
-            (positions[order], normals[order]),
-            (1024.0 * positions, normals),
-            (positions @ turn, normals @ turn),
-        ):
-            other = gc.critical_friction(*again)
-            assert other == upper or abs(other - upper) <= WIDTH * max(1.0, upper)
-            tested += 1
-    assert tested == 360
-
-
 ELSEWHERE = """
 import sys
 import numpy as np
 import grasp_core as gc
-from tests.grasp_core.grid_contacts import contact_sets
+from tests.grasp_core.closure.test_friction_interval import contact_sets
 found = [gc.critical_friction(p, n) for p, n, _ in contact_sets(int(sys.argv[1]), seed=27)]
 np.save(sys.argv[2], found)
 """
 
 
+@pytest.mark.slow
 def test_another_processors_rounding_changes_no_more_than_the_width(tmp_path):
     here = np.array([gc.critical_friction(p, n) for p, n, _ in contact_sets(60, seed=27)])
     root, kept = Path(__file__).parents[3], tmp_path / "found.npy"
@@ -197,46 +238,6 @@ def test_another_processors_rounding_changes_no_more_than_the_width(tmp_path):
     assert (np.isinf(here) == np.isinf(there)).all()
     assert finite.sum() >= 36
     np.testing.assert_allclose(there[finite], here[finite], rtol=WIDTH, atol=WIDTH)
-
-
-def tampered(found):
-    """What a certificate might claim beyond what it proves, and numbers that are none."""
-    k, turn = len(found.positions), random_rotation(np.random.default_rng(0))
-    yield "upper", {"upper": 0.99 * found.upper}
-    yield "lower", {"lower": 1.01 * found.lower}
-    yield "all open", {"lower": math.inf, "upper": math.inf, "forces": None}
-    yield "upside down", {"lower": found.upper, "upper": found.lower}
-    yield "negative", {"lower": -1.0, "twist": None}
-    yield "negative upper", {"lower": 0.0, "twist": None, "upper": -found.upper}
-    yield "beyond all", {"upper": 2e3}
-    yield "no forces", {"forces": None}
-    yield "no twist", {"twist": None}
-    yield "long normals", {"normals": 1.05 * found.normals}
-    yield "other normals", {"normals": found.normals @ turn}
-    yield "other positions", {"positions": found.positions[::-1]}
-    yield "pulls", {"forces": -found.forces}
-    yield "other way", {"twist": -found.twist}
-    yield "nothing", {"twist": np.zeros(6)}
-    for name in ("lower", "upper"):
-        yield f"{name} is no number", {name: math.nan}
-    for name, shape in (("positions", (k, 3)), ("normals", (k, 3)), ("forces", (k, 3)),
-                        ("twist", (6,))):  # fmt: skip
-        for value in (math.nan, math.inf, 1e300):
-            yield f"{name} {value}", {name: np.full(shape, value)}
-        for other in ((), (0,), (0, 3), (k + 1, 3), (k, 4), (3, k), (k, 3, 1), (5,)):
-            yield f"{name} {other}", {name: np.ones(other)}
-
-
-def test_what_is_tampered_with_does_not_verify():
-    rng, refused = np.random.default_rng(28), 0
-    for count in (4, 4, 5, 6):
-        found = gc.critical_friction_interval(*random_contacts(rng, count))
-        assert 1e-3 < found.lower < found.upper < math.inf
-        assert found.verify()
-        for what, change in tampered(found):
-            assert forged(found, **change).verify() is False, what
-            refused += 1
-    assert refused == 4 * (17 + 4 * 11)
 
 
 def test_a_critical_friction_of_a_few_ten_millionths_is_zero():

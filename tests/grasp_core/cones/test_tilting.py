@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.cones.spanning import cones_positively_span, span_angle, span_sines
+from grasp_core.cones.spanning import cones_positively_span
 from grasp_core.cones.tilting import tilted_cones, toward, widened
 from grasp_core.families.placing import BEFORE, BEHIND, CONSTRUCTIONS, regions_of
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
-from tests.grasp_core.cones import reference_tilting as reference
 from tests.judges import random_rotation
 
 
@@ -60,12 +59,6 @@ def test_turned_normals_get_turned_cones():
         np.testing.assert_allclose(there.axes, here.axes @ R.T, atol=1e-6)
 
 
-def test_span_sines_are_those_of_single_quadruples():
-    normals = quadruples("random-10-1")
-    expected = [math.sin(span_angle(units)) for units in normals]
-    np.testing.assert_allclose(np.maximum(span_sines(normals), 0.0), expected, atol=1e-12)
-
-
 def test_a_bore_is_held_from_inside_with_the_focus_behind_the_fingers():
     """Four faces of a nut's bore: any contacts in the footprints are in force closure."""
     pieces = [p for p in unit_pieces(example_object("hex-nut"))
@@ -107,17 +100,3 @@ def test_axes_lean_the_same_way_where_the_point_is_in_a_face_but_for_rounding():
     assert (above.half_angles > 0.0).sum() >= 20
     np.testing.assert_allclose(above.half_angles, below.half_angles, atol=1e-6)
     np.testing.assert_allclose(above.axes, below.axes, atol=1e-5)
-
-
-def test_compiled_cones_are_those_of_the_arrays():
-    rng = np.random.default_rng(3)
-    normals = rng.normal(size=(600, 4, 3))
-    normals[:200, :, 2] *= 0.05  # nearly in a plane, as the sides of a box
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    thetas = rng.uniform(0.1, 0.7, size=(600, 4))
-    quick = tilted_cones(normals, thetas)
-    axes, half_angles = reference.tilted_cones(normals, thetas)
-    np.testing.assert_allclose(quick.half_angles, half_angles, atol=1e-12)
-    np.testing.assert_allclose(quick.axes, axes, atol=1e-10)
-    assert (half_angles > 0.01).sum() >= 300
-    assert (half_angles < 0.0).sum() >= 20

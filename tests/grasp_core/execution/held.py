@@ -1,7 +1,6 @@
 """Grips for tests: four fingers on a box with answers by hand, and planned grasps."""
 
 from functools import cache
-from itertools import combinations
 
 import numpy as np
 
@@ -45,14 +44,14 @@ def planned(name, limit=3):
     return body, grasps
 
 
-def bodies_and_grasps(limit=2, names=("box", "dodecahedron", "wedge")):
+def bodies_and_grasps(limit=1, names=("box", "dodecahedron", "wedge")):
     for name in names:
         body, grasps = planned(name, limit)
         for grasp in grasps:
             yield body, grasp
 
 
-def planned_grips(names=("box", "dodecahedron", "wedge"), limit=2, push=8.0, **springs):
+def planned_grips(names=("box", "dodecahedron", "wedge"), limit=1, push=8.0, **springs):
     for body, grasp in bodies_and_grasps(limit, names):
         forces = push * even_forces(grasp.positions, grasp.normals, 0.35)
         yield gc.grip(body, grasp, 0.5, forces, **springs)
@@ -61,17 +60,6 @@ def planned_grips(names=("box", "dodecahedron", "wedge"), limit=2, push=8.0, **s
 def loads_of(grip, count, rng):
     """Wrenches in all directions, with torques relative to the grip's size, (count, 6)."""
     return directions(count, rng, 6) * np.repeat([1.0, grip.size], 3)
-
-
-@cache
-def orientations():
-    """Corners, middles of edges and middles of faces of an icosahedron as unit vectors, (62, 3)."""
-    body = scenes.example_object("icosahedron")
-    corners = body.vertices - body.center_of_mass
-    edges = {tuple(sorted(pair)) for face in body.triangles for pair in combinations(face, 2)}
-    chosen = [*np.arange(12)[:, None], *map(list, edges), *body.triangles]
-    found = np.array([corners[each].sum(axis=0) for each in chosen])
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
 def directions(count, rng, size=3):

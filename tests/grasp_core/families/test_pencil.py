@@ -5,14 +5,11 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.families.disc_bounds import pencil_radius_bounds
 from grasp_core.families.placements import LEAST_RADIUS
-from grasp_core.families.placing import AS_LISTED, CELL_A, CELL_B, CONSTRUCTIONS
-from grasp_core.objects.face_pieces import unit_pieces
+from grasp_core.families.placing import CELL_A, CELL_B, CONSTRUCTIONS
 from scenes.example_objects import example_object
 from tests.grasp_core.families.disc_borders import descended_margin, extremes, least_margin
-from tests.grasp_core.quadruples import paired_quadruples, tilted_side_cones
-from tests.judges import balancing_weights
+from tests.grasp_core.quadruples import paired_quadruples
 
 TOLERANCE = 1e-7
 """Ten times the residual at which a program's answer is accepted, in object radii."""
@@ -94,12 +91,12 @@ def test_any_contacts_on_the_disc_borders_are_in_force_closure():
     rng = np.random.default_rng(2)
     theta, grasps = math.radians(10.0), 0
     for name in ("random-30-1", "icosahedron", "double-wedge-bar"):
-        for quad, _, placed in list(pencils(name, theta))[:: 40 if grasps else 25]:
+        for quad, _, placed in list(pencils(name, theta))[:: 80 if grasps else 50]:
             choices = [*extremes(quad), *rng.uniform(0, 2 * np.pi, (8, 4))]
             discs = placed.positions, placed.radii
             assert least_margin(quad, *discs, choices, math.tan(theta) + BORDER) > 0.0
             grasps += 1
-    assert grasps >= 20
+    assert grasps >= 10
 
 
 @pytest.mark.slow
@@ -112,33 +109,3 @@ def test_adversarial_descent_finds_no_contacts_out_of_closure():
             assert descended_margin(quad, *discs, friction, step=0.6, finest=0.02) > 0.0
             grasps += 1
     assert grasps >= 12
-
-
-def test_no_radius_exceeds_its_bound():
-    tested = 0
-    for quad, cones, placed in pencils("random-30-1", math.radians(6.0), 150):
-        weights = balancing_weights(np.array([piece.normal for piece in quad]))
-        depth = -sum(w * (p.normal @ p.origin) for w, p in zip(weights, quad, strict=True))
-        half_angle, no_widths = np.array([cones[0].half_angle]), np.full((1, 4, 4), np.inf)
-        bound = pencil_radius_bounds(np.array([depth]), no_widths, half_angle, AS_LISTED)
-        assert placed.merit <= bound.item() + TOLERANCE
-        tested += 1
-    assert tested >= 300
-
-
-def test_tilted_cones_hold_a_box_by_its_four_sides():
-    """P3 fails for the normals of a box; cones tilted inside the friction cones satisfy it."""
-    pieces = [p for p in unit_pieces(example_object("box")) if abs(p.normal[2]) < 0.5]
-    tilt, half_angle = math.radians(14.036), math.radians(12.5)
-    cones = tilted_side_cones(pieces, tilt, half_angle)
-    assert gc.cones_positively_span([c.axis for c in cones], [half_angle] * 4)
-    rng, tested = np.random.default_rng(0), 0
-    for order in ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2)):
-        quad = [pieces[i] for i in order]
-        placed = CONSTRUCTIONS["pencil"].place(quad, [cones[i] for i in order], LEAST_RADIUS)
-        if placed is not None:
-            choices = [*extremes(quad), *rng.uniform(0, 2 * np.pi, (40, 4))]
-            discs = placed.positions, placed.radii
-            assert least_margin(quad, *discs, choices, 0.5 + BORDER) > 0.0
-            tested += 1
-    assert tested >= 2

@@ -18,7 +18,7 @@ from tests.grasp_core.quadruples import leave_all
 SAME = 1e-9
 """Ten times less than what a program's answer may be off; optima are unique."""
 OBJECTS = ("random-12-1", "random-14-3", "dodecahedron", "wedge")
-EACH = 40
+EACH = 12
 CASES = {
     "concurrent": CONSTRUCTIONS["concurrent"], "pencil": CONSTRUCTIONS["pencil"], "mixed": MIXED,
 }  # fmt: skip
@@ -68,8 +68,8 @@ def test_discs_are_the_largest_that_plain_rows_allow(case, friction):
             if at is not None:
                 assert at.merit == pytest.approx(best, abs=1e-6 * best)  # a later pattern, if equal
     assert sum(ends.values()) == EACH * len(OBJECTS)
-    assert ends[True] >= (0 if case == "mixed" else 100)
-    assert ends[False] >= (10 if case == "mixed" else 0)
+    assert ends[True] >= (0 if case == "mixed" else 30)
+    assert ends[False] >= (3 if case == "mixed" else 0)
 
 
 def agrees(one, other):
@@ -93,7 +93,7 @@ def test_regions_are_the_faces_cut_to_the_inverted_cones(case):
             assert not region.polygon.flags.writeable
             np.testing.assert_allclose(region.polygon, polygon, rtol=0.0, atol=SAME)
             assert region.inscribed_radius == pytest.approx(inscribed_radius(*rows), abs=SAME)
-    assert len(planned) >= (20 if case == "mixed" else 100)
+    assert len(planned) >= (6 if case == "mixed" else 30)
 
 
 def test_curved_patches_are_allowed_for():
@@ -109,7 +109,7 @@ def test_curved_patches_are_allowed_for():
             if at is not None:
                 assert at.merit == pytest.approx(best, abs=1e-6 * best)
                 tested += 1
-        assert tested >= 10
+        assert tested >= 3
 
 
 def test_discs_that_are_too_small_are_proved_to_be_none():

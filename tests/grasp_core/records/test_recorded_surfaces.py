@@ -1,6 +1,7 @@
 """What is known of a surface survives files, and files that say what is not so are refused."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ def together(*parts):
     return gc.Polyhedron.from_mesh(whole.vertices, whole.faces, name="boxes")
 
 
+@cache
 def capped():
     mesh = trimesh.creation.box((0.05, 0.06, 0.07)).subdivide().subdivide()
     left = np.delete(mesh.faces, [3, 70], axis=0)
@@ -31,8 +33,9 @@ def rounded():
     return gc.Polyhedron.from_mesh(points, mesh.faces, name="rounded", flatness_m=4e-6)
 
 
+@cache
 def opened():
-    mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=0.05)
     left = mesh.faces[mesh.triangles_center[:, 2] < 0.042]
     return gc.Polyhedron.from_mesh(mesh.vertices, left[:, ::-1], name="opened")
 
@@ -54,21 +57,25 @@ def meeting_in_a_corner():
     )  # fmt: skip
 
 
-BODIES = [capped, rounded, opened, speckled, meeting_in_an_edge, meeting_in_a_corner]
+def meets_itself(body):
+    return len(np.unique(body.vertices, axis=0)) < len(body.vertices)
 
 
-def test_the_bodies_are_what_they_are_called():
-    assert len(capped().surface.caps) == 2
-    assert rounded().surface.flatness_m == 4e-6
-    assert not opened().surface.closed
-    assert speckled().surface.dropped > 0.0
-    for body in (meeting_in_an_edge(), meeting_in_a_corner()):
-        assert len(np.unique(body.vertices, axis=0)) < len(body.vertices)
+BODIES = {
+    capped: lambda body: len(body.surface.caps) == 2,
+    rounded: lambda body: body.surface.flatness_m == 4e-6,
+    opened: lambda body: not body.surface.closed,
+    speckled: lambda body: body.surface.dropped > 0.0,
+    meeting_in_an_edge: meets_itself,
+    meeting_in_a_corner: meets_itself,
+}
+"""Bodies, and what tells that they are what they are called."""
 
 
 @pytest.mark.parametrize("make", BODIES)
 def test_a_body_and_what_is_known_of_it_come_back_from_a_file(make, tmp_path):
     body = make()
+    assert BODIES[make](body)
     plan = gc.plan(body, 0.5, families="concurrent", limit=2)
     assert plan.grasps
     found = gc.load_grasps(gc.save_grasps(tmp_path / "grasps.json", plan))
@@ -110,5 +117,5 @@ def test_an_open_surface_that_a_file_calls_closed_gives_no_mass(tmp_path):
     with pytest.raises(gc.InputError, match="gives no mass"):
         body.mass_at(1000.0)
     assert changed(capped(), tmp_path, closed=False).body.mass_at(1000.0) == pytest.approx(0.21)
-    with pytest.raises(gc.InputError, match=r"GP-MESH-OPEN: .*: 28 edges belong"):
+    with pytest.raises(gc.InputError, match=r"GP-MESH-OPEN: .*: 12 edges belong"):
         changed(opened(), tmp_path, {"patches": None}, closed=True)

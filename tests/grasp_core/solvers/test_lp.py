@@ -52,7 +52,7 @@ def test_verdicts_and_values_agree_with_another_route():
     """Random programs, half of them made infeasible by a contradictory row."""
     rng = np.random.default_rng(0)
     seen = {Optimum: 0, Infeasible: 0}
-    for trial in range(400):
+    for trial in range(60):
         n, rows = int(rng.integers(2, 12)), int(rng.integers(15, 60))
         A = rng.normal(size=(rows, n))
         b = A @ rng.normal(size=n) + rng.uniform(size=rows)
@@ -67,7 +67,7 @@ def test_verdicts_and_values_agree_with_another_route():
         seen[type(answer)] += 1
         if isinstance(answer, Optimum):
             assert answer.value == pytest.approx(-judge.fun, abs=1e-6)
-    assert min(seen.values()) >= 150
+    assert min(seen.values()) > 20
 
 
 def answers_agree(program, answer):
@@ -86,7 +86,7 @@ def test_degenerate_programs_end_with_the_same_answers(route):
     """Small whole numbers: rows repeat, vertices coincide, equalities contradict each other."""
     rng = np.random.default_rng(1)
     seen = {Optimum: 0, Infeasible: 0, None: 0}
-    for _ in range(1000):
+    for _ in range(200):
         n, rows, equalities = int(rng.integers(2, 7)), int(rng.integers(6, 25)), rng.integers(0, 3)
         A = rng.integers(-1, 2, (rows, n)).astype(float)
         A_eq = rng.integers(-1, 2, (equalities, n)).astype(float)
@@ -103,13 +103,13 @@ def test_degenerate_programs_end_with_the_same_answers(route):
             continue
         assert answers_agree(program, answer)
         seen[type(answer)] += 1
-    assert min(seen[Optimum], seen[Infeasible]) >= 200
-    assert seen[None] <= 10
+    assert min(seen[Optimum], seen[Infeasible]) >= 30
+    assert seen[None] <= 2
 
 
 def test_a_cutoff_ends_the_search_with_a_bound_below_it():
     rng, ended = np.random.default_rng(2), 0
-    for _ in range(300):
+    for _ in range(60):
         A = rng.normal(size=(40, 5))
         b = rng.uniform(0.5, 1.5, 40)
         c = rng.normal(size=5)
@@ -124,7 +124,7 @@ def test_a_cutoff_ends_the_search_with_a_bound_below_it():
         assert best.value - 1e-9 <= bound(best.value + 0.1) <= best.value + 0.1
         assert bound(best.value - 0.1) == pytest.approx(best.value, abs=1e-9)
         ended += 1
-    assert ended >= 250
+    assert ended >= 50
 
 
 def test_what_the_compiled_method_gets_wrong_is_left_to_the_conic_solver(monkeypatch):
@@ -167,7 +167,7 @@ def vertex_of(simplex, basis, y):
 def test_bounds_are_proved_where_many_rows_nearly_meet_in_a_vertex():
     """A corner of a box, each of whose rows comes four times, turned by about the last pivot."""
     rng, seen = np.random.default_rng(8), Counter()
-    for trial in range(300):
+    for trial in range(60):
         n = int(rng.integers(3, 12))
         A = np.vstack([np.eye(n), -np.eye(n)] * 4)
         A = (A + 1e-9 * rng.normal(size=A.shape)) @ np.linalg.qr(rng.normal(size=(n, n)))[0]
@@ -182,7 +182,7 @@ def test_bounds_are_proved_where_many_rows_nearly_meet_in_a_vertex():
         assert bound == (
             pytest.approx(-expected.fun, abs=1e-7) if expected.x is not None else -np.inf
         )
-    assert min(seen[0], seen[2]) == 150
+    assert min(seen[0], seen[2]) == 30
 
 
 def test_compiled_bounds_count_only_what_multipliers_prove():
