@@ -17,7 +17,6 @@ from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.settings import HoldProtocol
 from tests.grasp_core.families.printed_paper import printed_regulus
 from tests.grasp_core.quadruples import paired_quadruples
-from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 OBJECTS = ("tetrahedron", "wedge", "chamfered-box", "random-12-1", "l-bracket", "double-wedge-bar")
@@ -31,7 +30,7 @@ def all_controls():
     """With the object and the grasp that each was made from."""
     found = []
     for name in OBJECTS:
-        body, planned = grasps(name, FRICTION, 4, FAMILIES)
+        body, planned = grasps(name, FRICTION, 2, FAMILIES)
         found += [
             (body, grasp, control)
             for grasp in planned
@@ -40,12 +39,16 @@ def all_controls():
     return found
 
 
-def test_every_control_is_refuted_by_a_certificate_that_verifies():
+def test_the_simulator_lets_go_of_every_control_and_its_certificate_verifies():
     kinds = Counter()
-    for _, _, control in all_controls():
+    for body, _, control in all_controls():
         assert not control.certificate.closed
         assert control.certificate.verify()
+        verdict = try_control(body, control, Agenda(), Setup())
+        assert verdict.let_go, (control.name, [t.hold.outcome for t in verdict.tried])
+        assert not verdict.held
         kinds[control.name] += 1
+    assert sum(kinds.values()) >= 25
     assert set(kinds) == {"low_friction", "fingers_removed", "contacts_moved"}
 
 
@@ -64,13 +67,13 @@ def test_moved_contacts_stay_on_their_faces_and_leave_their_regions():
             )
             assert moved.max() > grasp.radius
         tested += 1
-    assert tested >= 16
+    assert tested >= 8
 
 
 def test_grasps_that_no_three_fingers_lose_have_a_control_of_three_all_the_same():
     """With much friction any three fingers hold these; two, or none, would be a trivial control."""
     tested = 0
-    for name in ("icosahedron", "octahedron", "dodecahedron"):
+    for name in ("octahedron",):
         body = scenes.example_object(name)
         for grasp in gc.plan(body, 0.8, limit=4, families=("concurrent", "regulus")).grasps:
             threes = [np.delete(np.arange(4), finger) for finger in range(4)]
@@ -90,9 +93,10 @@ def test_grasps_that_no_three_fingers_lose_have_a_control_of_three_all_the_same(
             verdict = try_control(body, removed, Agenda(), Setup())
             assert verdict.let_go
             tested += 1
-    assert tested >= 6
+    assert tested >= 2
 
 
+@pytest.mark.slow
 def test_the_simulator_lets_go_of_what_the_printed_regulus_program_takes_for_grasps():
     body, theta, tested = scenes.example_object("random-30-1"), math.radians(10.0), 0
     for quad, cones in paired_quadruples(body.name, theta, 160):
@@ -109,22 +113,9 @@ def test_the_simulator_lets_go_of_what_the_printed_regulus_program_takes_for_gra
     assert tested >= 3
 
 
-@pytest.mark.parametrize("every", [2, *more(1)])
-def test_the_simulator_lets_go_of_every_control(every):
-    kinds = Counter()
-    for body, _, control in all_controls()[::every]:
-        verdict = try_control(body, control, Agenda(), Setup())
-        assert verdict.let_go, (control.name, [t.hold.outcome for t in verdict.tried])
-        assert not verdict.held
-        kinds[control.name] += 1
-    assert sum(kinds.values()) >= 50 // every
-    assert len(kinds) == 3
-
-
-@pytest.mark.parametrize("factor", [1.5])
-def test_a_simulator_with_too_much_friction_is_caught(monkeypatch, factor):
+def test_a_simulator_with_too_much_friction_is_caught(monkeypatch):
     """Half as much friction again in the simulation only: low-friction controls then hold."""
-    holds = Rig.holds
+    holds, factor = Rig.holds, 1.5
 
     def with_more_friction(rig, loads, settling):
         rough = replace(rig, friction=factor * rig.friction)
@@ -132,7 +123,7 @@ def test_a_simulator_with_too_much_friction_is_caught(monkeypatch, factor):
 
     monkeypatch.setattr(Rig, "holds", with_more_friction)
     caught = tested = 0
-    for name in ("random-12-1", "random-30-2", "screwdriver", "double-wedge-bar", "random-8-3"):
+    for name in ("random-12-1", "double-wedge-bar"):
         body, found = grasps(name, 0.5, 6)
         for grasp in found:
             if grasp.critical_friction <= 0.03:
@@ -141,8 +132,7 @@ def test_a_simulator_with_too_much_friction_is_caught(monkeypatch, factor):
             verdict = try_control(body, controls["low_friction"], Agenda(), Setup())
             caught += verdict.held
             tested += 1
-    assert tested >= 5
-    assert caught == tested
+    assert caught == tested >= 2
 
 
 def test_a_threshold_of_millimetres_would_let_a_control_pass():

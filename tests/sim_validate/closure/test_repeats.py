@@ -6,7 +6,7 @@ import math
 import pytest
 
 import sim_validate as sv
-from sim_validate.closure.validate import disturbed, noisy_case, noisy_trial
+from sim_validate.closure.validate import disturbed, noisy_trial
 from sim_validate.closure.verdict import interval
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
@@ -29,7 +29,7 @@ def test_analysis_and_simulation_agree_on_every_repeat(each):
     """With noise that opens contacts, makes loads too large, and lets fingers miss."""
     held = let_go = missed = 0
     much = Noise(shift=0.02, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
-    for name in ("wedge", "screwdriver", "mug"):
+    for name in ("wedge", "screwdriver", "mug")[: 2 * each - 1]:
         body, found = grasps(name, 0.5, each)
         for grasp in found:
             verdict = repeated(body, grasp, 0.5, noise=much)
@@ -42,7 +42,7 @@ def test_analysis_and_simulation_agree_on_every_repeat(each):
                 held += trial.predicted
                 missed += trial.wrench == "" and not trial.predicted
                 let_go += trial.wrench != ""
-    assert min(held, let_go, missed) >= 1 + each
+    assert min(held, let_go, missed) >= 2 * each - 1
 
 
 def test_without_noise_every_repeat_holds():
@@ -56,23 +56,12 @@ def test_a_load_beyond_the_limit_is_not_held_however_it_came_about():
     """Loads are 80 % of what is resisted: a mass a third larger is too much, one a tenth is not."""
     body, (grasp,) = grasps("wedge", 0.5, 1)
     noise = dataclasses.replace(STILL, mass=0.3)
-    cases = [disturbed(body, grasp, 0.5, noise, 0, number) for number in range(24)]
-    found = repeated(body, grasp, 0.5, noise=noise, repeats=24).robustness
+    cases = [disturbed(body, grasp, 0.5, noise, 0, number) for number in range(12)]
+    found = repeated(body, grasp, 0.5, noise=noise).robustness
     assert {case.mass > 1.25 for case in cases} == {True, False}
     for case, trial in zip(cases, found.trials, strict=True):
         if abs(case.mass - 1.25) > 0.01:
             assert (trial.outcome is Outcome.HELD) == (case.mass < 1.25)
-
-
-def test_contacts_that_noise_opens_must_let_go():
-    """Friction just above the critical one: half of the draws are below."""
-    body, (grasp,) = grasps("wedge", 0.5, 1)
-    friction = 1.02 * grasp.critical_friction
-    found = repeated(body, grasp, friction, noise=dataclasses.replace(STILL, friction=0.1))
-    opened = [trial for trial in found.robustness.trials if trial.wrench == "separating"]
-    assert len(opened) >= 3
-    assert all(trial.outcome is Outcome.SLIPPED for trial in opened)
-    assert not found.mismatches
 
 
 def test_a_simulator_that_holds_what_it_must_not_is_contradicted(monkeypatch):
@@ -106,29 +95,14 @@ def test_fingers_that_miss_are_not_held():
 
 
 def test_the_same_seed_gives_the_same_repeats():
-    body, (grasp,) = grasps("screwdriver", 0.5, 1)
-    one, same = (repeated(body, grasp, 0.5, repeats=6).robustness for _ in range(2))
-    assert one == same
-    other = repeated(body, grasp, 0.5, repeats=6, seed=1).robustness
-    assert other.trials != one.trials
-    more = repeated(body, grasp, 0.5, repeats=7).robustness
-    assert more.trials[:6] == one.trials
-
-
-def test_a_heavier_object_is_the_same_scene_with_more_mass():
     body, (grasp,) = grasps("wedge", 0.5, 1)
-    case = disturbed(body, grasp, 0.5, STILL, 0, 0)
-    scene, heavy = (
-        noisy_case(body, dataclasses.replace(case, mass=mass), [], Setup())[0].bench.scene
-        for mass in (1.0, 1.5)
-    )
-    assert heavy.layout.object_kg == 1.5 * scene.layout.object_kg
-    changed = [
-        pair
-        for pair in zip(scene.xml.split(), heavy.xml.split(), strict=True)
-        if pair[0] != pair[1]
-    ]
-    assert 1 < len(changed) <= 7  # the mass and six moments of inertia
+    much = Noise(shift=0.04, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
+    one, same = (repeated(body, grasp, 0.5, noise=much, repeats=3).robustness for _ in range(2))
+    assert one == same
+    other = repeated(body, grasp, 0.5, noise=much, repeats=3, seed=1).robustness
+    assert other.trials != one.trials
+    more = repeated(body, grasp, 0.5, noise=much, repeats=4).robustness
+    assert more.trials[:3] == one.trials
 
 
 def test_intervals_are_those_of_the_tables():
