@@ -104,20 +104,6 @@ def test_gltf_shapes_have_the_sizes_of_object_and_fingers(plan, written):
             assert read.geometry[bar].is_watertight
 
 
-def test_grasps_of_a_file_stand_apart(plan, written):
-    read = trimesh.load_scene(written("gltf"))
-    boxes = []
-    for number in range(len(plan)):
-        parts = [name for name in read.graph.nodes_geometry if name.startswith(f"grasp_{number}_")]
-        corners = []
-        for name in parts:
-            pose, mesh = read.graph.get(name)
-            corners.append(trimesh.transform_points(read.geometry[mesh].vertices, pose))
-        boxes.append((np.vstack(corners).min(axis=0), np.vstack(corners).max(axis=0)))
-    for (low, high), (other_low, other_high) in zip(boxes, [*boxes[1:], boxes[0]], strict=True):
-        assert (low > other_high).any() or (high < other_low).any()
-
-
 MESSAGES = {
     "GraspableObject": {"object": "Object", "grasps": ["Grasp"]},
     "Object": {

@@ -16,7 +16,6 @@ import scenes
 import sim_validate as sv
 from scenes.drawing import pages
 from scenes.drawing.pages import UNITS
-from scenes.drawing.sheets import FINGERS
 from sim_validate.main import main
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -48,21 +47,6 @@ def test_a_plan_shows_four_fingers_and_no_figure_that_was_put_off(plan, monkeypa
     assert cells[4:6] == ["c-0-1-2-7", "concurrent"]
     assert cells[-1] == "..."
     assert len(cells) == 4 * 6 + 1
-
-
-def test_every_family_is_drawn():
-    for name, family in (
-        ("dodecahedron", "concurrent"),
-        ("double-wedge-bar", "pencil"),
-        ("icosahedron", "regulus"),
-    ):
-        plan = gc.plan(scenes.example_object(name), 0.5, families=family, limit=1)
-        assert plan[0].family == family
-        found, _ = read(plan)
-        assert len(list(found.iter(f"{SVG}path"))) >= 4 * (2 + 2)  # bars, cones
-        fills = {part.get("fill") for part in found.iter(f"{SVG}path")}
-        fills |= {part.get("fill") for part in found.iter(f"{SVG}g")}
-        assert set(FINGERS) <= fills
 
 
 def test_a_plan_without_grasps_says_why():
@@ -97,6 +81,7 @@ def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatc
     assert "67.74 mm" in cells
 
 
+@pytest.mark.slow
 def test_pictures_come_with_scenes_alone():
     code = """
 import grasp_core as gc

@@ -96,19 +96,6 @@ def test_fingertips_are_named_by_site_geom_or_body(tips, tmp_path):
     assert places(hand, angles).tips[0] == pytest.approx(np.array(true), abs=1e-9)
 
 
-def test_a_box_as_a_fingertip_is_a_block_with_a_ball_in_it(tmp_path):
-    hand = scenes.load_hand(written(tmp_path, gripper(BOX)), [f"p{n}" for n in range(4)])
-    tip = hand.fingers[0].tip
-    assert tip.radius == pytest.approx(0.008)
-    assert tip.center == pytest.approx([0.0, 0.0, 0.032], abs=1e-12)
-    assert np.abs(tip.corners - [0.0, 0.0, 0.02]) == pytest.approx(
-        np.tile([0.008, 0.009, 0.02], (8, 1)), abs=1e-12
-    )
-    assert tip.rounding == 1e-4
-    (shape,) = hand.fingers[0].links[-1].shapes
-    assert shape.half_sizes == pytest.approx(np.array([0.008, 0.009, 0.02]) + 1e-4, abs=1e-8)
-
-
 BLOCKS = {
     "box": BOX,
     "mesh": ("mesh", 'mesh="tip"'),  # a wedge: its ball is well inside of it

@@ -4,7 +4,6 @@ import mujoco
 import numpy as np
 import pytest
 
-import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.hand_scenes import finger_springs
@@ -118,11 +117,3 @@ def _support(model, data, geom, way):
         return place + size[0] + size[1] * abs(along[2])
     assert kind == mujoco.mjtGeom.mjGEOM_BOX
     return place + np.abs(along) @ size
-
-
-def test_motors_of_hands_with_masses_carry_their_links_in_any_orientation():
-    reach, hand, scene, _ = standing("leap")
-    strong = gc.hand_motors(hand, reach)
-    assert (scene.layout.holder.motors.limits < strong.limits).all()
-    reach, hand, scene, _ = standing("allegro")
-    assert scene.layout.holder.motors.limits == pytest.approx(gc.hand_motors(hand, reach).limits)
