@@ -3,7 +3,6 @@
 import pickle
 
 import grasp_core as gc
-import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate import Agenda, Setup
 from sim_validate.closure.validate import Job
@@ -27,14 +26,3 @@ def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
     monkeypatch.setattr(gate_module, "measured", fail)
     assert arrived(grasp).held
     assert arrived(grasp).gate == job.gate
-
-
-def test_many_validations_are_those_of_single_ones_and_say_how_far_they_are():
-    body, told = example_object("tetrahedron"), []
-    plan = gc.plan(body, FRICTION, limit=3)
-    found = sv.validate_all(
-        body, plan, FRICTION, agenda=SHORT, progress=lambda *step: told.append(step)
-    )
-    assert [verdict.id for verdict in found] == [grasp.id for grasp in plan]
-    assert list(found) == [sv.validate(body, grasp, FRICTION, agenda=SHORT) for grasp in plan]
-    assert told == [(1, 3, found[0]), (2, 3, found[1]), (3, 3, found[2])]

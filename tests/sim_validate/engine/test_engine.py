@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 from scenes.mujoco.silent_mujoco import unlogged
-from sim_validate.engine.bench import STATE, batch, compiled, state_parts, step
+from sim_validate.engine.bench import batch, compiled, step
 
 FALLING = """<mujoco><option integrator="discrete"/><worldbody><body><freejoint/>
 <geom size=".1" mass="1"/></body></worldbody></mujoco>"""
@@ -16,35 +16,6 @@ def test_text_that_is_no_scene_is_refused():
     for text in ("", "<mujoco", "<mujoco><nonsense/></mujoco>"):
         with pytest.raises(gc.InputError, match="MuJoCo cannot compile the scene"):
             compiled(text)
-
-
-def test_parts_of_a_state_lie_where_a_batch_has_them():
-    model = compiled(FALLING)
-    trials, parts = batch.Batch(model, 2, 1), state_parts(model)
-    assert set(parts) == set(STATE)
-    for place, name in enumerate(STATE):
-        trials.state[:] = 0.0
-        trials.state[:, parts[name]] = 1.0 + place
-        bound = trials.bind(name)
-        assert bound.size == trials.state[:, parts[name]].size
-        assert (bound == 1.0 + place).all()
-        assert (trials.state != 0.0).sum() == bound.size
-
-
-def test_many_trials_are_each_what_a_plain_loop_gives():
-    model = compiled(FALLING)
-    trials, errors = batch.Batch(model, 3, 2), {}
-    speeds = trials.bind("qvel")
-    speeds[:, 0] = [0.0, 1.0, 2.0]
-    for _ in range(5):
-        step(trials, errors, 4)
-    assert errors == {}
-    for trial in range(3):
-        data = mujoco.MjData(model)
-        data.qvel[0] = float(trial)
-        for _ in range(20):
-            mujoco.mj_step(model, data)
-        np.testing.assert_array_equal(trials.bind("qpos")[trial], data.qpos)
 
 
 def test_only_trials_that_go_on_are_stepped():

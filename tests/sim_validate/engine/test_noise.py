@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from grasp_core.closure.contacts import contact_frames
 from grasp_core.objects.on_faces import face_under
 from sim_validate.closure.validate import disturbed
 from sim_validate.settings import Noise
@@ -33,10 +32,9 @@ def test_without_noise_everything_is_as_planned():
     assert (case.friction, case.mass, case.missed) == (0.5, 1.0, ())
 
 
-@pytest.mark.parametrize("name", ["wedge", "screwdriver"])
-def test_contacts_are_on_their_faces_and_on_the_lines_of_the_fingers(name):
+def test_contacts_are_on_their_faces_and_on_the_lines_of_the_fingers():
     """In the world the object has moved; a finger's line through it has not."""
-    body, found = grasps(name, 0.5, 3)
+    body, found = grasps("wedge", 0.5, 2)
     landed = missed = 0
     for grasp in found:
         for place in range(100):
@@ -52,7 +50,7 @@ def test_contacts_are_on_their_faces_and_on_the_lines_of_the_fingers(name):
                 beside = np.cross(at - grasp.positions[finger], grasp.normals[finger])
                 assert np.linalg.norm(beside) < 1e-12 * body.radius
                 landed += 1
-    assert landed > 500
+    assert landed > 300
     assert missed >= 5
 
 
@@ -65,35 +63,18 @@ def test_a_finger_beside_its_face_misses_it():
         assert len(case.contacts) == 4 - len(case.missed)
 
 
-def test_noise_has_the_size_it_says():
+@pytest.mark.parametrize("size", [1.0, 45.0])
+def test_normals_friction_and_mass_are_off_by_what_is_drawn(size):
+    """Draws of a standard normal distribution, replayed."""
     body, (grasp,) = grasps("wedge", 0.5, 1)
-    noise = dataclasses.replace(STILL, normal_deg=2.0, friction=0.1, mass=0.2)
-    cases = [disturbed(body, grasp, 0.5, noise, 0, place) for place in range(2000)]
-    normals = np.array([[contact.normal for contact in case.contacts] for case in cases])
-    leans = np.arccos(np.clip(np.einsum("nki,ki->nk", normals, grasp.normals), -1.0, 1.0))
-    assert math.degrees(math.sqrt((leans**2).mean() / 2.0)) == pytest.approx(2.0, rel=0.03)
-    frictions = np.log([case.friction / 0.5 for case in cases])
-    masses = np.log([case.mass for case in cases])
-    for found, wanted in ((frictions, 0.1), (masses, 0.2)):
-        assert found.std() == pytest.approx(wanted, rel=0.06)
-        assert abs(found.mean()) < 0.1 * wanted
-    shifted = dataclasses.replace(STILL, shift=0.001)
-    landed = [disturbed(body, grasp, 0.5, shifted, 0, place).landed for place in range(500)]
-    moved = np.array([[contact.position for contact in each] for each in landed])
-    along = np.einsum("nki,kij->nkj", moved - grasp.positions, contact_frames(grasp.normals))
-    np.testing.assert_allclose(along[..., 0], 0.0, atol=1e-12)
-    np.testing.assert_allclose(along[..., 1:].std(axis=0), 0.001 * body.radius, rtol=0.15)
-
-
-@pytest.mark.parametrize("size", [1.0, 20.0, 45.0])
-def test_normals_lean_as_far_as_is_drawn(size):
-    body, (grasp,) = grasps("wedge", 0.5, 1)
-    noise = dataclasses.replace(STILL, normal_deg=size)
+    noise = dataclasses.replace(STILL, normal_deg=size, friction=0.1, mass=0.2)
     leans, drawn = [], []
     for number in range(50):
         case = disturbed(body, grasp, 0.5, noise, 0, number)
         rng = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(1, number)))
-        rng.normal(size=8)
+        *_, slipperiness, heaviness = rng.normal(size=8)
+        assert case.friction == pytest.approx(0.5 * math.exp(0.1 * slipperiness))
+        assert case.mass == pytest.approx(math.exp(0.2 * heaviness))
         drawn.append(np.radians(size) * np.linalg.norm(rng.normal(size=(4, 2)), axis=1))
         normals = np.array([contact.normal for contact in case.contacts])
         leans.append(np.arccos(np.clip(np.einsum("ki,ki->k", normals, grasp.normals), -1, 1)))

@@ -1,10 +1,9 @@
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sim_validate.engine.bench import Load, smooth
+from sim_validate.engine.bench import Load
 from sim_validate.engine.rig import OVERLOAD, Rig, part
 from sim_validate.engine.setup import Setup
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
@@ -13,14 +12,6 @@ LOAD = Load(np.arange(1.0, 7.0), np.full((4, 3), 5.0))
 RIG = Rig(
     SimpleNamespace(sample_s=0.01), Setup(), 0.5, Load(np.zeros(6), np.full((4, 3), 2.0)), None
 )
-
-
-def test_smooth_shares_rise_from_almost_nothing_to_one():
-    shares = smooth(20)
-    steps = np.diff(np.concatenate([[0.0], shares]))
-    assert shares[-1] == 1.0
-    assert (steps > 0).all()
-    assert steps[0] < 0.2 * steps.max() > steps[-1]
 
 
 def test_a_hold_loads_at_high_friction_and_watches_at_the_one_under_test():
@@ -43,15 +34,6 @@ def test_schedules_say_from_where_their_loads_are_constant():
         np.testing.assert_array_equal(rest, np.broadcast_to(each.forces[-1], rest.shape))
 
 
-def test_settling_and_a_settled_release_are_a_release():
-    (whole,), rest = RIG.releases(2.0, [0.3]), RIG.settling(2.0)
-    (left,) = replace(RIG, settled=True).releases(2.0, [0.3])
-    assert (rest.watched, left.watched) == (10, 0)
-    for name in ("forces", "wrenches", "friction"):
-        parts = [getattr(each, name) for each in (rest, left)]
-        np.testing.assert_array_equal(np.concatenate(parts), getattr(whole, name))
-
-
 def test_a_ramp_watches_while_the_load_rises_between_the_shares():
     (schedule,), shares = RIG.ramps([LOAD], (0.9, 1.1))
     assert len(shares) == len(schedule.friction) - schedule.watched == 50
@@ -60,17 +42,16 @@ def test_a_ramp_watches_while_the_load_rises_between_the_shares():
     np.testing.assert_allclose(applied, np.tile(shares[:, None], 6))
 
 
-@pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.3, OVERLOAD])
-def test_planned_forces_balance_every_share_of_a_limit(share):
+def test_planned_forces_balance_every_share_of_a_limit():
     """Below the limit, at it, and above it, where the fingers cannot apply them."""
     tested = 0
     for name in ("wedge", "random-12-1"):
-        body, found = grasps(name, 0.5, 2)
-        for grasp in found:
-            idle = rig_of(body, grasp, 0.5).idle
-            for limit in limiting_loads(body, grasp, 0.5, 4):
+        body, (grasp,) = grasps(name, 0.5, 1)
+        idle = rig_of(body, grasp, 0.5).idle
+        for limit in limiting_loads(body, grasp, 0.5, 3):
+            for share in (0.0, 0.4, 1.0, 1.3, OVERLOAD):
                 load = part(idle, limit, share)
                 assert imbalance(load, body, grasp) < 1e-6
                 np.testing.assert_allclose(load.wrench, share * limit.wrench)
                 tested += 1
-    assert tested >= 12
+    assert tested == 30

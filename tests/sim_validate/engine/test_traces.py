@@ -7,10 +7,7 @@ import scenes
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine.bench import Health, Motion
 from sim_validate.engine.traces import (
-    displaced,
-    rotated,
     rotation_angles,
-    strayed,
     traces,
 )
 from tests.judges import random_rotation
@@ -36,13 +33,6 @@ def pose(shift=(0.0, 0.0, 0.0), rotation=None, slides=None, scale=1.0):
     turn = quaternion(np.eye(3) if rotation is None else rotation)
     slid = np.zeros((4, 3)) if slides is None else slides
     return np.concatenate([shift, scale * turn, np.ravel(slid)])
-
-
-def test_quaternions_turn_like_matrices_whatever_their_length():
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        R, v = random_rotation(rng), rng.normal(size=(5, 3))
-        np.testing.assert_allclose(rotated(3.0 * quaternion(R)[None], v), v @ R.T, atol=1e-13)
 
 
 def test_small_angles_are_exact():
@@ -126,11 +116,3 @@ def test_trials_are_measured_alike_alone_and_beside_others(layout):
                 np.testing.assert_array_equal(getattr(beside, name), getattr(alone, name))
             assert beside.start_m == alone.start_m
     assert [len(each.times_s) for each in together] == [2, 0, 7, 0]
-
-
-def test_the_way_from_the_planned_pose_is_the_way_from_any_pose(layout):
-    poses = any_poses(20)[:, :7]
-    planned = np.tile(pose()[:7], (20, 1))
-    np.testing.assert_allclose(
-        strayed(poses, layout), displaced(poses, planned, layout), rtol=1e-13
-    )

