@@ -12,7 +12,6 @@ import grasp_core as gc
 import scenes
 from grasp_core.families.regulus_kernel import LEAST_DEPTH
 from sim_validate.closure.controls import Control, negative_controls, try_control
-from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, Setup
 from tests.grasp_core.families.printed_paper import printed_regulus
 from tests.grasp_core.quadruples import paired_quadruples
@@ -110,25 +109,3 @@ def test_the_simulator_lets_go_of_what_the_printed_regulus_program_takes_for_gra
             assert try_control(body, control, Agenda(), Setup()).let_go
             tested += 1
     assert tested >= 3
-
-
-def test_a_simulator_with_too_much_friction_is_caught(monkeypatch):
-    """Half as much friction again in the simulation only: low-friction controls then hold."""
-    holds, factor = Rig.holds, 1.5
-
-    def with_more_friction(rig, loads, settling):
-        rough = replace(rig, friction=factor * rig.friction)
-        return holds(rough, loads, [factor * mu for mu in settling])
-
-    monkeypatch.setattr(Rig, "holds", with_more_friction)
-    caught = tested = 0
-    for name in ("random-12-1", "double-wedge-bar"):
-        body, found = grasps(name, 0.5, 6)
-        for grasp in found:
-            if grasp.critical_friction <= 0.03:
-                continue
-            controls = {c.name: c for c in negative_controls(body, grasp, 0.5, 0)}
-            verdict = try_control(body, controls["low_friction"], Agenda(), Setup())
-            caught += verdict.held
-            tested += 1
-    assert caught == tested >= 2

@@ -12,7 +12,6 @@ from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.settings import Noise
-from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
@@ -24,25 +23,22 @@ def repeated(body, grasp, friction, **changed):
     return sv.validate(body, grasp, friction, agenda=agenda)
 
 
-@pytest.mark.parametrize("each", [1, *more(2)])
-def test_analysis_and_simulation_agree_on_every_repeat(each):
+@pytest.mark.parametrize("name", ["wedge", pytest.param("screwdriver", marks=pytest.mark.slow)])
+def test_analysis_and_simulation_agree_on_every_repeat(name):
     """With noise that opens contacts, makes loads too large, and lets fingers miss."""
     held = let_go = missed = 0
     much = Noise(shift=0.02, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
-    for name in ("wedge", "screwdriver", "mug")[: 2 * each - 1]:
-        body, found = grasps(name, 0.5, each)
-        for grasp in found:
-            verdict = repeated(body, grasp, 0.5, noise=much)
-            assert verdict.held
-            assert not verdict.mismatches
-            for trial in verdict.robustness.trials:
-                if trial.outcome is Outcome.INVALID_START:
-                    continue
-                assert (trial.outcome is Outcome.HELD) == trial.predicted
-                held += trial.predicted
-                missed += trial.wrench == "" and not trial.predicted
-                let_go += trial.wrench != ""
-    assert min(held, let_go, missed) >= 2 * each - 1
+    body, (grasp,) = grasps(name, 0.5, 1)
+    verdict = repeated(body, grasp, 0.5, noise=much)
+    assert verdict.held
+    assert not verdict.mismatches
+    for trial in verdict.robustness.trials:
+        if trial.outcome is not Outcome.INVALID_START:
+            assert (trial.outcome is Outcome.HELD) == trial.predicted
+            held += trial.predicted
+            missed += trial.wrench == "" and not trial.predicted
+            let_go += trial.wrench != ""
+    assert min(held, let_go, missed) >= 1
 
 
 def test_without_noise_every_repeat_holds():

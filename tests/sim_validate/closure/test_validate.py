@@ -14,22 +14,18 @@ from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from tests.marks import MORE
 from tests.sim_validate.rigs import grasps
 
 WITHOUT_CONTROLS = Agenda(controls=False)
 
 
 CASES = (("tetrahedron", "pencil"), ("tetrahedron", "regulus"), ("tetrahedron", "free"))
-MORE_CASES = (
-    ("wedge", "concurrent"),
-    ("mug", "concurrent"), ("chamfered-box", "free"), ("double-wedge-bar", "pencil"),
-    ("random-12-1", "regulus"), ("screwdriver", "concurrent"),
-)  # fmt: skip
+SLOW_CASES = (("screwdriver", "concurrent"), ("random-12-1", "regulus"))
 
 
 @pytest.mark.parametrize(
-    ("name", "family"), [*CASES, *(pytest.param(*case, marks=MORE) for case in MORE_CASES)]
+    ("name", "family"),
+    [*CASES, *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW_CASES)],
 )
 def test_planned_grasps_hold_all_wrenches_and_no_control_does(name, family):
     """At theta = 10 degrees; reguli among them need friction."""
@@ -153,9 +149,9 @@ def test_overlapping_fingertips_make_a_grasp_invalid():
     [
         FingerSettings(fingertip_radius_m=0.002),
         pytest.param(
-            FingerSettings(max_normal_force_n=80.0, approach=(0.0, 0.0, -1.0)), marks=MORE
+            FingerSettings(max_normal_force_n=80.0, approach=(0.0, 0.0, -1.0)),
+            marks=pytest.mark.slow,
         ),
-        pytest.param(FingerSettings(stiffness_n_per_m=600.0), marks=MORE),
     ],
 )
 def test_limits_do_not_depend_on_how_fingers_are_built(fingers):

@@ -18,7 +18,7 @@ from sim_validate.engine.traces import USABLE, WATCHED, EarlyEnds, Thresholds, j
 from sim_validate.settings import HoldProtocol
 from tests.marks import more
 from tests.sim_validate.engine.test_traces import pose
-from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
+from tests.sim_validate.rigs import grasps, limiting_loads
 
 SAMPLE_S = 0.01
 LENGTH = 66
@@ -99,12 +99,6 @@ def lengths(traces):
     return whole, early
 
 
-@pytest.fixture(scope="module")
-def held():
-    body, (grasp, *_) = grasps("random-12-1", 0.5, 1)
-    return body, grasp, rig_of(body, grasp, 0.5)
-
-
 @pytest.fixture
 def looking(held):
     """One trial that squeezes without a wrench, looked at from the last sample of settling on."""
@@ -134,7 +128,7 @@ def test_verdicts_are_those_of_the_full_length(held):
     assert early < 0.3 * whole
 
 
-@pytest.mark.parametrize("name", more("box", "tetrahedron", "l-bracket", "random-20-7"))
+@pytest.mark.parametrize("name", more("l-bracket", "random-20-7"))
 def test_verdicts_of_thousands_of_trials_are_those_of_the_full_length(name):
     pairs = []
     for friction in (0.2, 0.5, 0.8):

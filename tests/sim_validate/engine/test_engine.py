@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 from scenes.mujoco.silent_mujoco import unlogged
-from sim_validate.engine.bench import batch, compiled, step
+from sim_validate.engine.bench import compiled
 
 FALLING = """<mujoco><option integrator="discrete"/><worldbody><body><freejoint/>
 <geom size=".1" mass="1"/></body></worldbody></mujoco>"""
@@ -16,18 +16,6 @@ def test_text_that_is_no_scene_is_refused():
     for text in ("", "<mujoco", "<mujoco><nonsense/></mujoco>"):
         with pytest.raises(gc.InputError, match="MuJoCo cannot compile the scene"):
             compiled(text)
-
-
-def test_only_trials_that_go_on_are_stepped():
-    trials, errors = batch.Batch(compiled(FALLING), 3, 1), {}
-    step(trials, errors, 10, np.array([0, 2]))
-    heights = trials.bind("qpos")[:, 2].copy()
-    assert heights[0] == heights[2] < heights[1] == 0.0
-    step(trials, {0: "ended"}, 10)
-    after = trials.bind("qpos")[:, 2]
-    assert after[0] == heights[0]
-    assert after[1] < 0.0
-    assert after[2] < heights[2]
 
 
 def test_warnings_leave_no_file_behind(tmp_path, monkeypatch):

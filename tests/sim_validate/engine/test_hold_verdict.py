@@ -3,17 +3,9 @@ import re
 import numpy as np
 import pytest
 
-import scenes
 from sim_validate.engine.bench import Health
 from sim_validate.engine.traces import Outcome, Trace, judge
 from sim_validate.settings import HoldProtocol
-from tests.sim_validate.rigs import grasps
-
-
-@pytest.fixture(scope="module")
-def layout():
-    body, (grasp, *_) = grasps("wedge", 0.5, 1)
-    return scenes.build_scene(body, grasp, 0.5).layout
 
 
 def trace(layout, **changes):

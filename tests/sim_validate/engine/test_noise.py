@@ -23,15 +23,6 @@ def pose(body, noise, seed, number):
     return Rotation.from_rotvec(math.radians(noise.turn_deg) * rng.normal(size=3)), shift
 
 
-def test_without_noise_everything_is_as_planned():
-    body, (grasp,) = grasps("wedge", 0.5, 1)
-    case = disturbed(body, grasp, 0.5, STILL, 0, 0)
-    for contact, planned in zip(case.contacts, grasp.contacts, strict=True):
-        np.testing.assert_allclose(contact.position, planned.position, atol=1e-15)
-        np.testing.assert_allclose(contact.normal, planned.normal, atol=1e-15)
-    assert (case.friction, case.mass, case.missed) == (0.5, 1.0, ())
-
-
 def test_contacts_are_on_their_faces_and_on_the_lines_of_the_fingers():
     """In the world the object has moved; a finger's line through it has not."""
     body, found = grasps("wedge", 0.5, 2)

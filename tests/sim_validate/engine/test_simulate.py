@@ -8,13 +8,7 @@ from sim_validate.engine.bench import CHUNK, Bench, Load
 from sim_validate.engine.rig import part
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol
-from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
-
-
-@pytest.fixture(scope="module")
-def held():
-    body, (grasp, *_) = grasps("random-12-1", 0.5, 1)
-    return body, grasp, rig_of(body, grasp, 0.5)
+from tests.sim_validate.rigs import limiting_loads
 
 
 def trials_of(held, count=5):

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import scenes
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine.bench import Health, Motion
 from sim_validate.engine.traces import (
@@ -11,13 +10,6 @@ from sim_validate.engine.traces import (
     traces,
 )
 from tests.judges import random_rotation
-from tests.sim_validate.rigs import grasps
-
-
-@pytest.fixture(scope="module")
-def layout():
-    body, (grasp, *_) = grasps("wedge", 0.5, 1)
-    return scenes.build_scene(body, grasp, 0.5).layout
 
 
 def motion(rows, **changes):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sim_validate.engine.bench import Health, Load
-from sim_validate.engine.rig import _onset, bisected_limits, ramped_limits
+from sim_validate.engine.rig import OVERLOAD, _onset, bisected_limits, part, ramped_limits
 from sim_validate.engine.traces import Trace
-from tests.sim_validate.rigs import grasps, limiting_loads, rig_of
+from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
 
@@ -76,3 +76,18 @@ def test_a_ramp_without_an_onset_finds_nothing(moved):
     health = Health(finite=bool(np.isfinite(moved).all()))
     trace = replace(rising(moved), health=health)
     assert _onset(trace, np.linspace(0.98, 1.02, 50), 1e-6) is None
+
+
+def test_planned_forces_balance_every_share_of_a_limit():
+    """Below the limit, at it, and above it, where the fingers cannot apply them."""
+    tested = 0
+    for name in ("wedge", "random-12-1"):
+        body, (grasp,) = grasps(name, 0.5, 1)
+        idle = rig_of(body, grasp, 0.5).idle
+        for limit in limiting_loads(body, grasp, 0.5, 3):
+            for share in (0.0, 0.4, 1.0, 1.3, OVERLOAD):
+                load = part(idle, limit, share)
+                assert imbalance(load, body, grasp) < 1e-6
+                np.testing.assert_allclose(load.wrench, share * limit.wrench)
+                tested += 1
+    assert tested == 30
