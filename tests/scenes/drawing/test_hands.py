@@ -12,10 +12,8 @@ from scenes.drawing.hands import (
     STEPS,
     hand_shapes,
 )
-from scenes.drawing.pictures import Drawing, write_picture
-from scenes.drawing.sheets import Dots, Words
-from tests.scenes.drawing.standing import FRICTION, ROUNDING, held, standing
-from tests.scenes.drawing.whole import assert_whole
+from scenes.drawing.pictures import write_picture
+from tests.scenes.drawing.standing import ROUNDING, held, standing
 
 
 def tips_of(shapes):
@@ -73,23 +71,6 @@ def surface_gaps(frame, shape, points):
     local = np.abs((local - shape.position) @ shape.rotation) - shape.half_sizes
     outside = np.linalg.norm(np.maximum(local, 0.0), axis=1)
     return outside + np.minimum(local.max(axis=1), 0.0) - shape.radius
-
-
-def test_the_picture_is_whole_and_holds_the_hand():
-    body, grasp, _, _ = standing()
-    sheet = Drawing(body, grasp, FRICTION, held()).sheet(legend=True)
-    assert_whole(sheet)
-    points = np.vstack([
-        loop for mark in sheet.marks if not isinstance(mark, Words | Dots)
-        for loop in getattr(mark, "loops", ()) or getattr(mark, "lines", ())
-    ])  # fmt: skip
-    assert points.min() >= 0.0
-    assert points.max() <= sheet.height
-    assert np.ptp(points[:, 0]) > 0.6 * sheet.width
-    said = {words.text for words in sheet.words()}
-    assert {"hand", "friction cone", "0", "1", "2", "3"} <= said
-    assert "finger" not in said
-    assert sheet.name == "Grasp c-0-1-4-5 of small box with the hand allegro"
 
 
 def test_users_give_a_hand_and_what_was_found(tmp_path):

@@ -160,19 +160,6 @@ def test_visual_shapes_are_read_only_where_a_link_has_no_others(case, tmp_path):
     assert not hand.notes if noted is None else any(noted in note for note in hand.notes)
 
 
-def test_bodies_of_mjcf_without_shapes_that_collide_take_all_they_have(tmp_path):
-    fingers = "".join(
-        f'<body name="a{n}" pos="0.0{n + 2} 0 0"><joint name="j{n}" range="-9 9"/>'
-        f'<geom type="sphere" size="0.00{n + 5}" contype="0" conaffinity="0"/></body>'
-        for n in range(3)
-    )
-    text = f'<mujoco><worldbody><body name="palm">{fingers}</body></worldbody></mujoco>'
-    hand = loaded(tmp_path, text, ("a0", "a1", "a2"), "hand.xml")
-    assert [len(each.shapes) for each in hand.links] == [1, 1, 1]
-    assert any("with all they have: a0, a1, a2" in note for note in hand.notes)
-    assert not any({"a0", "a2"} == set(pair) for pair in hand.ignored_pairs)
-
-
 def test_a_fingertip_without_shape_is_the_nearest_of_its_link(tmp_path):
     ball = '<collision><origin xyz="0 0 0.055"/><geometry><sphere radius="0.006"/></geometry>'
     text = robot(tip="", middle=f"{ball}</collision>{box(length=0.04)}")

@@ -159,13 +159,6 @@ def test_the_last_digits_of_contacts_do_not_change_the_text(held):
         )
 
 
-def test_an_odd_object_name_still_makes_a_scene():
-    base = scenes.example_object("tetrahedron")
-    body = gc.Polyhedron.from_mesh(base.vertices, base.triangles, name='<b>"&\n\x1b[0m')
-    grasp = gc.plan(body).grasps[0]
-    mujoco.MjModel.from_xml_string(scenes.build_scene(body, grasp).xml)
-
-
 def test_each_fingertip_touches_the_face_of_its_contact(held):
     """It is the object's own surface that it touches, along the normal, and nothing else."""
     body, grasp, scene, model = held

