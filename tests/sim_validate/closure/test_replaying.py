@@ -103,14 +103,6 @@ def test_the_first_wrench_that_was_not_held_is_replayed_unless_another_is_named(
         replayed(known, "lift")
 
 
-def test_the_clip_begins_when_the_fingers_have_closed(tried):
-    known, _ = tried
-    found = replayed(known)
-    joints, trace = found.watched.joints, found.watched.trace
-    assert joints.shape[1] == 19
-    assert 1 + 26 + len(trace.times_s) == len(joints)
-
-
 def test_closed_contacts_are_no_control(tried):
     known, _ = tried
     with pytest.raises(gc.InputError, match="are force-closed"):

@@ -1,5 +1,6 @@
 import json
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,10 @@ import scenes
 import sim_validate as sv
 from scenes.settings import FingerSettings
 from sim_validate.closure.controls import negative_controls
+from sim_validate.closure.validate import Job
 from sim_validate.closure.verdict import Verdicts, trace_arrays
+from sim_validate.engine import gate as gate_module
+from sim_validate.engine.gate import measured_gate
 from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
@@ -226,3 +230,18 @@ def test_contacts_rounded_to_six_digits_are_as_good():
     verdict = sv.validate(body, replace(grasp, contacts=rounded), 0.5, agenda=WITHOUT_CONTROLS)
     assert verdict.good, verdict.wrenches[0].hold.reason
     assert verdict.scene.layout.drive.radius_m > 0.01 * body.radius
+
+
+def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    asked = replace(WITHOUT_CONTROLS, critical_friction=False)
+    job = Job(body, 0.5, asked, Setup()).prepared(1, 1)
+    assert job.gate is measured_gate(Setup(), 0.5, body.radius)
+    arrived = pickle.loads(pickle.dumps(job))  # noqa: S301
+
+    def fail(_):
+        raise AssertionError("measured again")
+
+    monkeypatch.setattr(gate_module, "measured", fail)
+    assert arrived(grasp).held
+    assert arrived(grasp).gate == job.gate

@@ -1,10 +1,14 @@
+"""How the simulator is started, stepped and kept quiet."""
+
 import mujoco
 import numpy as np
 import pytest
 
+import grasp_core as gc
 import scenes
 from grasp_core.arrays import to_digits
-from sim_validate.engine.bench import CHUNK, Bench, Load
+from scenes.mujoco.silent_mujoco import unlogged
+from sim_validate.engine.bench import CHUNK, Bench, Load, compiled
 from sim_validate.engine.rig import part
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol
@@ -74,3 +78,25 @@ def test_trials_past_their_time_are_stopped_and_say_so(held):
     assert len(motion.joints) == 0
     assert motion.health.error == ""
     assert not Bench(bench.scene).simulated(told)[0].health.timed_out
+
+
+def test_text_that_is_no_scene_is_refused():
+    for text in ("", "<mujoco", "<mujoco><nonsense/></mujoco>"):
+        with pytest.raises(gc.InputError, match="MuJoCo cannot compile the scene"):
+            compiled(text)
+
+
+def test_warnings_leave_no_file_behind(tmp_path, monkeypatch):
+    """A state that is not a number makes the simulator warn."""
+    monkeypatch.chdir(tmp_path)
+    model = compiled(
+        "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    data.qpos[0] = np.nan
+    before = mujoco.MjLogConfig.get().logto_file
+    with unlogged():
+        mujoco.mj_step(model, data)
+    assert data.warning.number.sum() > 0
+    assert not list(tmp_path.iterdir())
+    assert mujoco.MjLogConfig.get().logto_file == before

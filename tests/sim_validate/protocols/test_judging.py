@@ -8,8 +8,8 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.values import Contact
-from sim_validate.protocols.judging import judge_by, judge_hand_by
-from sim_validate.protocols.published import protocol, protocol_names
+from sim_validate.protocols.judging import Look, judge_by, judge_hand_by, judged_run
+from sim_validate.protocols.published import Passing, protocol, protocol_names
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 from tests.marks import more
 
@@ -72,3 +72,37 @@ def test_a_hand_passes_tests_as_well(name):
     assert found.ours.held, found.ours.reason
     assert found.hand == "allegro"
     assert found.predicted
+
+
+def moving(heights, turn_deg=0.0):
+    """An object that is at these heights after samples 0, 1, .., and looked at from 2 on."""
+    half = math.radians(0.5 * turn_deg)
+    poses = np.tile([0.0, 0.0, 0.0, math.cos(half), 0.0, math.sin(half), 0.0], (len(heights), 1))
+    poses[:, 2] = heights
+    return [Look(pose, 2) for pose in poses[2:]]
+
+
+@pytest.mark.parametrize(
+    ("passing", "heights", "passed", "said"),
+    [({"most_m": 0.035}, (0.01, 0.02, 0.03, 0.04), False, "moved by 40 mm"),
+     ({"most_m": 0.02}, (0.0, 0.0, 0.02), False, "moved by 20 mm"),
+     ({"most_m": 0.02}, (0.0, 0.0, 0.0199), True, ""),
+     ({"most_m": 0.02}, (0.0, 0.0, 0.03, 9.0), False, "moved by 30 mm"),
+     ({"most_m": 1.0}, (0.0, 0.0, math.nan), False, ""),
+     ({"fingers": 2}, (0.0, 0.0, 0.0), True, ""),
+     ({"fingers": 3}, (0.0, 0.0, 0.0), False, "2 fingers touched")],
+)  # fmt: skip
+def test_a_run_is_judged_at_its_looks_up_to_the_first_that_fails(passing, heights, passed, said):
+    """Displacement counts from before closing, and a threshold itself does not pass."""
+    found = judged_run(0, moving(heights), "", Passing(**passing))
+    assert found.passed is passed
+    assert said in found.reason
+
+
+def test_a_turn_counts_as_an_angle_and_a_fault_of_the_simulator_is_no_pass():
+    looks = moving((0.0, 0.0, 0.0), turn_deg=20.0)
+    assert not judged_run(0, looks, "", Passing(most_deg=15.0)).passed
+    found = judged_run(0, looks, "", Passing(most_deg=25.0))
+    assert (found.passed, found.turn_deg) == (True, pytest.approx(20.0))
+    found = judged_run(0, looks, "it diverged", Passing())
+    assert (found.passed, found.reason) == (False, "it diverged")
