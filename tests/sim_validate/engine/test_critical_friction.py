@@ -52,22 +52,6 @@ def test_a_finger_that_hardly_needs_to_push_does_not_let_the_object_turn():
     assert np.einsum("ki,ki->k", forces, grasp.normals).min() > 5e-6
 
 
-@pytest.mark.slow
-def test_it_is_found_at_small_sizes():
-    example, tested = scenes.example_object("box"), 0
-    scale = 1e-3 / float(np.ptp(example.vertices, axis=0).max())
-    body = gc.Polyhedron.from_mesh(scale * example.vertices, example.triangles, name="box")
-    for family in FAMILIES:
-        for grasp in gc.plan(body, 0.3, families=(family,), limit=2).grasps:
-            if grasp.critical_friction < FrictionProtocol().least_friction:
-                continue
-            assert sv.simulated_critical_friction(body, grasp) == pytest.approx(
-                grasp.critical_friction, rel=0.005
-            )
-            tested += 1
-    assert tested >= 2
-
-
 def test_forces_just_above_the_critical_friction_need_it_and_balance():
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1, ("regulus",))
     forces = forces_just_above(grasp.positions, grasp.normals, grasp.critical_friction)

@@ -56,17 +56,6 @@ def test_a_limit_that_is_not_where_it_is_predicted_is_found_farther_away_or_not_
         assert found[4:] == (None, None)
 
 
-def test_where_a_ramp_began_to_slip_is_bounded_from_below():
-    """Displacement grows with the third power of the time since the limit, as masses do."""
-    shares = np.linspace(0.9, 1.1, 401)
-    for limit in (0.95, 1.0, 1.04):
-        for speed in (1e-3, 1e-1, 10.0):
-            moved = speed * np.maximum(shares - limit, 0.0) ** 3
-            onset = _onset(rising(moved), shares, 1e-8)
-            assert onset.lower <= limit + 1e-9
-            assert limit <= onset.share <= onset.upper
-
-
 @pytest.mark.parametrize(
     "moved",
     [np.zeros(50), np.full(50, 1.0), np.concatenate([np.zeros(20), [1.0], np.full(29, np.nan)])],

@@ -18,34 +18,10 @@ from tests.sim_validate.execution.held_rigs import (
     box_bench,
     box_grip,
     box_scene,
-    squeezed,
 )
 
 DOWN = np.array([0.0, 0.0, -G])
 UP = np.array([0.0, 0.0, 1.0])
-FIELDS = ("moved", "turned", "palm", "tips", "forces", "table")
-
-
-def ran(*drives, start=None, **rig):
-    state = squeezed(**rig) if start is None else start
-    motions = box_bench(**rig).run(drives, state)
-    assert not any(motion.health.fault for motion in motions)
-    return motions
-
-
-def same(one, other):
-    for name in FIELDS:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-
-
-def several():
-    """Trials of different lengths."""
-    return (
-        paths.weighed(DOWN, paths.samples(0.3)),
-        paths.shake(DOWN, np.array([0, 6.0, 0, 0, 0, 0]), 10.0),
-        paths.knock(DOWN, np.array([0.02, 0, 0]), np.array([0, 0.01, 0])),
-        paths.stop(DOWN, UP, 10.0, 0.3),
-    )
 
 
 def test_the_squeeze_comes_and_leaves_the_object_where_it_is():
@@ -72,18 +48,6 @@ def test_the_palm_follows_its_path_and_takes_the_object_along():
     # the table carries the weight before the lift, and nothing after it
     assert motion.table[begun - 1] == pytest.approx([0, 0, MASS * G], abs=0.01)
     assert motion.table[-1] == pytest.approx(np.zeros(3), abs=1e-9)
-
-
-def test_results_depend_on_no_company_order_or_threads():
-    drives = several()
-    together = ran(*drives)
-    back = ran(*drives[::-1])[::-1]
-    (alone,) = ran(drives[1])
-    threaded = HeldBench(box_scene(), threads=2).run(drives, squeezed())
-    same(together[1], alone)
-    for one, reversed_, two in zip(together, back, threaded, strict=True):
-        same(one, reversed_)
-        same(one, two)
 
 
 def test_a_finger_that_meets_nothing_pushes_nothing():
