@@ -17,18 +17,11 @@ from scenes.drawing.panels import width_of
 from scenes.drawing.pictures import BAR_RADIUS, Drawing, grasp_figure, write_picture
 from scenes.drawing.sheets import (
     ASSETS,
-    BAD,
-    FINGERS,
-    FOCUS,
     FONT_FILES,
     FORMATS,
-    GOOD,
-    INK,
-    SURFACE,
     Sheet,
     Words,
     png_of,
-    rgb,
 )
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps
@@ -53,24 +46,6 @@ def test_no_finger_points_at_the_viewer(name):
         places, _ = view.seen(grasp.positions)
         gaps = [np.linalg.norm(a - b) for a, b in itertools.combinations(places, 2)]
         assert min(gaps) > BAR_RADIUS * body.radius
-
-
-SEEN_BY = {
-    "all": np.eye(3),
-    "protanopes": np.array([[0.112, 0.888, 0.0], [0.112, 0.888, 0.0], [0.004, -0.004, 1.0]]),
-    "deuteranopes": np.array([[0.292, 0.708, 0.0], [0.292, 0.708, 0.0], [-0.022, 0.022, 1.0]]),
-}
-"""Linear light as dichromats see it, after Vienot, Brettel & Mollon 1999."""
-
-
-@pytest.mark.parametrize("viewer", SEEN_BY)
-@pytest.mark.parametrize("colours", [FINGERS, (GOOD, BAD), (FOCUS, SURFACE, INK)])
-def test_colours_can_be_told_apart(viewer, colours):
-    seen = [(SEEN_BY[viewer] @ np.array(rgb(colour)) ** 2.2).clip(0.0) ** (1 / 2.2)
-            for colour in colours]  # fmt: skip
-    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)]
-    assert min(apart) > 0.2
-    assert np.linalg.norm(np.subtract(*map(rgb, ("#00ff00", "#00ee00")))) < 0.2  # it has teeth
 
 
 @pytest.mark.parametrize("family", ["concurrent", "pencil", "regulus"])

@@ -75,24 +75,6 @@ def test_a_fingertip_beyond_the_border_has_rolled_off(layout):
     assert verdict.failed_after_s == pytest.approx(0.04)
 
 
-def test_a_trace_that_was_never_watched_is_no_hold(layout):
-    none = {
-        "times_s": np.empty(0), "displacements_m": np.empty(0), "shifts_m": np.empty(0),
-        "rotations_rad": np.empty(0), "slips_m": np.empty((0, 4)), "gaps_m": np.empty((0, 4)),
-        "touched_m": np.empty((0, 4, 3)), "health": Health(timed_out=True),
-    }  # fmt: skip
-    verdict = judge(trace(layout, **none), layout, HoldProtocol())
-    assert verdict.outcome is Outcome.TIMEOUT
-    np.testing.assert_array_equal(verdict.slip_m, np.zeros(4))
-
-
-def test_overlapping_fingertips_make_the_start_invalid(layout):
-    overlap = ["fingertips 0 and 1 overlap", "fingertip 2 meets the object"]
-    verdict = judge(trace(layout), layout, HoldProtocol(), overlap)
-    assert verdict.outcome is Outcome.INVALID_START
-    assert verdict.reason == "fingertips 0 and 1 overlap; fingertip 2 meets the object"
-
-
 def test_the_largest_motion_is_reported(layout):
     slips = np.diag(np.arange(5.0))[:, :4]
     verdict = judge(trace(layout, displacements_m=MOVING, slips_m=slips), layout, HoldProtocol())

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-import scenes
 from grasp_core.arrays import to_digits
 from scenes.mujoco.silent_mujoco import unlogged
 from sim_validate.engine.bench import CHUNK, Bench, Load, compiled
@@ -67,17 +66,6 @@ def test_a_good_hold_beside_a_blow_up_is_judged_on_its_own(held):
     assert outcomes == [Outcome.HELD, Outcome.DIVERGED, Outcome.HELD]
     (alone,) = rig.hold([still])
     np.testing.assert_array_equal(alone.displacements_m, together[2].displacements_m)
-
-
-def test_trials_past_their_time_are_stopped_and_say_so(held):
-    body, grasp, _ = held
-    bench = Bench(scenes.build_scene(body, grasp, 0.5), timeout_s=0.0)
-    told = [trials_of(held)[0].told(bench.scene.layout)]
-    (motion,) = bench.simulated(told)
-    assert motion.health.timed_out
-    assert len(motion.joints) == 0
-    assert motion.health.error == ""
-    assert not Bench(bench.scene).simulated(told)[0].health.timed_out
 
 
 def test_text_that_is_no_scene_is_refused():

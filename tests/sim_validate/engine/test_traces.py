@@ -86,25 +86,3 @@ def test_rigid_fingers_have_no_slides(layout):
     away = 1e-4 * layout.frames[0, :, 0]
     (found,) = traces([motion([pose()[:7], pose(away)[:7]])], rigid, [1])
     assert found.gaps_m[0, 0] == pytest.approx(1e-4 - layout.drive.indentation_m)
-
-
-def any_poses(count):
-    rng = np.random.default_rng(3)
-    rows = [
-        pose(1e-3 * rng.normal(size=3), random_rotation(rng), 1e-3 * rng.normal(size=(4, 3)))
-        for _ in range(count)
-    ]
-    return np.array(rows)
-
-
-def test_trials_are_measured_alike_alone_and_beside_others(layout):
-    motions = [motion(any_poses(count)) for count in (4, 1, 7, 2)]
-    watched = [2, 1, 0, 5]
-    for earlier in (None, motions[0]):
-        together = traces(motions, layout, watched, earlier)
-        for each, first, beside in zip(motions, watched, together, strict=True):
-            (alone,) = traces([each], layout, [first], earlier)
-            for name in ("times_s", "displacements_m", "rotations_rad", "slips_m", "gaps_m"):
-                np.testing.assert_array_equal(getattr(beside, name), getattr(alone, name))
-            assert beside.start_m == alone.start_m
-    assert [len(each.times_s) for each in together] == [2, 0, 7, 0]

@@ -1,25 +1,11 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from sim_validate.engine.bench import Health, Load
-from sim_validate.engine.rig import OVERLOAD, _onset, bisected_limits, part, ramped_limits
-from sim_validate.engine.traces import Trace
+from sim_validate.engine.bench import Load
+from sim_validate.engine.rig import OVERLOAD, bisected_limits, part, ramped_limits
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
-
-
-def rising(displacements):
-    """A trace of which only displacements count."""
-    n = len(displacements)
-    nothing = np.zeros((n, 4))
-    return Trace(
-        times_s=np.arange(n), displacements_m=np.array(displacements), shifts_m=np.zeros(n),
-        rotations_rad=np.zeros(n), slips_m=nothing, gaps_m=nothing, touched_m=np.zeros((n, 4, 3)),
-        start_m=0.0, health=Health(),
-    )  # fmt: skip
 
 
 def test_ramps_and_bisections_find_the_predicted_limits_of_every_family():
@@ -54,17 +40,6 @@ def test_a_limit_that_is_not_where_it_is_predicted_is_found_farther_away_or_not_
         for factor, simulated in zip((0.95, 1.05, 0.75, 1.3), found, strict=False):
             assert simulated.share * factor == pytest.approx(1.0, abs=0.05)
         assert found[4:] == (None, None)
-
-
-@pytest.mark.parametrize(
-    "moved",
-    [np.zeros(50), np.full(50, 1.0), np.concatenate([np.zeros(20), [1.0], np.full(29, np.nan)])],
-    ids=["it never moved", "it moved at once", "it diverged"],
-)
-def test_a_ramp_without_an_onset_finds_nothing(moved):
-    health = Health(finite=bool(np.isfinite(moved).all()))
-    trace = replace(rising(moved), health=health)
-    assert _onset(trace, np.linspace(0.98, 1.02, 50), 1e-6) is None
 
 
 def test_planned_forces_balance_every_share_of_a_limit():

@@ -104,17 +104,6 @@ def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
             assert one == other
 
 
-@pytest.mark.slow
-def test_an_object_that_is_shot_away_beyond_all_numbers_is_lost():
-    body, grasp = planned("box")
-    settings = sv.ExecutionSettings(0.1, trials=("weight", "knock"), knock_n_s=1e5)
-    found = sv.execute(body, grasp, 0.5, settings)
-    assert found.trials[0].survived
-    assert {trial.fate for trial in found.of_kind("knock")} <= {"dropped", "diverged"}
-    assert "diverged" in {trial.fate for trial in found.of_kind("knock")}
-    assert not found.survived
-
-
 def test_a_loss_of_which_nothing_says_when_it_begins_is_run_again_as_a_whole():
     """Contacts may slip within samples only; then no sample has one on its cone."""
     settings = sv.ExecutionSettings(0.1, trials=("weight",))

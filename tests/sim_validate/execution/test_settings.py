@@ -10,9 +10,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.settings import as_table
 from scenes.example_objects import example_object
-from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 from sim_validate.settings import KINDS, TrialKind
 
 TABLE = {
@@ -32,16 +30,6 @@ def test_a_table_says_how_objects_are_executed():
     mass = wedge.mass_at(700.0)
     assert asked.for_body(wedge) == replace(asked, mass_kg=mass, density_kg_m3=None)
     assert of_table({"mass_kg": 2}).for_body(wedge) == sv.ExecutionSettings(mass_kg=2.0)
-
-
-@pytest.mark.parametrize("table", [TABLE, {"mass_kg": 0.3}])
-def test_a_configuration_is_the_same_when_it_is_written_and_read_again(tmp_path, table):
-    asked = of_table(table)
-    assert of_table(as_table(asked)) == asked
-    config = DatasetConfig(objects=("wedge",), execution=asked)
-    path = tmp_path / "dataset.toml"
-    path.write_text(config_to_toml(config))
-    assert config_from_toml(path) == config
 
 
 @pytest.mark.parametrize(

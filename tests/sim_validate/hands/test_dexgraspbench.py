@@ -151,14 +151,6 @@ def saved(value, path, protocol=None):
     return path
 
 
-@pytest.mark.parametrize("protocol", [3, 4, 5])
-def test_records_of_any_pickle_protocol_are_read(protocol, tmp_path):
-    read = load_dex_record(saved(FIELDS, tmp_path / "0.npy", protocol))
-    assert read.object_scale == 0.06
-    assert read.grasp[7] == np.float32(0.2)
-    assert len(read.grasp) == 8
-
-
 class Runs:
     """Unpickling this would call a function."""
 
