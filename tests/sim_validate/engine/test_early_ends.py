@@ -229,15 +229,14 @@ def test_an_object_beyond_half_of_a_threshold_is_watched_to_the_end(looking):
         assert any(said) is ended
 
 
-def test_an_object_that_is_or_was_moved_too_far_is_answered_at_once(looking):
+@pytest.mark.parametrize("before", [False, True])
+def test_an_object_that_is_or_was_moved_too_far_is_answered_at_once(looking, before):
     """What moved before friction was lowered counts as well."""
     joints, speeds = pose(), np.zeros(18)
-    first, second = np.array([LAST_OF_SETTLING]), np.array([LAST_OF_SETTLING + 1])
-    looking.look(np.array([0]), first, joints[None], speeds[None])
-    joints[2] = 1.01 * looking.thresholds.watched_m
-    assert looking.look(np.array([0]), second, joints[None], speeds[None])[1] == [True]
+    joints[2] = 1.01 * looking.thresholds.total_m if before else 0.0
+    looking.look(np.array([0]), np.array([LAST_OF_SETTLING]), joints[None], speeds[None])
     joints[2] = 1.01 * looking.thresholds.total_m
-    looking.look(np.array([0]), first, joints[None], speeds[None])
+    second = np.array([LAST_OF_SETTLING + 1])
     assert looking.look(np.array([0]), second, joints[None], speeds[None])[1] == [True]
 
 
