@@ -1,4 +1,4 @@
-"""Pictures of grasps can be read: from a good side, in colours apart, nothing cut off."""
+"""Pictures of grasps can be read: from a good side, nothing cut off."""
 
 import io
 import itertools
@@ -7,23 +7,24 @@ import numpy as np
 import pytest
 from PIL import Image, ImageFont
 
+import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import convex_hull
 from scenes.drawing.painting import (
     FORESHORTENED,
+    Surface,
+    View,
+    Window,
     best_view,
+    outline,
+    painted,
 )
 from scenes.drawing.panels import width_of
-from scenes.drawing.pictures import BAR_RADIUS, Drawing, grasp_figure, write_picture
-from scenes.drawing.sheets import (
-    ASSETS,
-    FONT_FILES,
-    FORMATS,
-    Sheet,
-    Words,
-    png_of,
-)
+from scenes.drawing.pictures import BAR_RADIUS, Drawing, glass, grasp_figure, write_picture
+from scenes.drawing.sheets import ASSETS, FONT_FILES, FORMATS, Area, Sheet, Words, png_of
 from tests.scenes.drawing.whole import assert_whole
+from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
 
 
@@ -90,6 +91,37 @@ def test_a_picture_has_letters_where_a_machine_has_no_fonts():
             assert font.getlength(said) <= width_of(said, 100.0)
         drawn = pixels_of(Sheet(300.0, 30.0, "words", (Words(5.0, 15.0, said, bold=bold),)))
         assert (drawn.min(axis=2) < 0.5).sum() > 300
+
+
+def test_a_curved_body_has_an_outline_and_no_seams(monkeypatch):
+    """A ball is drawn with no edge; its outline is the circle where the line of sight grazes it."""
+    vertices, triangles = sphere_mesh(3)
+    body = gc.Polyhedron.from_mesh(vertices, triangles, faces="patches")
+    surface, edges = glass(body)
+    assert not edges.lines
+    with monkeypatch.context() as patch:  # fine surfaces are drawn coarser and stay where they are
+        patch.setattr("scenes.drawing.pictures.MOST_TRIANGLES", 300)
+        coarser = glass(body)[0]
+    assert 50 < len(coarser.polygons) < len(surface.polygons)
+    far = np.linalg.norm(coarser.vertices() - body.center_of_mass, axis=1)
+    assert 0.85 * body.radius < far.min() <= far.max() <= (1.0 + 1e-9) * body.radius
+    view = View.of_angles(20.0, 30.0, body)
+    lines = outline(Surface.of(surface.polygons), view.camera)
+    assert len(lines) > 30
+    heights = (lines.reshape(-1, 3) - body.center_of_mass) @ view.axes[2] / body.radius
+    # the camera is nine radii away: the tangents touch at a ninth, here to an edge's length
+    assert np.abs(heights - 1.0 / 9.0).max() < 0.2
+    window = Window.around([surface], np.empty((0, 3)), body, view, 500.0)
+    areas = [part for part in painted((surface,), window) if isinstance(part, Area)]
+    assert 2 <= len(areas) <= 14  # two sides, at most seven shades each
+    flat, _ = window.seen(surface.vertices())
+    covered = sum(abs(signed(loop)) for area in areas for loop in area.loops)
+    assert covered == pytest.approx(2.0 * abs(signed(convex_hull(flat))), rel=0.35)
+
+
+def signed(loop):
+    x, y = loop.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 @pytest.mark.parametrize("form", FORMATS)

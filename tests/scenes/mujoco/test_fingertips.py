@@ -86,16 +86,6 @@ def test_two_fingertips_at_one_edge_always_overlap():
     assert "fingertips 0 and 1 of radius" in found[0]
 
 
-def test_opposite_fingertips_never_overlap_and_close_ones_do_from_half_their_distance_on():
-    body = scenes.example_object("box")
-    length = np.ptp(body.vertices[:, 0])
-    at = np.array([[length / 2, 0.0, 0.0], [-length / 2, 0.0, 0.0], [length / 2, 0.004, 0.0]])
-    normals = np.array([[-1.0, 0, 0], [1.0, 0, 0], [-1.0, 0, 0]])
-    assert clashes(body, at[:2], normals[:2], 1.0) == ()
-    assert clashes(body, at[[0, 2]], normals[[0, 2]], 0.00199) == ()
-    assert len(clashes(body, at[[0, 2]], normals[[0, 2]], 0.00201)) == 1
-
-
 def test_fingers_arrive_on_their_planned_lines():
     body = scenes.example_object("wedge")
     grasp = gc.plan(body, limit=1, finger=gc.Finger(0.004, 0.05)).grasps[0]

@@ -107,11 +107,6 @@ def test_the_surface_is_the_outer_side_of_solids(name):
     assert np.mean(in_solids(name, points - aside) > 0) > 0.99
 
 
-def test_a_convex_object_is_its_own_solid():
-    body = scenes.example_object("dodecahedron")
-    assert touched_solids(body, np.zeros((1, 3)), 0.0) is None
-
-
 def test_only_what_is_within_reach_is_there():
     """The points of left-out pieces are farther from the contact than the reach."""
     body, name = body_of("mug"), "mug"

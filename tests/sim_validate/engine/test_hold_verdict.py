@@ -73,10 +73,3 @@ def test_a_fingertip_beyond_the_border_has_rolled_off(layout):
     assert verdict.outcome is Outcome.LOST_CONTACT
     assert verdict.reason == "finger 2 rolled off its face"
     assert verdict.failed_after_s == pytest.approx(0.04)
-
-
-def test_the_largest_motion_is_reported(layout):
-    slips = np.diag(np.arange(5.0))[:, :4]
-    verdict = judge(trace(layout, displacements_m=MOVING, slips_m=slips), layout, HoldProtocol())
-    assert verdict.displacement_m == pytest.approx(MOVING.max() * layout.grasp_size_m)
-    np.testing.assert_allclose(verdict.slip_m, layout.grasp_size_m * np.arange(4.0))
