@@ -54,6 +54,7 @@ def test_a_plan_without_grasps_says_why():
     assert read(plan)[1] == [plan.absence]
 
 
+@pytest.mark.slow
 def test_a_verdict_shows_its_trials_and_a_scene_its_object(plan):
     verdict = sv.validate(plan.body, plan[0], 0.5)
     found, cells = read(verdict)

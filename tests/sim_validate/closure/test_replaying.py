@@ -76,6 +76,7 @@ def test_so_do_repeats_with_noise(tried):
     assert min(missed, loaded) >= 2
 
 
+@pytest.mark.slow
 def test_contacts_that_noise_opens_let_go_and_so_they_do_by_themselves(tried):
     """Friction just above the critical one: half of the draws are below."""
     known, _ = tried

@@ -216,6 +216,7 @@ def test_run_executes_grasps_too_and_a_run_without_removes_the_file(here, capsys
     assert not (here / "r" / "executions.json").exists()
 
 
+@pytest.mark.slow
 def test_a_run_has_a_report_where_executions_are_refused(here, capsys, monkeypatch):
     def refuse(*_args, **_more):
         raise UnfaithfulError("the simulator fails")
