@@ -11,6 +11,7 @@ from grasp_core.hands.hand_arrays import places, tip_jacobians
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.hand_models import hand_mjcf
 from tests.scenes.hand_files.grippers import gripper, written
+from tests.scenes.meshes import box_obj
 
 TABLES = ["allegro", "leap"]
 BOX = ("box", 'pos="0 0 0.02" size="0.008 0.009 0.02"')
@@ -157,3 +158,12 @@ def test_a_file_that_is_too_large_is_refused(tmp_path):
     path = written(tmp_path, gripper() + " " * (4 * 2**20))
     with pytest.raises(InputError, match="4 MiB"):
         scenes.load_hand(path, ("s0", "s1", "s2"))
+
+
+def test_meshes_in_the_folder_of_the_compiler_are_read_and_taken_as_boxes(tmp_path):
+    written(tmp_path / "meshes", box_obj(0.01, 0.02, 0.03), "palm.obj")
+    extra = '<compiler meshdir="meshes"/><asset><mesh file="palm.obj"/></asset>'
+    cylinder = 'type="cylinder" size="0.05 0.005"'
+    text = gripper(extra=extra).replace(cylinder, 'type="mesh" mesh="palm"')
+    hand = scenes.load_hand(written(tmp_path, text), ("s0", "s1", "s2", "s3"))
+    assert sorted(hand.palm[0].half_sizes) == pytest.approx([0.01, 0.02, 0.03], abs=1e-6)

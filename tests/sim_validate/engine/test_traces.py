@@ -74,12 +74,6 @@ def test_fingers_that_move_with_the_object_do_not_slip(layout):
     assert np.abs(found.gaps_m + layout.drive.indentation_m).max() < 1e-14
 
 
-def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):
-    (found,) = traces([motion([pose(), pose()], health=Health(timed_out=True))], layout, [5])
-    assert len(found.times_s) == len(found.displacements_m) == 0
-    assert found.health.timed_out
-
-
 def test_rigid_fingers_have_no_slides(layout):
     """The scene has no joints for them: seven numbers a row."""
     rigid = replace(layout, holder=replace(layout.holder, stiffness=np.zeros((4, 0))))
