@@ -14,10 +14,6 @@ FACES = {
 }  # fmt: skip
 
 
-def test_every_named_object_is_counted_here():
-    assert set(scenes.example_names()) == {*FACES, "random-FACES-SEED"}
-
-
 @pytest.mark.parametrize("name", FACES)
 def test_an_object_is_a_solid_of_hand_size_with_its_faces(name):
     body = scenes.example_object(name)
@@ -41,7 +37,7 @@ def test_volumes_of_simple_objects_are_their_formulas():
         assert scenes.example_object(name).volume == pytest.approx(volume, rel=1e-9)
 
 
-@pytest.mark.parametrize(("faces", "seed"), [(4, 1), (12, 3), (30, 5), (60, 2)])
+@pytest.mark.parametrize(("faces", "seed"), [(12, 3), (60, 2)])
 def test_random_objects_have_the_asked_number_of_faces_and_repeat(faces, seed):
     one, two = (scenes.example_object(f"random-{faces}-{seed}") for _ in range(2))
     assert len(one.faces) == faces

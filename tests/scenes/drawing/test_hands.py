@@ -8,21 +8,12 @@ import pytest
 
 import scenes
 from grasp_core.errors import InputError
-from grasp_core.values import Contact
 from scenes.drawing.hands import (
     STEPS,
-    PosedHand,
-    extent_with,
     hand_shapes,
-    numbers_behind,
-    parts_of,
-    view_of_hand,
 )
-from scenes.drawing.pictures import Drawing, write_picture
-from scenes.drawing.sheets import Dots, Words
-from tests.grasp_core.hands.gripping import plain_hand
-from tests.scenes.drawing.standing import FRICTION, ROUNDING, held, standing
-from tests.scenes.drawing.whole import assert_whole
+from scenes.drawing.pictures import write_picture
+from tests.scenes.drawing.standing import ROUNDING, held, standing
 
 
 def tips_of(shapes):
@@ -80,72 +71,6 @@ def surface_gaps(frame, shape, points):
     local = np.abs((local - shape.position) @ shape.rotation) - shape.half_sizes
     outside = np.linalg.norm(np.maximum(local, 0.0), axis=1)
     return outside + np.minimum(local.max(axis=1), 0.0) - shape.radius
-
-
-def three():
-    """A hand of four fingers of which three touch."""
-    hand = plain_hand()
-    pose = PosedHand(hand, np.zeros(8), np.eye(4), (), ())
-    used = (3, 0, 1)
-    tips = replace(pose, fingers=used, contacts=tuple(
-        Contact([0.0, 0.0, float(n)], [0.0, 0.0, 1.0]) for n in range(3)
-    )).tips  # fmt: skip
-    contacts = tuple(Contact(tip + np.array([0.008, 0.0, 0.0]), [1.0, 0.0, 0.0]) for tip in tips)
-    return PosedHand(hand, np.zeros(8), np.eye(4), used, contacts)
-
-
-def test_fingers_that_do_not_touch_look_like_links():
-    one = three()
-    shapes = hand_shapes(one)
-    assert sorted(shape.finger for shape in tips_of(shapes)) == [0, 1, 2]
-    (idle,) = [n for n in range(4) if n not in one.fingers]
-    balls = [shape for shape in shapes if shape.role == "hand" and len(shape.polygons) > 50]
-    (ball,) = balls
-    middle = [0.0, 0.04 * idle, 0.07]
-    distances = np.linalg.norm(ball.vertices() - middle, axis=1)
-    np.testing.assert_allclose(distances, 0.008, atol=1e-12)
-    assert numbers_behind(one).shape == (3, 3)
-
-
-def test_the_extent_holds_object_and_hand():
-    body, one = standing()[0], held()
-    extent = extent_with(body, parts_of(one))
-    points = np.vstack([corners_of(hand_shapes(one)), body.vertices])
-    far = np.linalg.norm(points - extent.center_of_mass, axis=1)
-    assert 0.9 * extent.radius < far.max() <= (1.0 + 1e-9) * extent.radius
-    assert extent.radius > 2.0 * body.radius
-
-
-def test_the_view_shows_every_contact_of_this_grasp():
-    """No point between the camera and a contact is deep in a part: in nine tenths of a box in it.
-
-    Such a box reaches radius / sqrt(3) beyond the box that is rounded.
-    """
-    body, one = standing()[0], held()
-    view, parts = view_of_hand(body, one), parts_of(one)
-    sizes = parts.half_sizes + parts.radii[:, None] / math.sqrt(3.0)
-    for contact in one.contacts:
-        way = np.linspace(0.0, 1.0, 4000)[:, None] * (view.camera - contact.position)
-        for middle, axes, half in zip(parts.middles, parts.axes, sizes, strict=True):
-            local = np.abs((contact.position + way - middle) @ axes)
-            assert ((local - 0.9 * half).max(axis=1) >= -1e-9).all()
-
-
-def test_the_picture_is_whole_and_holds_the_hand():
-    body, grasp, _, _ = standing()
-    sheet = Drawing(body, grasp, FRICTION, held()).sheet(legend=True)
-    assert_whole(sheet)
-    points = np.vstack([
-        loop for mark in sheet.marks if not isinstance(mark, Words | Dots)
-        for loop in getattr(mark, "loops", ()) or getattr(mark, "lines", ())
-    ])  # fmt: skip
-    assert points.min() >= 0.0
-    assert points.max() <= sheet.height
-    assert np.ptp(points[:, 0]) > 0.6 * sheet.width
-    said = {words.text for words in sheet.words()}
-    assert {"hand", "friction cone", "0", "1", "2", "3"} <= said
-    assert "finger" not in said
-    assert sheet.name == "Grasp c-0-1-4-5 of small box with the hand allegro"
 
 
 def test_users_give_a_hand_and_what_was_found(tmp_path):

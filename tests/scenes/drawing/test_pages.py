@@ -16,7 +16,6 @@ import scenes
 import sim_validate as sv
 from scenes.drawing import pages
 from scenes.drawing.pages import UNITS
-from scenes.drawing.sheets import FINGERS
 from sim_validate.main import main
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -50,26 +49,12 @@ def test_a_plan_shows_four_fingers_and_no_figure_that_was_put_off(plan, monkeypa
     assert len(cells) == 4 * 6 + 1
 
 
-def test_every_family_is_drawn():
-    for name, family in (
-        ("dodecahedron", "concurrent"),
-        ("double-wedge-bar", "pencil"),
-        ("icosahedron", "regulus"),
-    ):
-        plan = gc.plan(scenes.example_object(name), 0.5, families=family, limit=1)
-        assert plan[0].family == family
-        found, _ = read(plan)
-        assert len(list(found.iter(f"{SVG}path"))) >= 4 * (2 + 2)  # bars, cones
-        fills = {part.get("fill") for part in found.iter(f"{SVG}path")}
-        fills |= {part.get("fill") for part in found.iter(f"{SVG}g")}
-        assert set(FINGERS) <= fills
-
-
 def test_a_plan_without_grasps_says_why():
     plan = gc.plan(scenes.example_object("box"), 0.5, families=("concurrent",), cones="normal")
     assert read(plan)[1] == [plan.absence]
 
 
+@pytest.mark.slow
 def test_a_verdict_shows_its_trials_and_a_scene_its_object(plan):
     verdict = sv.validate(plan.body, plan[0], 0.5)
     found, cells = read(verdict)
@@ -97,6 +82,7 @@ def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatc
     assert "67.74 mm" in cells
 
 
+@pytest.mark.slow
 def test_pictures_come_with_scenes_alone():
     code = """
 import grasp_core as gc

@@ -1,8 +1,7 @@
-"""Pictures of grasps can be read: from a good side, in colours apart, nothing cut off."""
+"""Pictures of grasps can be read: from a good side, nothing cut off."""
 
 import io
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -14,8 +13,6 @@ from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_hull
 from scenes.drawing.painting import (
     FORESHORTENED,
-    LOOKS,
-    Shape,
     Surface,
     View,
     Window,
@@ -25,28 +22,10 @@ from scenes.drawing.painting import (
 )
 from scenes.drawing.panels import width_of
 from scenes.drawing.pictures import BAR_RADIUS, Drawing, glass, grasp_figure, write_picture
-from scenes.drawing.sheets import (
-    ASSETS,
-    BAD,
-    FINGERS,
-    FOCUS,
-    FONT_FILES,
-    FORMATS,
-    GOOD,
-    INK,
-    SURFACE,
-    Area,
-    Sheet,
-    Words,
-    png_of,
-    rgb,
-)
+from scenes.drawing.sheets import ASSETS, FONT_FILES, FORMATS, Area, Sheet, Words, png_of
 from tests.scenes.drawing.whole import assert_whole
 from tests.scenes.meshes import sphere_mesh
 from tests.sim_validate.rigs import grasps
-
-FRONT = View.of_angles(0.0, 0.0, scenes.example_object("box"))
-SHEET = Window(FRONT, np.array([-1.0, -1.0]), 2.0, 100.0)
 
 
 @pytest.fixture(scope="module")
@@ -55,27 +34,7 @@ def wedge():
     return body, grasp
 
 
-def test_a_view_is_a_right_handed_frame_with_z_upwards(wedge):
-    for azimuth, elevation in itertools.product((0.0, 75.0, 200.0), (0.0, 30.0, 60.0)):
-        axes = View.of_angles(azimuth, elevation, wedge[0]).axes
-        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
-        np.testing.assert_allclose(np.cross(axes[0], axes[1]), axes[2], atol=1e-12)
-        assert axes[0][2] == pytest.approx(0.0, abs=1e-12)
-        assert axes[1][2] > 0.0
-        assert math.degrees(math.asin(axes[2][2])) == pytest.approx(elevation)
-
-
-def test_what_is_nearer_is_larger():
-    towards, right = FRONT.axes[2], FRONT.axes[0]
-    unit = 0.1 * FRONT.distance
-    far, near = (FRONT.center + unit * (right + side * towards) for side in (-1.0, 1.0))
-    places, nearness = FRONT.seen(np.array([far, near, FRONT.center]))
-    assert places[1, 0] > unit > places[0, 0] > 0.0
-    np.testing.assert_allclose(nearness, [-unit, unit, 0.0], atol=1e-12)
-    np.testing.assert_allclose(places[2], 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["wedge", "dodecahedron", "box", "mug", "double-wedge-bar"])
+@pytest.mark.parametrize("name", ["wedge", "double-wedge-bar"])
 def test_no_finger_points_at_the_viewer(name):
     """A bar that is seen at FORESHORTENED + 0.1 is still 0.33 object radii long: 0.75 of them
     times the sine of 26 degrees. Contacts are a bar's width apart.
@@ -90,56 +49,14 @@ def test_no_finger_points_at_the_viewer(name):
         assert min(gaps) > BAR_RADIUS * body.radius
 
 
-def square(nearness, role="region", finger=0):
-    corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-    points = [FRONT.center + x * FRONT.axes[0] + y * FRONT.axes[1] + nearness * FRONT.axes[2]
-              for x, y in corners]  # fmt: skip
-    return Shape(role, finger, polygons=(np.array(points),))
-
-
-def test_what_is_in_front_is_drawn_later():
-    patches = painted([square(0.3, finger=1), square(-0.3, finger=0)], SHEET)
-    assert [patch.fill for patch in patches] == [FINGERS[0], FINGERS[1]]
-
-
-def test_lines_are_as_wide_and_as_long_as_they_say():
-    ends = np.array([FRONT.center - FRONT.axes[0], FRONT.center + FRONT.axes[0]])
-    for role, share in (("friction cone", 1.0), ("line of force", 0.5)):
-        parts = list(painted([Shape(role, 0, lines=(ends,))], SHEET))
-        lengths = [np.linalg.norm(np.diff(line, axis=0)) for part in parts for line in part.lines]
-        assert sum(lengths) == pytest.approx(100.0 * share, rel=0.05)
-        widths = [part.width for part in parts]
-        np.testing.assert_allclose(widths, LOOKS[role].line, rtol=1e-9)
-
-
-SEEN_BY = {
-    "all": np.eye(3),
-    "protanopes": np.array([[0.112, 0.888, 0.0], [0.112, 0.888, 0.0], [0.004, -0.004, 1.0]]),
-    "deuteranopes": np.array([[0.292, 0.708, 0.0], [0.292, 0.708, 0.0], [-0.022, 0.022, 1.0]]),
-}
-"""Linear light as dichromats see it, after Vienot, Brettel & Mollon 1999."""
-
-
-@pytest.mark.parametrize("viewer", SEEN_BY)
-@pytest.mark.parametrize("colours", [FINGERS, (GOOD, BAD), (FOCUS, SURFACE, INK)])
-def test_colours_can_be_told_apart(viewer, colours):
-    seen = [(SEEN_BY[viewer] @ np.array(rgb(colour)) ** 2.2).clip(0.0) ** (1 / 2.2)
-            for colour in colours]  # fmt: skip
-    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)]
-    assert min(apart) > 0.2
-    assert np.linalg.norm(np.subtract(*map(rgb, ("#00ff00", "#00ee00")))) < 0.2  # it has teeth
-
-
-@pytest.mark.parametrize("legend", [True, False])
 @pytest.mark.parametrize("family", ["concurrent", "pencil", "regulus"])
-def test_nothing_is_cut_off(family, legend):
+def test_nothing_is_cut_off(family):
     body, (grasp,) = grasps("tetrahedron", 0.3, 1, (family,), cones="tilted")
-    assert_whole(grasp_figure(body, grasp, 0.3, legend=legend))
+    assert_whole(grasp_figure(body, grasp, 0.3, legend=True))
 
 
 @pytest.mark.parametrize(("name", "family"), [
-    ("wedge", "concurrent"), ("tetrahedron", "pencil"), ("tetrahedron", "regulus"),
-    ("mug", "regulus"), ("double-wedge-bar", "pencil"),
+    ("wedge", "concurrent"), ("tetrahedron", "regulus"),
 ])  # fmt: skip
 def test_every_finger_is_seen(name, family, monkeypatch):
     """The picture changes where a bar is left out.
@@ -176,12 +93,18 @@ def test_a_picture_has_letters_where_a_machine_has_no_fonts():
         assert (drawn.min(axis=2) < 0.5).sum() > 300
 
 
-def test_a_curved_body_has_an_outline_and_no_seams():
+def test_a_curved_body_has_an_outline_and_no_seams(monkeypatch):
     """A ball is drawn with no edge; its outline is the circle where the line of sight grazes it."""
     vertices, triangles = sphere_mesh(3)
     body = gc.Polyhedron.from_mesh(vertices, triangles, faces="patches")
     surface, edges = glass(body)
     assert not edges.lines
+    with monkeypatch.context() as patch:  # fine surfaces are drawn coarser and stay where they are
+        patch.setattr("scenes.drawing.pictures.MOST_TRIANGLES", 300)
+        coarser = glass(body)[0]
+    assert 50 < len(coarser.polygons) < len(surface.polygons)
+    far = np.linalg.norm(coarser.vertices() - body.center_of_mass, axis=1)
+    assert 0.85 * body.radius < far.min() <= far.max() <= (1.0 + 1e-9) * body.radius
     view = View.of_angles(20.0, 30.0, body)
     lines = outline(Surface.of(surface.polygons), view.camera)
     assert len(lines) > 30

@@ -109,26 +109,19 @@ def meshed(name, tag="collision"):
     return f'<{tag}><geometry><mesh filename="{name}"/></geometry></{tag}>'
 
 
-def test_a_package_is_looked_for_above_the_file(tmp_path):
+def test_a_package_is_looked_for_above_the_file_by_its_folder_or_its_own_name(tmp_path):
     root = tmp_path / "my_hand"
     (root / "meshes").mkdir(parents=True)
     (root / "meshes" / "middle.obj").write_text(box_obj(0.005, 0.005, 0.005))
     text = robot(middle=meshed("package://my_hand/meshes/middle.obj"))
     hand = loaded(root / "models" / "urdf", text, TIPS)
     assert hand.links[1].shapes[0].half_sizes == pytest.approx([0.005] * 3)
-    beside = loaded(root, text, TIPS)
-    assert beside.links[1] == hand.links[1]
-
-
-def test_a_package_may_be_called_otherwise_than_its_folder(tmp_path):
-    root = tmp_path / "checkout"
-    (root / "meshes").mkdir(parents=True)
-    (root / "meshes" / "middle.obj").write_text(box_obj(0.005, 0.005, 0.005))
-    text = robot(middle=meshed("package://my_hand/meshes/middle.obj"))
+    assert loaded(root, text, TIPS).links[1] == hand.links[1]
+    other = root.rename(tmp_path / "checkout")
     with pytest.raises(InputError, match="package my_hand around it"):
-        loaded(root / "urdf", text, TIPS)
-    (root / "package.xml").write_text("<package><name>my_hand</name></package>")
-    assert loaded(root / "urdf", text, TIPS).links[1].shapes
+        loaded(other / "urdf", text, TIPS)
+    (other / "package.xml").write_text("<package><name>my_hand</name></package>")
+    assert loaded(other / "urdf", text, TIPS).links[1] == hand.links[1]
 
 
 OUTSIDE = {
@@ -151,35 +144,20 @@ def test_nothing_is_read_outside_the_package(case, tmp_path):
         loaded(tmp_path / "my_hand" / "urdf", robot(middle=meshed(OUTSIDE[case])), TIPS)
 
 
-def test_visual_shapes_are_taken_where_a_link_has_no_others(tmp_path):
-    hand = loaded(tmp_path, robot(middle=box("visual"), tip=f"<visual>{SPHERE}</visual>"), TIPS)
-    assert any("collide with their visual ones: b0, t0, b1, t1, b2, t2" in n for n in hand.notes)
-    assert [len(each.shapes) for each in hand.links] == [1, 2] * 3
+VISUAL = {
+    "no others": (box("visual"), "collide with their visual ones: b0, b1, b2", [1, 2] * 3),
+    "others": (box() + meshed("missing.glb", "visual"), None, [1, 2] * 3),
+    "pictures alone": (meshed("missing.dae", "visual"), "touch nothing: b0, b1, b2", [1, 1] * 3),
+}
+
+
+@pytest.mark.parametrize("case", VISUAL)
+def test_visual_shapes_are_read_only_where_a_link_has_no_others(case, tmp_path):
+    middle, noted, counts = VISUAL[case]
+    hand = loaded(tmp_path, robot(middle=middle), TIPS)
+    assert [len(each.shapes) for each in hand.links] == counts
     assert [finger.tip.radius for finger in hand.fingers] == pytest.approx([0.008] * 3)
-
-
-def test_visual_shapes_of_links_that_have_others_are_not_read(tmp_path):
-    hand = loaded(tmp_path, robot(middle=box() + meshed("missing.glb", "visual")), TIPS)
-    assert hand.notes == ()
-    assert [len(each.shapes) for each in hand.links] == [1, 2] * 3
-
-
-def test_links_with_pictures_alone_touch_nothing_and_are_named(tmp_path):
-    hand = loaded(tmp_path, robot(middle=meshed("missing.dae", "visual")), TIPS)
-    assert any("touch nothing: b0, b1, b2" in note for note in hand.notes)
-
-
-def test_bodies_of_mjcf_without_shapes_that_collide_take_all_they_have(tmp_path):
-    fingers = "".join(
-        f'<body name="a{n}" pos="0.0{n + 2} 0 0"><joint name="j{n}" range="-9 9"/>'
-        f'<geom type="sphere" size="0.00{n + 5}" contype="0" conaffinity="0"/></body>'
-        for n in range(3)
-    )
-    text = f'<mujoco><worldbody><body name="palm">{fingers}</body></worldbody></mujoco>'
-    hand = loaded(tmp_path, text, ("a0", "a1", "a2"), "hand.xml")
-    assert [len(each.shapes) for each in hand.links] == [1, 1, 1]
-    assert any("with all they have: a0, a1, a2" in note for note in hand.notes)
-    assert not any({"a0", "a2"} == set(pair) for pair in hand.ignored_pairs)
+    assert not hand.notes if noted is None else any(noted in note for note in hand.notes)
 
 
 def test_a_fingertip_without_shape_is_the_nearest_of_its_link(tmp_path):
@@ -234,20 +212,25 @@ def coupled(tmp_path, equality, tendon=""):
     return loaded(tmp_path, text.replace(motors, ""), ("d0", "d1", "d2"), "hand.xml")
 
 
-def test_equalities_are_about_the_angles_in_which_a_file_is_drawn(tmp_path):
-    """c - 0 = 0.2 + 0.5 (b - 10 degrees)."""
-    hand = coupled(tmp_path, rule("c0", "b0", "0.2 0.5 0 0 0"))
-    (coupling,) = hand.couplings
-    assert (coupling.joint, coupling.driver) == ("c0", "b0")
-    assert coupling.ratio == pytest.approx(0.5)
-    assert coupling.offset == pytest.approx(0.2 - 0.5 * np.deg2rad(10.0))
+TEN = np.deg2rad(10.0)
+COUPLED = {
+    "one": (rule("c0", "b0", "0.2 0.5 0 0 0"), [("c0", "b0", 0.5, 0.2 - 0.5 * TEN)]),
+    "a chain": (
+        rule("c0", "b0", "0 0.5 0 0 0") + rule("b0", "a0", "0 -2 0 0 0"),
+        [("b0", "a0", -2.0, TEN), ("c0", "a0", -1.0, 0.0)],
+    ),
+    "off": ('<joint joint1="c0" joint2="b0" active="false"/>', []),
+}
 
 
-def test_chains_of_couplings_end_at_one_free_joint(tmp_path):
-    hand = coupled(tmp_path, rule("c0", "b0", "0 0.5 0 0 0") + rule("b0", "a0", "0 -2 0 0 0"))
-    ten = np.deg2rad(10.0)
-    found = {c.joint: (c.driver, c.ratio, c.offset) for c in hand.couplings}
-    assert found == {"b0": ("a0", -2.0, pytest.approx(ten)), "c0": ("a0", -1.0, 0.0)}
+@pytest.mark.parametrize("case", COUPLED)
+def test_equalities_are_about_the_angles_in_which_a_file_is_drawn(case, tmp_path):
+    """As c - 0 = 0.2 + 0.5 (b - 10 degrees); chains end at one free joint."""
+    rules, wanted = COUPLED[case]
+    found = [(c.joint, c.driver, c.ratio, c.offset) for c in coupled(tmp_path, rules).couplings]
+    assert [each[:2] for each in found] == [each[:2] for each in wanted]
+    for one, other in zip(found, wanted, strict=True):
+        assert one[2:] == pytest.approx(other[2:], abs=1e-12)
 
 
 def test_joints_that_follow_one_that_moves_no_fingertip_follow_each_other(tmp_path):
@@ -265,11 +248,6 @@ def test_a_joint_that_is_held_at_an_angle_has_no_other(tmp_path):
     hand = coupled(tmp_path, '<joint joint1="b0" polycoef="0.3 0 0 0 0"/>')
     names = [joint.name for joint in hand.joints]
     assert hand.ranges[names.index("b0")] == pytest.approx([0.3 + np.deg2rad(10.0)] * 2)
-
-
-def test_rules_that_are_off_do_not_count(tmp_path):
-    hand = coupled(tmp_path, '<joint joint1="c0" joint2="b0" active="false"/>')
-    assert hand.couplings == ()
 
 
 def test_tendons_without_rules_leave_joints_free_with_a_note(tmp_path):

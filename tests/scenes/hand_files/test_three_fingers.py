@@ -1,6 +1,5 @@
 """A gripper with three fingers stands at three contacts of a grasp, and MuJoCo agrees."""
 
-from contextlib import suppress
 from itertools import combinations
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.errors import UndecidedError
 from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
@@ -20,8 +18,6 @@ from tests.three_fingers import THREE_TIPS, three_fingers_file, three_fingers_mj
 OBJECTS = ("box", "dodecahedron")
 RADIUS = 0.035
 CLEARANCE = 5e-4
-STARTS = 50
-"""Starts for each choice of contacts: a pose from fewer is one for the first choice."""
 MUJOCO_SLACK = 2e-6
 """Twice the tolerance of MuJoCo's own distances of convex bodies [m]."""
 
@@ -59,7 +55,7 @@ def simulated(hand, body, found):
 
 def test_most_grasps_are_reached_at_three_contacts_that_close(hand, reached):
     assert len(reached) >= 5
-    for body, grasp, found in reached:
+    for _, grasp, found in reached:
         assert len(found.used) == len(found.fingers) == len(found.contacts) == 3
         assert sorted(found.fingers) == [0, 1, 2]
         assert (np.diff(found.used) > 0).all()
@@ -75,7 +71,6 @@ def test_most_grasps_are_reached_at_three_contacts_that_close(hand, reached):
         assert found.certificate.verify()
         assert gc.critical_friction(points, normals) < FRICTION
         assert normals == pytest.approx(planned[1], abs=1e-6)  # flat faces, and the same ones
-        assert body.radius < 0.05
 
 
 def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(hand, reached):
@@ -99,24 +94,6 @@ def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(hand, reached):
                 assert apart(i, j) >= CLEARANCE - MUJOCO_SLACK
                 seen += 1
     assert seen >= 5 * len(reached) > 0
-
-
-def test_the_first_choice_has_the_largest_margin(hand):
-    """Where a pose is found for the first choice, no other three contacts close with more."""
-    firsts = 0
-    for grasp in grasps("dodecahedron", RADIUS):
-        found = gc.reach_with(hand, scaled("dodecahedron", RADIUS), grasp, FRICTION, starts=STARTS)
-        if not found.reached or found.starts > STARTS:
-            continue
-        firsts += 1
-        margins = dict[tuple[int, ...], float]()
-        for chosen in combinations(range(4), 3):
-            kept = list(chosen)
-            with suppress(UndecidedError):  # what is nearly degenerate is not chosen either
-                proof = gc.force_closure(grasp.positions[kept], grasp.normals[kept], FRICTION)
-                margins[chosen] = proof.margin
-        assert margins[tuple(found.used)] >= max(margins.values()) - 1e-6
-    assert firsts >= 1
 
 
 def test_where_no_three_contacts_close_each_choice_has_a_proof(hand):

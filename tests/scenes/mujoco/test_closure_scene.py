@@ -1,16 +1,13 @@
-from dataclasses import asdict
-
 import mujoco
 import numpy as np
 import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.mujoco.closure_scene import PAD_TOUCH, SQUEEZE, arrange, grasp_size
+from scenes.mujoco.closure_scene import PAD_TOUCH, SQUEEZE
 from scenes.mujoco.scene_text import TOUCH
-from scenes.settings import CHOSEN_FLAGS, ENABLED_FLAGS, UNUSED_FLAGS
 
-OBJECTS = ("wedge", "icosahedron", "screwdriver")
+OBJECTS = ("wedge", "screwdriver")
 SINGLE = 4e-8
 """Largest error of a mesh's coordinate, which the simulator holds in single precision, in radii."""
 
@@ -65,24 +62,6 @@ def test_every_setting_reaches_the_compiled_model(held):
         assert model.geom_friction[geom, 0] == 0.5
 
 
-def test_all_flags_are_written_and_only_three_are_off_that_are_on_elsewhere(held):
-    _, _, scene, model = held
-    for name in (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS):
-        assert f'{name}="' in scene.xml
-    off = mujoco.mjtDisableBit
-    assert model.opt.disableflags == off.mjDSBL_AUTORESET | off.mjDSBL_MIDPHASE | off.mjDSBL_ISLAND
-    assert model.opt.enableflags == 0
-
-
-def test_the_flags_are_all_that_mujoco_has():
-    bits = [
-        name for kind in (mujoco.mjtDisableBit, mujoco.mjtEnableBit) for name in kind.__members__
-    ]
-    ours = {name.upper() for name in (*ENABLED_FLAGS, *CHOSEN_FLAGS, *UNUSED_FLAGS)}
-    theirs = {name.split("_")[1] for name in bits if not name.startswith("mjN")}
-    assert ours == theirs
-
-
 def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(on_pads):
     body, grasp, scene, model = on_pads
     data = mujoco.MjData(model)
@@ -103,21 +82,8 @@ def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(on_pads):
         assert abs((tip_top - top) @ outward) < 1e-15
 
 
-def test_each_finger_meets_its_own_pad_only(on_pads):
-    _, _, scene, model = on_pads
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
-    data.qpos[7::3] += 1e-5 - PAD_TOUCH * scene.layout.grasp_size_m
-    mujoco.mj_forward(model, data)
-    pairs = {
-        tuple(sorted(model.geom(int(g)).name for g in (c.geom1, c.geom2))) for c in data.contact
-    }
-    assert pairs == {(f"finger{i}", f"pad{i}") for i in range(4)}
-    assert all(c.dist == pytest.approx(-1e-5, rel=1e-6) for c in data.contact)
-
-
-@pytest.mark.parametrize("scale", [0.01, 0.03, 1.0, 7.0, 20.0])
-@pytest.mark.parametrize("name", ["l-bracket", "octahedron", "wedge"])
+@pytest.mark.parametrize("scale", [0.01, 1.0, 20.0])
+@pytest.mark.parametrize("name", ["l-bracket", "octahedron"])
 def test_all_fingertips_touch_from_the_first_step(name, scale):
     """If they were put exactly onto their faces, rounding would decide which of them do."""
     example = scenes.example_object(name)
@@ -156,14 +122,6 @@ def after(model, key, steps):
     return data, forces[:, 0].max(initial=0.0)
 
 
-def test_before_the_grasp_fingers_stay_where_they_come_from(held):
-    _, _, scene, model = held
-    (start, _), (later, _) = after(model, "pregrasp", 0), after(model, "pregrasp", 1500)
-    np.testing.assert_array_equal(start.qpos, model.key("approach").qpos)
-    assert start.ncon == later.ncon == 0
-    np.testing.assert_allclose(later.qpos, start.qpos, atol=1e-9 * scene.layout.radius_m)
-
-
 def test_fingers_push_as_hard_as_their_keyframe_says(held):
     """A servo loses its stiffness times what its finger moves until the contact carries it; and as
     the object turns, a share of the tangential force, at most `friction` of the push, is normal."""
@@ -187,7 +145,7 @@ def test_the_last_digits_of_contacts_do_not_change_the_text(held):
     """Other machines plan the same contacts with other last digits."""
     body, grasp, scene, _ = held
     rng = np.random.default_rng(0)
-    for _ in range(20):
+    for _ in range(5):
         contacts = [
             gc.Contact(
                 contact.position + 1e-15 * body.radius * rng.normal(size=3),
@@ -199,41 +157,6 @@ def test_the_last_digits_of_contacts_do_not_change_the_text(held):
             scenes.build_scene(body, contacts, 0.5).xml.split("<keyframe>")[0]
             == (scene.xml.split("<keyframe>")[0])
         )
-
-
-def test_the_text_is_the_same_for_the_same_grasp_and_can_be_written(held, tmp_path):
-    body, grasp, scene, _ = held
-    assert scenes.build_scene(body, grasp, 0.5).xml == scene.xml
-    path = scenes.write_scene(scene, tmp_path / "scene.xml")
-    assert mujoco.MjModel.from_xml_path(str(path)).nv == 18
-
-
-def test_an_odd_object_name_still_makes_a_scene():
-    base = scenes.example_object("tetrahedron")
-    body = gc.Polyhedron.from_mesh(base.vertices, base.triangles, name='<b>"&\n\x1b[0m')
-    grasp = gc.plan(body).grasps[0]
-    mujoco.MjModel.from_xml_string(scenes.build_scene(body, grasp).xml)
-
-
-def test_similar_grasps_are_driven_alike():
-    """Lengths scale, forces stay: mass and stiffness scale inversely, damping inversely too."""
-    base = scenes.example_object("wedge")
-    large = gc.Polyhedron.from_mesh(3.0 * base.vertices, base.triangles)
-    drives = []
-    for body in (base, large):
-        layout = arrange(body, gc.plan(body, limit=1).grasps[0], 0.5)
-        drives.append((layout.grasp_size_m, layout.object_kg, asdict(layout.drive)))
-    (size, mass, drive), (size3, mass3, drive3) = drives
-    assert size3 == pytest.approx(3 * size, rel=1e-6)
-    assert mass3 == pytest.approx(mass / 3, rel=1e-6)
-    assert drive3["stiffness_n_per_m"] == pytest.approx(drive["stiffness_n_per_m"] / 3, rel=1e-6)
-    assert drive3["max_normal_force_n"] == drive["max_normal_force_n"]
-
-
-def test_grasp_size_is_the_lever_about_the_nearest_axis():
-    bar = np.array([[-5.0, 1, 0], [-5, -1, 0], [5, 0, 1], [5, 0, -1]])
-    assert grasp_size(bar) == pytest.approx(1.0)
-    assert grasp_size(bar + 7.0) == pytest.approx(1.0)
 
 
 def test_each_fingertip_touches_the_face_of_its_contact(held):

@@ -1,4 +1,3 @@
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,7 @@ def sampled_clearance(body, center, rng, count=40_000):
     return np.linalg.norm(points - center, axis=1).min()
 
 
-@pytest.mark.parametrize("name", ["l-bracket", "cross", "wedge", "mug"])
+@pytest.mark.parametrize("name", ["l-bracket", "wedge"])
 def test_fingertips_that_fit_meet_neither_each_other_nor_the_object_elsewhere(name):
     body = scenes.example_object(name)
     rng, tested = np.random.default_rng(0), 0
@@ -48,17 +47,6 @@ def test_near_an_inner_corner_the_radius_is_the_distance_to_it():
         radius = fitting_radius(body, at[None], normal[None])
         expected = 0.1 * body.radius if distance >= 0.1 * body.radius else 0.95 * distance
         assert radius == pytest.approx(expected, rel=1e-5)
-
-
-def test_a_clash_names_the_face_behind_the_inner_corner():
-    body = scenes.example_object("l-bracket")
-    inner, point, normal = _inner_corner(body)
-    at = point + 0.05 * body.radius * inner
-    (found,) = clashes(body, at[None], normal[None], 0.1 * body.radius)
-    number = int(found.split("meets face ")[1].split()[0])
-    behind = body.faces[number]
-    assert abs(behind.normal @ normal) < 1e-9
-    assert behind.normal @ (point - behind.centroid) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_fingertip_that_shrinks_too_often_is_shown_to_be_clear_nowhere(monkeypatch):
@@ -96,32 +84,6 @@ def test_two_fingertips_at_one_edge_always_overlap():
     found = clashes(body, at, normals, radius)
     assert len(found) == 1
     assert "fingertips 0 and 1 of radius" in found[0]
-
-
-def test_opposite_fingertips_never_overlap_and_close_ones_do_from_half_their_distance_on():
-    body = scenes.example_object("box")
-    length = np.ptp(body.vertices[:, 0])
-    at = np.array([[length / 2, 0.0, 0.0], [-length / 2, 0.0, 0.0], [length / 2, 0.004, 0.0]])
-    normals = np.array([[-1.0, 0, 0], [1.0, 0, 0], [-1.0, 0, 0]])
-    assert clashes(body, at[:2], normals[:2], 1.0) == ()
-    assert clashes(body, at[[0, 2]], normals[[0, 2]], 0.00199) == ()
-    assert len(clashes(body, at[[0, 2]], normals[[0, 2]], 0.00201)) == 1
-
-
-def test_settings_of_a_user_are_kept():
-    body = scenes.example_object("wedge")
-    grasp = gc.plan(body, limit=1).grasps[0]
-    fingers = scenes.FingerSettings(
-        max_normal_force_n=3.0, fingertip_radius_m=0.002, fingertip_mass_kg=0.4,
-        stiffness_n_per_m=500.0, approach=(0.0, 0.0, -2.0),
-    )  # fmt: skip
-    layout = arrange(body, grasp, 0.5, fingers)
-    drive = layout.drive
-    assert (drive.max_normal_force_n, drive.radius_m, drive.tip_mass_kg) == (3.0, 0.002, 0.4)
-    assert drive.stiffness_n_per_m == 500.0
-    assert drive.damping_n_s_per_m == pytest.approx(2.0 * math.sqrt(500.0 * 0.4))
-    directions = layout.approach / np.linalg.norm(layout.approach, axis=1, keepdims=True)
-    np.testing.assert_allclose(directions, np.tile([0.0, 0.0, 1.0], (4, 1)))
 
 
 def test_fingers_arrive_on_their_planned_lines():

@@ -8,7 +8,6 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places
-from scenes.mujoco.hand_scenes import squeezing
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 
 WRITTEN = 2e-8
@@ -90,13 +89,6 @@ def test_gravity_pulls_at_links_as_the_motors_say_and_not_at_the_object():
     assert np.abs(held[6:]).max() > 1e-3
 
 
-def test_a_squeeze_goes_as_far_as_motors_do():
-    scene = stood("leap", DOWN)[3]
-    most = squeezing(scene.hand.motors, scene.layout.squeeze_forces)
-    shares = np.abs(scene.hand.motors.torques(most)) / scene.hand.motors.limits
-    assert shares.max() == pytest.approx(1.0)
-
-
 def test_what_makes_no_scene_is_refused():
     _, body, reach, *_ = stood("allegro")
     with pytest.raises(InputError, match="must have a torque limit"):
@@ -104,9 +96,3 @@ def test_what_makes_no_scene_is_refused():
     other = gc.load_hand("leap").with_torque_limits(0.35, "a test")
     with pytest.raises(InputError, match="hand must be the one of the pose"):
         scenes.build_hand_scene(other, body, reach, FRICTION)
-
-
-def test_a_written_scene_is_its_text(tmp_path):
-    scene = stood("allegro")[3]
-    path = scenes.write_scene(scene, tmp_path / "hand.xml")
-    assert path.read_text() == scene.xml

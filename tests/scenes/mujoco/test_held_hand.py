@@ -4,7 +4,6 @@ import mujoco
 import numpy as np
 import pytest
 
-import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.hand_scenes import finger_springs
@@ -34,16 +33,6 @@ def test_springs_are_those_of_the_servos_by_the_simulators_own_jacobians(hand):
         assert springs == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).max())
         alike = layout.tip_masses[contact] / layout.stiffness[contact]
         assert alike == pytest.approx(layout.holder.armature_kg_m2 / layout.holder.servo)
-
-
-@pytest.mark.parametrize("hand", HANDS)
-def test_servos_hold_the_squeeze_that_they_are_told(hand):
-    _, _, scene, best = standing(hand)
-    motion, _ = HeldBench(scene).settled(closing())
-    forces = np.einsum("kij,kj->ki", scene.layout.axes, motion.forces[-1])
-    most = np.abs(best.grip.squeeze).max()
-    assert forces == pytest.approx(best.grip.squeeze, abs=0.01 * most)
-    assert not motion.health.fault
 
 
 @pytest.mark.parametrize("hand", HANDS)
@@ -118,11 +107,3 @@ def _support(model, data, geom, way):
         return place + size[0] + size[1] * abs(along[2])
     assert kind == mujoco.mjtGeom.mjGEOM_BOX
     return place + np.abs(along) @ size
-
-
-def test_motors_of_hands_with_masses_carry_their_links_in_any_orientation():
-    reach, hand, scene, _ = standing("leap")
-    strong = gc.hand_motors(hand, reach)
-    assert (scene.layout.holder.motors.limits < strong.limits).all()
-    reach, hand, scene, _ = standing("allegro")
-    assert scene.layout.holder.motors.limits == pytest.approx(gc.hand_motors(hand, reach).limits)

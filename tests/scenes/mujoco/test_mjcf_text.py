@@ -56,14 +56,6 @@ def test_the_text_is_that_of_xml_etree():
     assert document(root) == ElementTree.tostring(judge, encoding="unicode") + "\n"
 
 
-def test_many_numbers_are_written_like_few():
-    numbers = np.random.default_rng(0).normal(size=(60, 3))
-    rows = [as_text(row) for row in numbers]
-    for _ in range(2):
-        assert as_text(numbers) == as_text(numbers.T.copy().T) == " ".join(rows)
-    assert as_text(np.arange(90)) == " ".join(map(str, range(90)))
-
-
 def test_names_can_be_printed():
     assert printable("a\n\x00b") == "a__b"
     assert printable("") == "object"

@@ -12,10 +12,10 @@ TASK = '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3], "torque_n_m": [0, 
 
 
 @pytest.fixture
-def planned(tmp_path, monkeypatch):
-    """A folder with the plan of one grasp, and a task."""
+def planned(wedge_plan, tmp_path, monkeypatch):
+    """A folder with the plan of the wedge, and a task."""
     monkeypatch.chdir(tmp_path)
-    assert main(["plan", "wedge", "--limit", "1", "--out", ".", "-q"]) == Exit.GOOD
+    (tmp_path / "grasps.json").write_text(wedge_plan.read_text())
     (tmp_path / "task.json").write_text(TASK)
     return tmp_path
 
@@ -25,7 +25,10 @@ def verdict(planned, capsys):
     """Validates with flags; answers with the one verdict."""
 
     def validated(*flags, code=Exit.GOOD):
-        assert main(["validate", str(planned / "grasps.json"), *flags, "--json"]) == code
+        assert (
+            main(["validate", str(planned / "grasps.json"), "--limit", "1", *flags, "--json"])
+            == code
+        )
         (found,) = json.loads(capsys.readouterr().out)["verdicts"]
         return found
 
@@ -56,7 +59,7 @@ def test_a_task_too_heavy_for_the_grasp_makes_it_fail(verdict):
 
 
 def test_traces_tell_how_contacts_moved(planned):
-    command = ["validate", "grasps.json", "--traces", "--out", "v", "-q"]
+    command = ["validate", "grasps.json", "--limit", "1", "--traces", "--out", "v", "-q"]
     assert main(command) == Exit.GOOD
     (path,) = (planned / "v" / "traces").iterdir()
     (verdict,) = json.loads((planned / "v" / "verdicts.json").read_text())["verdicts"]
@@ -80,14 +83,6 @@ def test_a_simulator_that_is_unfaithful_is_refused_with_its_figures(planned, cap
     assert sorted(planned.rglob("*")) == before
 
 
-def test_settings_of_a_file_are_in_force_and_in_the_record(planned, verdict):
-    text = "[hold]\nload_share = 0.5\n[fingers]\nfingertip_radius_m = 0.004\n"
-    (planned / "setup.toml").write_text(text)
-    settings = verdict("--setup", "setup.toml")["setup"]
-    assert settings["hold"]["load_share"] == 0.5
-    assert settings["fingers"]["fingertip_radius_m"] == 0.004
-
-
 @pytest.mark.parametrize(
     ("flags", "code", "words"),
     [
@@ -102,28 +97,22 @@ def test_flags_that_make_no_sense_are_refused_before_anything_runs(capsys, flags
     assert words in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("flags", [["--weight-down", "0", "0", "-1"], ["--setup", "pyramids.toml"]])
-def test_a_run_that_is_refused_leaves_earlier_results(planned, flags):
+def test_a_run_that_is_refused_leaves_earlier_results_and_scenes_as_they_were_simulated(planned):
     (planned / "pyramids.toml").write_text('[physics]\ncone = "pyramidal"\n')
-    assert main(["run", "tetrahedron", "--out", "r", "-q", "--no-report"]) == Exit.GOOD
+    (planned / "tips.toml").write_text("[fingers]\nfingertip_radius_m = 0.004\n")
+    run = ["run", "tetrahedron", "--limit", "1", "--out", "r", "-q", "--no-report"]
+    assert main([*run, "--setup", "tips.toml"]) == Exit.GOOD
     before = (planned / "r" / "verdicts.json").read_text()
-    assert main(["run", "tetrahedron", "--out", "r", "-q", "--no-report", *flags]) in {
-        Exit.USAGE,
-        Exit.INTERNAL,
-    }
-    assert (planned / "r" / "verdicts.json").read_text() == before
-
-
-def test_the_scenes_of_a_run_are_those_that_were_simulated(planned):
-    (planned / "setup.toml").write_text(
-        "[physics]\ntimestep = 0.001\n[fingers]\nfingertip_radius_m = 0.004\n"
-    )
-    command = ["run", "tetrahedron", "--out", "r", "-q", "--no-report", "--setup", "setup.toml"]
-    assert main(command) == Exit.GOOD
-    for path in (planned / "r" / "scenes").iterdir():
-        text = path.read_text()
-        assert 'timestep="0.001"' in text
-        assert 'size="0.004"' in text
+    (found,) = json.loads(before)["verdicts"]
+    assert found["setup"]["fingers"]["fingertip_radius_m"] == 0.004
+    (scene,) = (planned / "r" / "scenes").iterdir()
+    assert 'size="0.004"' in scene.read_text()
+    for flags, code in (
+        (["--weight-down", "0", "0", "-1"], Exit.USAGE),
+        (["--setup", "pyramids.toml"], Exit.INTERNAL),
+    ):
+        assert main([*run, *flags]) == code
+        assert (planned / "r" / "verdicts.json").read_text() == before
 
 
 def test_what_a_verdict_lists_may_be_given_back(planned, verdict):

@@ -3,19 +3,22 @@
 import dataclasses
 import math
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import sim_validate as sv
-from sim_validate.closure.validate import disturbed, noisy_case, noisy_trial
+from grasp_core.objects.on_faces import face_under
+from sim_validate.closure.validate import disturbed, noisy_trial
 from sim_validate.closure.verdict import interval
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.settings import Noise
-from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 STILL = Noise(shift=0.0, turn_deg=0.0, normal_deg=0.0, friction=0.0, mass=0.0)
+POSE = dataclasses.replace(STILL, shift=0.01, turn_deg=2.0)
 ONLY_NOISE = Agenda(repeats=12, controls=False, critical_friction=False)
 
 
@@ -24,25 +27,22 @@ def repeated(body, grasp, friction, **changed):
     return sv.validate(body, grasp, friction, agenda=agenda)
 
 
-@pytest.mark.parametrize("each", [1, *more(2)])
-def test_analysis_and_simulation_agree_on_every_repeat(each):
+@pytest.mark.parametrize("name", ["wedge", pytest.param("screwdriver", marks=pytest.mark.slow)])
+def test_analysis_and_simulation_agree_on_every_repeat(name):
     """With noise that opens contacts, makes loads too large, and lets fingers miss."""
     held = let_go = missed = 0
     much = Noise(shift=0.02, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
-    for name in ("wedge", "screwdriver", "mug"):
-        body, found = grasps(name, 0.5, each)
-        for grasp in found:
-            verdict = repeated(body, grasp, 0.5, noise=much)
-            assert verdict.held
-            assert not verdict.mismatches
-            for trial in verdict.robustness.trials:
-                if trial.outcome is Outcome.INVALID_START:
-                    continue
-                assert (trial.outcome is Outcome.HELD) == trial.predicted
-                held += trial.predicted
-                missed += trial.wrench == "" and not trial.predicted
-                let_go += trial.wrench != ""
-    assert min(held, let_go, missed) >= 1 + each
+    body, (grasp,) = grasps(name, 0.5, 1)
+    verdict = repeated(body, grasp, 0.5, noise=much)
+    assert verdict.held
+    assert not verdict.mismatches
+    for trial in verdict.robustness.trials:
+        if trial.outcome is not Outcome.INVALID_START:
+            assert (trial.outcome is Outcome.HELD) == trial.predicted
+            held += trial.predicted
+            missed += trial.wrench == "" and not trial.predicted
+            let_go += trial.wrench != ""
+    assert min(held, let_go, missed) >= 1
 
 
 def test_without_noise_every_repeat_holds():
@@ -56,23 +56,12 @@ def test_a_load_beyond_the_limit_is_not_held_however_it_came_about():
     """Loads are 80 % of what is resisted: a mass a third larger is too much, one a tenth is not."""
     body, (grasp,) = grasps("wedge", 0.5, 1)
     noise = dataclasses.replace(STILL, mass=0.3)
-    cases = [disturbed(body, grasp, 0.5, noise, 0, number) for number in range(24)]
-    found = repeated(body, grasp, 0.5, noise=noise, repeats=24).robustness
+    cases = [disturbed(body, grasp, 0.5, noise, 0, number) for number in range(12)]
+    found = repeated(body, grasp, 0.5, noise=noise).robustness
     assert {case.mass > 1.25 for case in cases} == {True, False}
     for case, trial in zip(cases, found.trials, strict=True):
         if abs(case.mass - 1.25) > 0.01:
             assert (trial.outcome is Outcome.HELD) == (case.mass < 1.25)
-
-
-def test_contacts_that_noise_opens_must_let_go():
-    """Friction just above the critical one: half of the draws are below."""
-    body, (grasp,) = grasps("wedge", 0.5, 1)
-    friction = 1.02 * grasp.critical_friction
-    found = repeated(body, grasp, friction, noise=dataclasses.replace(STILL, friction=0.1))
-    opened = [trial for trial in found.robustness.trials if trial.wrench == "separating"]
-    assert len(opened) >= 3
-    assert all(trial.outcome is Outcome.SLIPPED for trial in opened)
-    assert not found.mismatches
 
 
 def test_a_simulator_that_holds_what_it_must_not_is_contradicted(monkeypatch):
@@ -106,29 +95,14 @@ def test_fingers_that_miss_are_not_held():
 
 
 def test_the_same_seed_gives_the_same_repeats():
-    body, (grasp,) = grasps("screwdriver", 0.5, 1)
-    one, same = (repeated(body, grasp, 0.5, repeats=6).robustness for _ in range(2))
-    assert one == same
-    other = repeated(body, grasp, 0.5, repeats=6, seed=1).robustness
-    assert other.trials != one.trials
-    more = repeated(body, grasp, 0.5, repeats=7).robustness
-    assert more.trials[:6] == one.trials
-
-
-def test_a_heavier_object_is_the_same_scene_with_more_mass():
     body, (grasp,) = grasps("wedge", 0.5, 1)
-    case = disturbed(body, grasp, 0.5, STILL, 0, 0)
-    scene, heavy = (
-        noisy_case(body, dataclasses.replace(case, mass=mass), [], Setup())[0].bench.scene
-        for mass in (1.0, 1.5)
-    )
-    assert heavy.layout.object_kg == 1.5 * scene.layout.object_kg
-    changed = [
-        pair
-        for pair in zip(scene.xml.split(), heavy.xml.split(), strict=True)
-        if pair[0] != pair[1]
-    ]
-    assert 1 < len(changed) <= 7  # the mass and six moments of inertia
+    much = Noise(shift=0.04, turn_deg=3.0, normal_deg=3.0, friction=0.3, mass=0.3)
+    one, same = (repeated(body, grasp, 0.5, noise=much, repeats=3).robustness for _ in range(2))
+    assert one == same
+    other = repeated(body, grasp, 0.5, noise=much, repeats=3, seed=1).robustness
+    assert other.trials != one.trials
+    more = repeated(body, grasp, 0.5, noise=much, repeats=4).robustness
+    assert more.trials[:3] == one.trials
 
 
 def test_intervals_are_those_of_the_tables():
@@ -147,3 +121,60 @@ def test_intervals_cover_the_share_as_often_as_they_say():
             chance = math.comb(30, count) * share**count * (1.0 - share) ** (30 - count)
             inside += chance * (low <= share <= high)
         assert 0.95 <= inside <= 0.999
+
+
+def pose(body, noise, seed, number):
+    """Where the object stands, by another way: a rotation about its centre of mass, and a shift."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1, number)))
+    shift = noise.shift * body.radius * rng.normal(size=3)
+    return Rotation.from_rotvec(math.radians(noise.turn_deg) * rng.normal(size=3)), shift
+
+
+def test_contacts_are_on_their_faces_and_on_the_lines_of_the_fingers():
+    """In the world the object has moved; a finger's line through it has not."""
+    body, found = grasps("wedge", 0.5, 2)
+    landed = missed = 0
+    for grasp in found:
+        for place in range(100):
+            case = disturbed(body, grasp, 0.5, POSE, 3, place)
+            missed += len(case.missed)
+            fingers = [finger for finger in range(4) if finger not in case.missed]
+            turned, shift = pose(body, POSE, 3, place)
+            for finger, contact in zip(fingers, case.contacts, strict=True):
+                face = body.faces[grasp.faces[finger]]
+                assert face_under(body, contact) is face
+                center = body.center_of_mass
+                at = turned.apply(contact.position - center) + center + shift
+                beside = np.cross(at - grasp.positions[finger], grasp.normals[finger])
+                assert np.linalg.norm(beside) < 1e-12 * body.radius
+                landed += 1
+    assert landed > 300
+    assert missed >= 5
+
+
+def test_a_finger_beside_its_face_misses_it():
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    far = dataclasses.replace(STILL, shift=1.0)
+    cases = [disturbed(body, grasp, 0.5, far, 0, place) for place in range(50)]
+    assert any(len(case.missed) == 4 for case in cases)
+    for case in cases:
+        assert len(case.contacts) == 4 - len(case.missed)
+
+
+@pytest.mark.parametrize("size", [1.0, 45.0])
+def test_normals_friction_and_mass_are_off_by_what_is_drawn(size):
+    """Draws of a standard normal distribution, replayed."""
+    body, (grasp,) = grasps("wedge", 0.5, 1)
+    noise = dataclasses.replace(STILL, normal_deg=size, friction=0.1, mass=0.2)
+    leans, drawn = [], []
+    for number in range(50):
+        case = disturbed(body, grasp, 0.5, noise, 0, number)
+        rng = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(1, number)))
+        *_, slipperiness, heaviness = rng.normal(size=8)
+        assert case.friction == pytest.approx(0.5 * math.exp(0.1 * slipperiness))
+        assert case.mass == pytest.approx(math.exp(0.2 * heaviness))
+        drawn.append(np.radians(size) * np.linalg.norm(rng.normal(size=(4, 2)), axis=1))
+        normals = np.array([contact.normal for contact in case.contacts])
+        leans.append(np.arccos(np.clip(np.einsum("ki,ki->k", normals, grasp.normals), -1, 1)))
+    wrapped = np.arccos(np.cos(drawn))
+    np.testing.assert_allclose(leans, wrapped, atol=1e-7)

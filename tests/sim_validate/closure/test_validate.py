@@ -1,5 +1,6 @@
 import json
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -8,57 +9,39 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.mujoco.fingertips import clashes
 from scenes.settings import FingerSettings
 from sim_validate.closure.controls import negative_controls
+from sim_validate.closure.validate import Job
 from sim_validate.closure.verdict import Verdicts, trace_arrays
+from sim_validate.engine import gate as gate_module
+from sim_validate.engine.gate import measured_gate
 from sim_validate.engine.rig import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from tests.marks import MORE, more
 from tests.sim_validate.rigs import grasps
 
-OBJECTS = (
-    "tetrahedron", "octahedron", "wedge", "chamfered-box", "random-12-1", "screwdriver", "mug",
-)  # fmt: skip
 WITHOUT_CONTROLS = Agenda(controls=False)
 
 
-@pytest.mark.parametrize("name", ["tetrahedron", *more("chamfered-box", "double-wedge-bar")])
-@pytest.mark.parametrize("family", ["pencil", "regulus", "free"])
-def test_grasps_of_every_family_are_good(name, family):
+CASES = (("tetrahedron", "pencil"), ("tetrahedron", "regulus"), ("tetrahedron", "free"))
+SLOW_CASES = (("screwdriver", "concurrent"), ("random-12-1", "regulus"))
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [*CASES, *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW_CASES)],
+)
+def test_planned_grasps_hold_all_wrenches_and_no_control_does(name, family):
     """At theta = 10 degrees; reguli among them need friction."""
     friction = math.tan(math.radians(10.0))
-    body, found = grasps(name, friction, 5, (family,))
+    body, found = grasps(name, friction, 1, (family,))
     assert found
     for grasp in found:
         verdict = sv.validate(body, grasp, friction)
         assert verdict.good, (verdict.outcome, verdict.mismatches)
-        assert verdict.controls
-
-
-@pytest.mark.parametrize(
-    ("names", "friction", "each"),
-    [
-        (OBJECTS[::2], 0.5, 1),
-        *(pytest.param(OBJECTS, mu, 2, marks=MORE) for mu in (0.2, 0.5, 0.8)),
-    ],
-)
-def test_planned_grasps_hold_all_wrenches_and_no_control_does(names, friction, each):
-    tested = controls = 0
-    for name in names:
-        body, found = grasps(name, friction, each)
-        for grasp in found:
-            verdict = sv.validate(body, grasp, friction)
-            assert verdict.held, [(w.name, w.hold.outcome) for w in verdict.wrenches]
-            assert len(verdict.wrenches) == 13
-            assert verdict.controls_let_go
-            assert verdict.controls
-            assert not verdict.mismatches
-            controls += len(verdict.controls)
-            tested += 1
-    assert tested >= (len(names) - 1) * each
-    assert controls >= 2 * (len(names) - 1) * each
+        assert len(verdict.wrenches) == 13
+        assert len(verdict.controls) >= 2
+        assert verdict.controls_let_go
 
 
 def test_holding_leaves_a_wide_margin_to_the_threshold():
@@ -71,31 +54,28 @@ def test_holding_leaves_a_wide_margin_to_the_threshold():
 
 
 def test_all_that_can_be_asked_for_repeats_to_the_last_digit_at_any_number_of_threads():
-    body, (grasp, *_) = grasps("random-12-1", 0.4, 1)
+    """All but the random wrenches is the same with another seed, too."""
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
     agenda = Agenda(random_wrenches=2, limits="ramp", keep_traces=True)
     texts, traces = set(), []
     for threads in (1, 2):
-        verdict = sv.validate(body, grasp, 0.4, agenda=agenda, setup=Setup(threads=threads))
-        texts.add(Verdicts.of(body, 0.4, verdict.gate, (verdict,)).text())
+        verdict = sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(threads=threads))
+        texts.add(Verdicts.of(body, 0.5, verdict.gate, (verdict,)).text())
         traces.append(trace_arrays(verdict))
     assert len(texts) == 1
+    assert verdict.good
     for name, array in traces[0].items():
         np.testing.assert_array_equal(array, traces[1][name])
     assert {"weakest.slips_m", "random_1.gaps_m", "fingers_removed.separating.times_s"} <= set(
         traces[0]
     )
-
-
-def test_random_wrenches_depend_on_the_seed_alone():
-    body, (grasp, *_) = grasps("random-12-1", 0.4, 1)
-    drawn = [
-        [t.wrench for t in sv.validate(body, grasp, 0.4, agenda=agenda).wrenches]
-        for agenda in (
-            replace(WITHOUT_CONTROLS, random_wrenches=3, seed=seed) for seed in (1, 1, 2)
-        )
+    asked = replace(WITHOUT_CONTROLS, random_wrenches=2, critical_friction=False, seed=2)
+    other = sv.validate(body, grasp, 0.5, agenda=asked)
+    same = [
+        np.allclose(one.wrench, another.wrench)
+        for one, another in zip(verdict.wrenches, other.wrenches, strict=True)
     ]
-    np.testing.assert_array_equal(drawn[0], drawn[1])
-    assert not np.allclose(drawn[0][13], drawn[2][13])
+    assert same == [True] * 13 + [False] * 2
 
 
 def test_a_users_wrench_is_applied_as_it_is_and_need_not_hold():
@@ -118,40 +98,50 @@ def test_a_users_wrench_is_applied_as_it_is_and_need_not_hold():
 
 
 def test_what_contradicts_the_analysis_is_said(monkeypatch):
-    """With half of the friction in the simulation only, much goes wrong, and all of it is named."""
-    holds, releases = Rig.holds, Rig.releases
+    """With less friction in the simulation only, much goes wrong, and all of it is named."""
 
-    def slippery_holds(rig, loads, settling):
-        return holds(replace(rig, friction=0.5 * rig.friction), loads, settling)
+    def slippery(kind):
+        faithful = getattr(Rig, kind)
 
-    def slippery_releases(rig, high, frictions):
-        return releases(rig, high, [0.3 * friction for friction in frictions])
+        def weaker(trial):
+            watched = np.arange(len(trial.friction)) >= trial.watched
+            return replace(trial, friction=np.where(watched, 0.5, 1.0) * trial.friction)
 
-    body, (grasp, *_) = grasps("random-12-1", 0.4, 1, ("regulus",))
-    sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)  # the gate is measured before
-    monkeypatch.setattr(Rig, "holds", slippery_holds)
-    monkeypatch.setattr(Rig, "releases", slippery_releases)
-    verdict = sv.validate(body, grasp, 0.4, agenda=WITHOUT_CONTROLS)
-    assert not verdict.good
-    assert any("though the predicted limit is 1.25" in line for line in verdict.mismatches)
-    assert "critical friction: not found near the predicted one" in verdict.mismatches
+        def weakened(*arguments):
+            made = faithful(*arguments)
+            trials, *rest = made if isinstance(made, tuple) else (made,)
+            weak = [weaker(trial) for trial in trials]
+            return (weak, *rest) if rest else weak
+
+        return weakened
+
+    body, (*_, grasp) = grasps("wedge", 0.5, 8, ("free",))
+    assert 0.01 < grasp.critical_friction < 0.3
+    agenda = replace(WITHOUT_CONTROLS, limits="ramp")
+    assert sv.validate(body, grasp, 0.5, agenda=agenda).good
+    said = {
+        "holds": "though the predicted limit is 1.25", "releases": "critical friction: ",
+        "ramps": "the limit was not found near the predicted one",
+    }  # fmt: skip
+    for kind, words in said.items():
+        with monkeypatch.context() as patched:
+            patched.setattr(Rig, kind, slippery(kind))
+            verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
+        assert not verdict.good
+        assert any(words in line for line in verdict.mismatches), verdict.mismatches
 
 
 def test_limits_are_multiples_of_the_applied_wrench():
     body, (grasp, *_) = grasps("wedge", 0.5, 1)
-    for limits in ("ramp", "bisection"):
-        agenda = replace(WITHOUT_CONTROLS, limits=limits)
-        verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
-        for trial in verdict.wrenches:
-            assert trial.predicted_limit == pytest.approx(1.25, rel=1e-6)
-            assert trial.let_go_at.share == pytest.approx(1.0, abs=0.005)
+    agenda = replace(WITHOUT_CONTROLS, limits="bisection")
+    for trial in sv.validate(body, grasp, 0.5, agenda=agenda).wrenches:
+        assert trial.predicted_limit == pytest.approx(1.25, rel=1e-6)
+        assert trial.let_go_at.share == pytest.approx(1.0, abs=0.005)
 
 
 def test_overlapping_fingertips_make_a_grasp_invalid():
-    body, found = grasps("l-bracket", 0.5, 8, ("free",))
-    radius = 0.5 * body.radius
-    grasp = next(g for g in found if clashes(body, g.positions, g.normals, radius))
-    setup = Setup(fingers=FingerSettings(fingertip_radius_m=radius))
+    body, (grasp, *_) = grasps("wedge", 0.5, 8, ("free",))
+    setup = Setup(fingers=FingerSettings(fingertip_radius_m=0.5 * body.radius))
     verdict = sv.validate(body, grasp, 0.5, agenda=WITHOUT_CONTROLS, setup=setup)
     assert verdict.outcome is Outcome.INVALID_START
     assert "of radius" in verdict.wrenches[0].hold.reason
@@ -162,13 +152,14 @@ def test_overlapping_fingertips_make_a_grasp_invalid():
     "fingers",
     [
         FingerSettings(fingertip_radius_m=0.002),
-        FingerSettings(max_normal_force_n=1.0),
-        FingerSettings(max_normal_force_n=80.0, approach=(0.0, 0.0, -1.0)),
-        FingerSettings(stiffness_n_per_m=600.0),
+        pytest.param(
+            FingerSettings(max_normal_force_n=80.0, approach=(0.0, 0.0, -1.0)),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_limits_do_not_depend_on_how_fingers_are_built(fingers):
-    body, (grasp, *_) = grasps("random-12-1", 0.5, 1)
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
     verdict = sv.validate(
         body, grasp, 0.5, agenda=replace(WITHOUT_CONTROLS, limits="ramp"),
         setup=Setup(fingers=fingers),
@@ -178,19 +169,11 @@ def test_limits_do_not_depend_on_how_fingers_are_built(fingers):
         assert trial.let_go_at.share == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("name", "family"),
-    [
-        ("wedge", "concurrent"),
-        pytest.param("random-12-1", "regulus", marks=MORE),
-        pytest.param("prism", "free", marks=MORE),
-    ],
-)
-def test_pads_are_where_the_surface_of_the_object_is(name, family):
+@pytest.mark.slow
+def test_pads_are_where_the_surface_of_the_object_is():
     """Limits are the same when fingertips touch pads, in place of the object itself."""
     agenda = replace(WITHOUT_CONTROLS, limits="ramp")
-    tested = 0
-    body, (grasp, *_) = grasps(name, 0.5, 1, (family,))
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
     pads, own = (
         sv.validate(body, grasp, 0.5, agenda=agenda, setup=Setup(surface=surface))
         for surface in ("pads", "object")
@@ -199,8 +182,6 @@ def test_pads_are_where_the_surface_of_the_object_is(name, family):
     assert own.good
     for one, other in zip(pads.wrenches, own.wrenches, strict=True):
         assert one.let_go_at.share == pytest.approx(other.let_go_at.share, abs=2e-3)
-        tested += 1
-    assert tested == 13
 
 
 def test_contacts_that_are_not_closed_are_refused_whatever_they_claim():
@@ -217,36 +198,6 @@ def test_a_grasp_of_another_object_is_refused():
     for name in ("octahedron", "box"):
         with pytest.raises(gc.InputError, match=r"names face|does not lie on face"):
             sv.validate(scenes.example_object(name), grasp, 0.5)
-
-
-def test_a_simulator_that_disagrees_makes_the_verdict_bad(monkeypatch):
-    """Friction that is really 0.7 of what it should be, in releases and then in ramps."""
-    body, found = grasps("random-12-1", 0.5, 20, ("free",))
-    grasp = next(g for g in found if 0.01 < g.critical_friction < 0.3)
-    agenda = replace(WITHOUT_CONTROLS, limits="ramp")
-    assert sv.validate(body, grasp, 0.5, agenda=agenda).good
-    for kind, says in (("releases", "critical friction: "), ("ramps", "limit")):
-        with monkeypatch.context() as patched:
-            patched.setattr(Rig, kind, _weaker(kind))
-            verdict = sv.validate(body, grasp, 0.5, agenda=agenda)
-        assert not verdict.good
-        assert any(says in mismatch for mismatch in verdict.mismatches)
-
-
-def _weaker(kind):
-    faithful = getattr(Rig, kind)
-
-    def weaker(plan):
-        lowered = np.arange(len(plan.friction)) >= plan.watched
-        return replace(plan, friction=np.where(lowered, 0.7, 1.0) * plan.friction)
-
-    def weakened(*arguments):
-        made = faithful(*arguments)
-        plans, *rest = made if isinstance(made, tuple) else (made,)
-        weak = [weaker(plan) for plan in plans]
-        return (weak, *rest) if rest else weak
-
-    return weakened
 
 
 def test_trials_that_say_nothing_neither_confirm_nor_contradict():
@@ -274,17 +225,23 @@ def test_a_load_that_blows_everything_up_is_recorded_without_numbers():
 
 def test_contacts_rounded_to_six_digits_are_as_good():
     """What a file with fewer digits does: contacts are a little above or below their faces."""
-    tested = 0
-    for name in ("wedge", "random-12-1"):
-        body, found = grasps(name, 0.5, 2)
-        for grasp in found:
-            rounded = tuple(
-                gc.values.Contact(np.round(c.position, 8), c.normal) for c in grasp.contacts
-            )
-            verdict = sv.validate(
-                body, replace(grasp, contacts=rounded), 0.5, agenda=WITHOUT_CONTROLS
-            )
-            assert verdict.good, verdict.wrenches[0].hold.reason
-            assert verdict.scene.layout.drive.radius_m > 0.01 * body.radius
-            tested += 1
-    assert tested >= 4
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    rounded = tuple(gc.values.Contact(np.round(c.position, 8), c.normal) for c in grasp.contacts)
+    verdict = sv.validate(body, replace(grasp, contacts=rounded), 0.5, agenda=WITHOUT_CONTROLS)
+    assert verdict.good, verdict.wrenches[0].hold.reason
+    assert verdict.scene.layout.drive.radius_m > 0.01 * body.radius
+
+
+def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    asked = replace(WITHOUT_CONTROLS, critical_friction=False)
+    job = Job(body, 0.5, asked, Setup()).prepared(1, 1)
+    assert job.gate is measured_gate(Setup(), 0.5, body.radius)
+    arrived = pickle.loads(pickle.dumps(job))  # noqa: S301
+
+    def fail(_):
+        raise AssertionError("measured again")
+
+    monkeypatch.setattr(gate_module, "measured", fail)
+    assert arrived(grasp).held
+    assert arrived(grasp).gate == job.gate

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 
 import grasp_core as gc
-import scenes
 import sim_validate as sv
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -15,10 +14,9 @@ from tests.sim_validate.changing import changed
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(wedge_plan, tmp_path_factory):
     folder = tmp_path_factory.mktemp("verdicts")
-    plan = gc.plan(scenes.example_object("wedge"), 0.5, limit=2)
-    gc.save_grasps(folder / "grasps.json", plan)
+    (folder / "grasps.json").write_text(wedge_plan.read_text())
     more = ["--repeats", "2", "--limits", "ramp", "--random-wrenches", "1"]
     assert main(["validate", str(folder / "grasps.json"), "--out", str(folder), *more]) == 0
     return folder

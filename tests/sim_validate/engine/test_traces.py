@@ -3,24 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import scenes
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine.bench import Health, Motion
 from sim_validate.engine.traces import (
-    displaced,
-    rotated,
     rotation_angles,
-    strayed,
     traces,
 )
 from tests.judges import random_rotation
-from tests.sim_validate.rigs import grasps
-
-
-@pytest.fixture(scope="module")
-def layout():
-    body, (grasp, *_) = grasps("wedge", 0.5, 1)
-    return scenes.build_scene(body, grasp, 0.5).layout
 
 
 def motion(rows, **changes):
@@ -36,13 +25,6 @@ def pose(shift=(0.0, 0.0, 0.0), rotation=None, slides=None, scale=1.0):
     turn = quaternion(np.eye(3) if rotation is None else rotation)
     slid = np.zeros((4, 3)) if slides is None else slides
     return np.concatenate([shift, scale * turn, np.ravel(slid)])
-
-
-def test_quaternions_turn_like_matrices_whatever_their_length():
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        R, v = random_rotation(rng), rng.normal(size=(5, 3))
-        np.testing.assert_allclose(rotated(3.0 * quaternion(R)[None], v), v @ R.T, atol=1e-13)
 
 
 def test_small_angles_are_exact():
@@ -92,45 +74,9 @@ def test_fingers_that_move_with_the_object_do_not_slip(layout):
     assert np.abs(found.gaps_m + layout.drive.indentation_m).max() < 1e-14
 
 
-def test_a_motion_stopped_before_watching_began_has_an_empty_trace(layout):
-    (found,) = traces([motion([pose(), pose()], health=Health(timed_out=True))], layout, [5])
-    assert len(found.times_s) == len(found.displacements_m) == 0
-    assert found.health.timed_out
-
-
 def test_rigid_fingers_have_no_slides(layout):
     """The scene has no joints for them: seven numbers a row."""
     rigid = replace(layout, holder=replace(layout.holder, stiffness=np.zeros((4, 0))))
     away = 1e-4 * layout.frames[0, :, 0]
     (found,) = traces([motion([pose()[:7], pose(away)[:7]])], rigid, [1])
     assert found.gaps_m[0, 0] == pytest.approx(1e-4 - layout.drive.indentation_m)
-
-
-def any_poses(count):
-    rng = np.random.default_rng(3)
-    rows = [
-        pose(1e-3 * rng.normal(size=3), random_rotation(rng), 1e-3 * rng.normal(size=(4, 3)))
-        for _ in range(count)
-    ]
-    return np.array(rows)
-
-
-def test_trials_are_measured_alike_alone_and_beside_others(layout):
-    motions = [motion(any_poses(count)) for count in (4, 1, 7, 2)]
-    watched = [2, 1, 0, 5]
-    for earlier in (None, motions[0]):
-        together = traces(motions, layout, watched, earlier)
-        for each, first, beside in zip(motions, watched, together, strict=True):
-            (alone,) = traces([each], layout, [first], earlier)
-            for name in ("times_s", "displacements_m", "rotations_rad", "slips_m", "gaps_m"):
-                np.testing.assert_array_equal(getattr(beside, name), getattr(alone, name))
-            assert beside.start_m == alone.start_m
-    assert [len(each.times_s) for each in together] == [2, 0, 7, 0]
-
-
-def test_the_way_from_the_planned_pose_is_the_way_from_any_pose(layout):
-    poses = any_poses(20)[:, :7]
-    planned = np.tile(pose()[:7], (20, 1))
-    np.testing.assert_allclose(
-        strayed(poses, layout), displaced(poses, planned, layout), rtol=1e-13
-    )

@@ -83,16 +83,15 @@ def test_a_grasp_that_does_not_survive_is_a_result(capsys):
 @pytest.mark.usefixtures("here")
 def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
     words = ["execute", "grasps.json", "--friction", "0.03", "--mass-kg", "0.3", *QUICK]
-    assert main([*words, "--out", "."]) == Exit.NEGATIVE
+    assert main([*words, "--limit", "1", "--out", "."]) == Exit.NEGATIVE
     found = sv.load_executions("executions.json")
-    first, second = found.grasps
+    (first,) = found.grasps
     assert found.friction == 0.03
     assert first.execution is None
     assert first.enough.push_n is None
     assert str(first.enough) in first.reason
     assert first.reason.startswith("no squeeze carries any part of the weight")
     assert not first.survived
-    assert second.execution is not None
     assert f"c-0-1-2-7: not executed: {first.reason}" in capsys.readouterr().err
 
 
@@ -138,8 +137,6 @@ def settings_of(here, *flags, code=Exit.GOOD):
 def test_an_object_without_a_mass_has_the_density_of_water(here):
     volume = scenes.example_object("wedge").volume
     assert settings_of(here, *QUICK).mass_kg == pytest.approx(1000.0 * volume, rel=1e-8)
-    heavier = settings_of(here, *QUICK, "--density-kg-m3", "1500")
-    assert heavier.mass_kg == pytest.approx(1500.0 * volume, rel=1e-8)
 
 
 def test_every_flag_reaches_the_settings(here):
@@ -164,10 +161,14 @@ def test_every_flag_reaches_the_settings(here):
 
 
 def test_a_file_of_flags_and_a_file_of_physics(here):
-    (here / "flags.toml").write_text('trials = ["knock", "weight"]\nmass_kg = 0.25\npush_n = 11\n')
+    volume = scenes.example_object("wedge").volume
+    (here / "flags.toml").write_text(
+        'trials = ["knock", "weight"]\ndensity_kg_m3 = 1500\npush_n = 11\n'
+    )
     (here / "physics.toml").write_text("[physics]\ntimestep = 0.001\n")
     found = settings_of(here, "--config", "flags.toml", "--setup", "physics.toml")
-    assert (found.trials, found.mass_kg, found.push_n) == (("weight", "knock"), 0.25, 11.0)
+    assert (found.trials, found.push_n) == (("weight", "knock"), 11.0)
+    assert found.mass_kg == pytest.approx(1500.0 * volume, rel=1e-8)
     document = json.loads((here / "executions.json").read_text())
     (execution,) = document["executions"]
     assert execution["physics"]["timestep"] == 0.001
@@ -215,6 +216,7 @@ def test_run_executes_grasps_too_and_a_run_without_removes_the_file(here, capsys
     assert not (here / "r" / "executions.json").exists()
 
 
+@pytest.mark.slow
 def test_a_run_has_a_report_where_executions_are_refused(here, capsys, monkeypatch):
     def refuse(*_args, **_more):
         raise UnfaithfulError("the simulator fails")

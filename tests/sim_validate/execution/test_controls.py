@@ -7,11 +7,9 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from grasp_core.closure.contacts import cross_matrix
 from scenes.example_objects import example_object
 from sim_validate.execution.execute import Fingertips
-from sim_validate.execution.trials import SURE, idle, slipping_load, weaker_grips
-from tests.grasp_core.execution.held import planned_grips
+from sim_validate.execution.trials import SURE, slipping_load, weaker_grips
 
 FRICTION = 0.5
 SETTINGS = sv.ExecutionSettings(mass_kg=0.55, trials=("weight",))
@@ -25,24 +23,7 @@ def squeezed(name):
         yield best, fingers.scene(SETTINGS, best).layout
 
 
-def test_springs_share_what_an_idle_finger_leaves():
-    """The forces balance, and but for the push that is missing they are those of one motion."""
-    for grip in planned_grips(limit=2, push=6.0):
-        for finger, push in enumerate(0.5 * grip.squeeze):
-            left = idle(grip, finger, push)
-            assert left.balanced
-            change = left.squeeze - grip.squeeze
-            change[finger] += push
-            jacobian = np.vstack([
-                -stiffness @ np.hstack([np.eye(3), -cross_matrix(arm)])
-                for stiffness, arm in zip(grip.stiffness, grip.arms, strict=True)
-            ])  # fmt: skip
-            _, residual, rank, _ = np.linalg.lstsq(jacobian, change.ravel(), rcond=None)
-            assert (rank, float(residual[0])) == (6, pytest.approx(0.0, abs=1e-18))
-            assert np.linalg.norm(left.squeeze[finger]) < np.linalg.norm(grip.squeeze[finger])
-
-
-@pytest.mark.parametrize("name", ["wedge", "dodecahedron", "l-bracket"])
+@pytest.mark.parametrize("name", ["wedge", "l-bracket"])
 def test_loads_of_controls_slip_by_analysis_with_a_quarter_to_spare(name):
     followed = 0
     for best, layout in squeezed(name):
@@ -65,12 +46,12 @@ def test_an_object_that_slides_while_fingers_close_is_let_go():
     """Without its strongest finger this grasp slides at once, and then would carry the load."""
     body = example_object("box")
     grasps = gc.plan(body, FRICTION, families=("concurrent",), limit=8).grasps
-    sliding = 0
     for grasp in grasps[:4]:
         found = sv.execute(body, grasp, FRICTION, SETTINGS)
         assert found.controls_let_go
-        sliding += found.controls[2].first_slip == 0.0
-    assert sliding > 0
+        if found.controls[2].first_slip == 0.0:
+            return
+    pytest.fail("no grasp slides")
 
 
 def test_the_slipping_load_slips_also_where_a_push_reaches_its_limit_first():

@@ -1,6 +1,5 @@
 """The push and stiffness that are said to be enough: executed again with them, objects are kept."""
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -8,7 +7,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from sim_validate.execution.execute import Fingertips
-from sim_validate.execution.predictions import CLEAR, Enough, NoSqueezeError, accelerations_g
+from sim_validate.execution.predictions import CLEAR, NoSqueezeError
 from sim_validate.execution.verdict import losses_in_words
 from sim_validate.hands.trials import hand_execution_settings
 from tests.grasp_core.execution.held import box
@@ -41,7 +40,11 @@ def lost(name):
     return body, grasp, settings, found.enough
 
 
-@pytest.mark.parametrize("name", LOST)
+@pytest.mark.parametrize(
+    "name",
+    ["soft", "unstable"]
+    + [pytest.param(name, marks=pytest.mark.slow) for name in ("heavy", "weak", "knocked")],
+)
 def test_a_grasp_survives_with_what_is_said_to_be_enough(name):
     body, grasp, settings, enough = lost(name)
     chosen = replace(settings, push_n=enough.push_n, tip_stiffness_n_per_m=enough.stiffness_n_per_m)
@@ -70,6 +73,7 @@ def test_the_push_is_the_least_for_loads_that_are_a_formula():
     assert less.upper < 1.6
 
 
+@pytest.mark.slow
 def test_the_stiffness_is_the_least_that_keeps_the_object_in_its_place():
     """A heavy object bends soft springs farther than it may go, whatever the push."""
     body, grasp, settings, enough = lost("heavy")
@@ -95,6 +99,7 @@ def test_where_no_push_is_enough_a_proof_says_so():
     assert "no balanced squeeze within the torques of the joints" in found.enough.reason
 
 
+@pytest.mark.slow
 def test_a_hand_says_what_is_enough_within_its_torques():
     reach, hand = stood("allegro")
     body = scaled(OBJECT, RADIUS)
@@ -111,32 +116,7 @@ def test_nothing_is_sought_where_nothing_is_lost_or_asked_for():
     light = sv.ExecutionSettings(0.1, trials=("weight",))
     assert sv.execute(body, grasp, 0.5, light).enough is None
     weak = replace(light, push_n=0.1)
-    assert sv.execute(body, grasp, 0.5, weak).enough is not None
     assert sv.execute(body, grasp, 0.5, weak, enough=False).enough is None
     with pytest.raises(gc.NoForcesError) as raised:
         sv.execute(body, grasp, 0.001, light, enough=False)
     assert not isinstance(raised.value, NoSqueezeError)
-
-
-def test_what_contradicts_itself_is_refused():
-    with pytest.raises(gc.InputError, match="expected a push with its stiffness"):
-        Enough(2.0, push_n=3.0)
-    with pytest.raises(gc.InputError, match="or a reason why there is none"):
-        Enough(2.0)
-
-
-def test_accelerations_are_those_of_the_trials():
-    asked = sv.ExecutionSettings(
-        0.3, shake_g=0.5, stop_m_per_s2=2.0 * G, stop_from_m_per_s=1.0, knock_n_s=0.02
-    )
-    peaks = accelerations_g(asked)
-    assert peaks["weight"] == peaks["misplaced"] == 0.0
-    # as asked for, not as samples of the sinusoid reach it
-    assert peaks["shake along"] == peaks["shake about"] == 0.5
-    assert peaks["stop"] == pytest.approx(2.0, rel=1e-9)
-    # the path of least jerk reaches 10 / sqrt(3) of its height over its time squared
-    lift = 10.0 / math.sqrt(3.0) * asked.lift_m / asked.lift_s**2 / G
-    assert peaks["lift"] == pytest.approx(lift, rel=0.01)
-    # half a sine of 20 ms, whose four samples miss its top
-    knock = 0.5 * math.pi * 0.02 / 0.02 / asked.mass_kg / G
-    assert 0.89 * knock < peaks["knock"] < knock

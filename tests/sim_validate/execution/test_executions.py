@@ -9,7 +9,16 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
-from sim_validate.execution.verdict import Enough
+from sim_validate.execution.trials import Skipped
+from sim_validate.execution.verdict import (
+    ExecutedGrasp,
+    Execution,
+    ExecutionControl,
+    ExecutionTrial,
+    best_executed,
+    ended,
+)
+from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.execution.executed import BODY, ENOUGH, GRASPS, SETTINGS, executions
 
 
@@ -30,17 +39,6 @@ def test_executions_come_back_as_they_were(saved):
     assert not sv.Executions.of_text(executions(complete=False).text()).complete
 
 
-def test_executions_are_a_sequence(saved):
-    assert len(saved) == 3
-    assert list(saved[:2]) == [saved[0], saved.grasps[1]]
-    assert saved["p-0-1-2-3"].survived
-    assert not saved["c-0-1-2-3"].controls_let_go
-    assert saved["p-0-1-2-3"].trials == saved["p-0-1-2-3"].execution.trials != ()
-    assert saved[2].trials == ()
-    with pytest.raises(KeyError, match="nobody"):
-        saved["nobody"]
-
-
 def test_executions_are_a_table(saved):
     table = saved.to_dataframe()
     assert table.index.tolist() == [grasp.id for grasp in saved]
@@ -55,40 +53,10 @@ def test_executions_are_a_table(saved):
     assert table.iloc[2].least_predicted_loss == 0.0
 
 
-def test_the_file_is_strict_json_with_all_settings():
-    document = json.loads(executions().text(), parse_constant=pytest.fail)
-    settings = document["settings"]
-    assert (settings["mass_kg"], settings["tip_mass_kg"]) == (0.3, 0.02)
-    assert document["versions"]["mujoco"]
-    first, second, third = document["executions"]
-    assert first["tip_radius_m"] == [0.004, 0.004, 0.004, 0.005]
-    assert first["enough"] == {
-        "load_multiple": 1.5, "push_n": 12.5, "stiffness_n_per_m": 4000.0, "predicted_loss": None,
-        "reason": None,
-    }  # fmt: skip
-    assert second["enough"] is None
-    assert third["enough"]["reason"] == "it is proved"
-    assert first["physics"]["timestep"] == 0.00125
-    assert first["controls"][1]["first_slip"] is None
-    assert second["trials"][0]["simulated_first_slip"] is None
-    assert [each["survived"] for each in (first, second, third)] == [False, True, False]
-    assert (first["lost"], first["controls_held"]) == (["lift"], ["x"])
-    assert third["reason"] == "no squeeze carries the weight"
-    assert "trials" not in third
-    assert document["summary"] == {
-        "grasps": 3, "grasps_survived": 1, "grasps_without_squeeze": 1, "trials": 3,
-        "trials_survived": 2, "controls": 4, "controls_let_go": 2,
-    }  # fmt: skip
-
-
 def test_the_file_holds_the_impulse_that_was_used():
     usual = replace(executions(), settings=replace(SETTINGS, knock_n_s=None))
     assert json.loads(usual.text())["settings"]["knock_n_s"] == 0.05
     assert usual.settings.knock_n_s == 0.05
-
-
-def test_a_push_after_which_nothing_is_lost_is_one():
-    assert Enough(2.0, 3.0, 4.0).predicted_loss == math.inf
 
 
 def of_trial(**changes):
@@ -139,3 +107,57 @@ def test_a_file_that_contradicts_itself_is_refused_with_the_field(name, tmp_path
     path.write_text(json.dumps(document))
     with pytest.raises(gc.InputError, match=rf"x\.json: .*{said}"):
         sv.load_executions(path)
+
+
+def trial(kind, survived, fate="stuck"):
+    return ExecutionTrial(kind, kind, survived, fate, 0.0, 0.0, 0.0, 2.0, 3.0, 2.0, 1e-3)
+
+
+def execution(*trials, controls=()):
+    skipped = (Skipped("lift", "no room"),)
+    return Execution(0.3, np.zeros((4, 3)), 2.0, trials, controls, skipped)
+
+
+@pytest.mark.parametrize(
+    ("survived", "expected"), [((), False), ((True,), True), ((True, True, False), False)]
+)
+def test_an_object_survives_if_it_survives_every_trial_of_at_least_one(survived, expected):
+    assert execution(*(trial("knock", each) for each in survived)).survived is expected
+
+
+@pytest.mark.parametrize(
+    ("survived", "fate", "moved_mm", "turned_deg", "said"),
+    [
+        (True, "slipped", 4.0, 4.0, "slipped"),
+        (False, "dropped", 90.0, 90.0, "dropped"),
+        (False, "stuck", 4.0, 15.9, "turned too far without a slip"),
+        (False, "slipped", 6.0, 4.0, "moved too far after a slip"),
+        (False, "stuck", 6.0, 15.9, "moved and turned too far without a slip"),
+    ],
+)
+def test_an_object_that_was_kept_and_failed_is_said_to_have_left_its_place(
+    survived, fate, moved_mm, turned_deg, said
+):
+    found = ExecutionTrial("knock", "knock -y", survived, fate, 0.0, 1e-3 * moved_mm,
+                           math.radians(turned_deg), 2.0, 3.0, 2.0, 1e-3)  # fmt: skip
+    assert ended(found, ExecutionSettings(0.3)) == said
+
+
+def executed(name, losses, *, survived=True, let_go=True):
+    trials = [replace(trial("knock", survived), predicted_loss=loss) for loss in losses]
+    controls = (ExecutionControl("a", let_go, 0.9),)
+    return ExecutedGrasp(name, "pencil", "", execution(*trials, controls=controls))
+
+
+def test_the_best_grasp_survived_and_has_the_largest_of_the_least_losses():
+    """Grasps that were lost, whose control held, or that have no squeeze do not count."""
+    grasps = [
+        executed("a", [1.5, 9.0]), executed("b", [1.8, 1.7]), executed("c", [1.7, 2.0]),
+        executed("d", [5.0], survived=False), executed("e", [6.0], let_go=False),
+        ExecutedGrasp("f", "pencil", "", None, "no squeeze"), executed("g", []),
+    ]  # fmt: skip
+    assert [grasp.least_predicted_loss for grasp in grasps] == [1.5, 1.7, 1.7, 5.0, 6.0, 0.0, 0.0]
+    assert best_executed(grasps) == grasps[1]
+    assert best_executed(grasps[3:]) is None
+    endless = executed("h", [math.inf])
+    assert best_executed([*grasps, endless]) == endless

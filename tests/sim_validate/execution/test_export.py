@@ -1,20 +1,12 @@
 """The command `export`: what it writes is what the Python function writes, and what it refuses."""
 
-import json
-
 import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.exports import ENDINGS, GraspFormat
-from sim_validate.kit.command_flags import Export
+from scenes.exports import ENDINGS
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-
-
-def test_the_flag_the_functions_and_the_endings_have_the_same_formats():
-    assert Export.__dataclass_fields__["to"].type == GraspFormat
-    assert set(GraspFormat.__args__) == set(ENDINGS)
 
 
 @pytest.mark.parametrize("to", ["moveit", "gltf"])
@@ -27,27 +19,6 @@ def test_it_writes_what_python_writes(wedge_plan, tmp_path, capsys, to):
     assert "with 1 grasp" in capsys.readouterr().out
     scenes.export_grasps(gc.load_grasps(wedge_plan)[:1], wanted, to)
     assert out.read_bytes() == wanted.read_bytes()
-
-
-def test_one_grasp_and_another_radius_can_be_asked_for(wedge_plan, tmp_path, capsys):
-    plan, out = gc.load_grasps(wedge_plan), tmp_path / "a.glb"
-    wanted = plan[1].id
-    words = [
-        "export",
-        str(wedge_plan),
-        "--to",
-        "gltf",
-        "-o",
-        str(out),
-        "--grasp",
-        wanted,
-        "--json",
-    ]
-    assert main([*words, "--fingertip-radius-m", "0.004"]) == Exit.GOOD
-    told = json.loads(capsys.readouterr().out)
-    assert told == {"to": "gltf", "out": str(out), "grasps": [wanted]}
-    again = scenes.export_grasps(plan[1:2], tmp_path / "b.glb", "gltf", fingertip_radius_m=0.004)
-    assert out.read_bytes() == again.read_bytes()
 
 
 def test_what_it_refuses_is_told_with_a_remedy(wedge_plan, tmp_path, capsys):

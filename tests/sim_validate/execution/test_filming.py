@@ -101,17 +101,6 @@ def test_what_is_filmed_is_the_motion_in_its_true_size(asked):
     assert asked["table"] is None
 
 
-def test_a_trial_is_filmed_with_the_physics_of_its_execution(held, asked, monkeypatch, tmp_path):
-    drawn = []
-    monkeypatch.setattr(jobs, "write_held_clip", lambda scene, *_, **__: drawn.append(scene))
-    job = ExecutionJob(*held, FRICTION, SETTINGS, {"timestep": 0.001})
-    film(job, "shake along z", tmp_path / "clip.gif")
-    assert drawn[0].physics == replace(asked["scene"].physics, timestep=0.001)
-    other = replace(job, physics={"gravity": (0.0, 0.0, 9.0)})
-    with pytest.raises(gc.InputError, match="gravity must be that of the settings"):
-        film(other, "shake along z", tmp_path / "clip.gif")
-
-
 @pytest.mark.slow
 def test_a_clip_of_a_lift_shows_the_object_rising(held, tmp_path):
     try:

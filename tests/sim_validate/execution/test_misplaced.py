@@ -9,7 +9,6 @@ from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held_scene import held_layout
 from scenes.mujoco.scene_text import TOUCH
 from scenes.settings import HeldSettings
-from sim_validate.execution import trials
 from sim_validate.execution.trials import ROOM, met, misplacements
 from tests.sim_validate.execution.held_rigs import planned
 
@@ -46,7 +45,7 @@ def tip_paths(layout, pose, reached, count=200):
     return (way - pose.moved) @ turn_of(pose.quaternion)
 
 
-@pytest.fixture(scope="module", params=["box", "dodecahedron", "l-bracket"])
+@pytest.fixture(scope="module", params=["box", "l-bracket"])
 def misplaced(request):
     layout = layout_of(request.param)
     poses = misplacements(layout, OFF_M, OFF_RAD, 12, 0)
@@ -65,16 +64,6 @@ def test_objects_are_off_by_what_is_stated():
     assert np.abs(shifts.mean(axis=0)).max() < 3.0 * OFF_M / np.sqrt(3.0 * 200)
 
 
-def test_seeds_and_counts_draw_poses():
-    layout = layout_of("box")
-    one, same, other = (misplacements(layout, OFF_M, OFF_RAD, 5, seed) for seed in (1, 1, 2))
-    fewer = misplacements(layout, OFF_M, OFF_RAD, 2, 1)
-    for a, b in [*zip(one, same, strict=True), *zip(one[:2], fewer, strict=True)]:
-        np.testing.assert_array_equal(a.moved, b.moved)
-        np.testing.assert_array_equal(a.quaternion, b.quaternion)
-    assert not any(np.array_equal(a.moved, b.moved) for a, b in zip(one, other, strict=True))
-
-
 def test_fingertips_touch_where_they_stop_and_nowhere_before(misplaced):
     """The judge is trimesh: its distance from the mesh along the whole way, densely."""
     layout, poses, reached = misplaced
@@ -90,14 +79,6 @@ def test_fingertips_touch_where_they_stop_and_nowhere_before(misplaced):
     assert touched == 4 * 12
 
 
-def test_fingertips_come_along_their_normals(misplaced):
-    layout, _, reached = misplaced
-    moved = np.einsum("kij,pkj->pki", layout.axes, reached)
-    along = np.einsum("pki,ki->pk", moved, layout.frames[:, :, 0])
-    np.testing.assert_allclose(moved, along[..., None] * layout.frames[:, :, 0], atol=1e-12)
-    assert np.abs(along).max() <= ROOM * (OFF_M + OFF_RAD * layout.radius_m) + 1e-12
-
-
 def test_a_finger_that_meets_nothing_stops_beyond_its_place():
     """The object is far aside: all fingers pass it."""
     layout = layout_of("box")
@@ -105,21 +86,3 @@ def test_a_finger_that_meets_nothing_stops_beyond_its_place():
     reached = met(layout, (pose,), OFF_M, 0.0)
     moved = np.einsum("kij,pkj->pki", layout.axes, reached)[0]
     assert moved == pytest.approx(ROOM * OFF_M * layout.frames[:, :, 0], abs=1e-12)
-
-
-def test_an_object_in_its_place_is_met_in_the_planned_places():
-    layout = layout_of("wedge")
-    poses = misplacements(layout, 0.0, 0.0, 3, 0)
-    assert met(layout, poses, OFF_M, OFF_RAD) == pytest.approx(
-        np.zeros((3, 4, 3)), abs=1e-6 * layout.radius_m
-    )
-
-
-def test_fingertips_meet_the_same_points_of_triangles_nearby_as_of_all(monkeypatch):
-    layout = layout_of("l-bracket")
-    near = trials._near(layout, layout.tip_centers[:1], 1e-3)
-    assert 0 < len(near) < len(layout.triangles)
-    poses = misplacements(layout, 2e-3, 0.03, 20, seed=1)
-    few = met(layout, poses, 2e-3, 0.03)
-    monkeypatch.setattr(trials, "_near", lambda layout, *_: layout.triangles)
-    np.testing.assert_array_equal(few, met(layout, poses, 2e-3, 0.03))

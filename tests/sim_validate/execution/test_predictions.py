@@ -110,8 +110,9 @@ def drives():
     return {"shake": shaken, "turn": turning, "stop": stopped, "knock": struck}
 
 
-@pytest.mark.parametrize("kind", ["shake", "turn", "stop", "knock"])
-@pytest.mark.parametrize("name", ["box", "wedge"])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("box", "shake"), ("box", "turn"), ("wedge", "stop"), ("wedge", "knock")]
+)
 def test_predictions_are_those_of_a_fine_integration(name, kind):
     dynamics, drive = dynamics_of(name), drives()[kind]
     (found,) = dynamics.expected([drive])
@@ -120,7 +121,7 @@ def test_predictions_are_those_of_a_fine_integration(name, kind):
     assert found.first_slip < 1e3
 
 
-@pytest.mark.parametrize("name", ["box", "dodecahedron", "wedge"])
+@pytest.mark.parametrize("name", ["box", "wedge"])
 def test_slow_loads_slip_where_the_static_analysis_says(name):
     """Loads that grow over six seconds, some sixty periods of the slowest mode."""
     dynamics = dynamics_of(name)
@@ -137,27 +138,6 @@ def test_slow_loads_slip_where_the_static_analysis_says(name):
         assert multiple == pytest.approx(expected, rel=2e-3)
 
 
-@pytest.mark.parametrize("hertz", [2.0, 8.0, 14.0, 20.0])
-def test_shakes_are_amplified_like_a_mass_on_springs(hertz):
-    """Across the pushes all fingers share alike; the object's acceleration a |T| follows from the
-    transmissibility T = (k + i c w) / (k - M w^2 + i c w) of all tips and springs together."""
-    dynamics = box_dynamics()
-    count = paths.samples(3.0)
-    rate = 2.0 * np.pi * hertz
-    times = SAMPLE_S * (np.arange(count) + 0.5)
-    accelerations = np.zeros((count, 6))
-    accelerations[:, 2] = np.clip(times, 0, 1) * np.sinc(hertz * SAMPLE_S) * np.sin(rate * times)
-    (found,) = predicted_slips(dynamics, [replace(idle(count), accelerations=accelerations)])
-    layout = dynamics.layout
-    k, c = 4 * layout.stiffness[0, 2], 4 * layout.damping[0, 2]
-    M = MASS + 4 * layout.tip_mass_kg
-    share = (k + 1j * c * rate) / (k - M * rate**2 + 1j * c * rate)
-    # samples miss the peak by half of one at most
-    missed = 1.0 / np.cos(0.5 * rate * SAMPLE_S)
-    expected = 4 * 0.5 * 5.0 / (MASS * abs(share))
-    assert expected * 0.97 <= found <= expected * missed * 1.02
-
-
 def test_the_lowest_frequency_is_that_of_the_slowest_mode():
     for dynamics in (dynamics_of("wedge"), box_dynamics()):
         stiff = dynamics.grip.grasp_stiffness
@@ -166,21 +146,6 @@ def test_the_lowest_frequency_is_that_of_the_slowest_mode():
     layout = box_dynamics().layout
     along = np.sqrt(4 * 2000.0 / (MASS + 4 * layout.tip_mass_kg))
     assert box_dynamics().lowest_frequency <= along
-
-
-def test_uniform_motion_changes_no_prediction():
-    drive = drives()["knock"]
-    moving = replace(drive, velocity=np.array([3.0, -2.0, 1.0]))
-    one, other = predicted_slips(box_dynamics(), [drive, moving])
-    assert one == other
-
-
-def test_predictions_do_not_depend_on_their_company():
-    dynamics, several = box_dynamics(), list(drives().values())
-    together = predicted_slips(dynamics, several)
-    alone = [predicted_slips(dynamics, [drive])[0] for drive in several]
-    assert together == pytest.approx(alone, rel=1e-12)
-    assert predicted_slips(dynamics, several[::-1])[::-1] == pytest.approx(together, rel=1e-12)
 
 
 def test_nothing_slips_where_nothing_acts():
@@ -223,13 +188,3 @@ def test_an_object_is_lost_after_the_first_slip_and_before_it_moves_too_far_with
     assert (losses > 1.01 * np.minimum(slips, sticking)).any()
     (_, safer) = losses_of(dynamics, several, turning=True)
     assert safer == pytest.approx(np.minimum(slips, sticking), rel=1e-12)
-
-
-def test_narrow_limits_lose_the_object_before_it_slips():
-    dynamics, several = dynamics_of("box"), list(drives().values())
-    slips, losses = losses_of(dynamics, several, most_m=1e-6)
-    found = dynamics.expected(several)
-    assert losses == pytest.approx([1e-6 / one.moved_m for one in found], rel=1e-9)
-    assert (losses < slips).all()
-    (_, twice) = losses_of(dynamics, several, most_m=2e-6)
-    assert twice == pytest.approx(2.0 * losses, rel=1e-9)

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
+import grasp_core as gc
 import scenes
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -16,19 +17,14 @@ from sim_validate.main import main
 SETTLED_S = 2.0
 
 
-@pytest.fixture(scope="module")
-def plans(tmp_path_factory):
-    """Plans of a convex object, and of one that is not."""
-    folder = tmp_path_factory.mktemp("plans")
-    for name in ("wedge", "l-bracket"):
-        words = ["plan", name, "--limit", "1", "--out", str(folder / name), "-q"]
-        assert main(words) == Exit.GOOD
-    return folder
+def of_first(plan):
+    """The command for the first grasp of a plan."""
+    return ["scene", str(plan), "--grasp", gc.load_grasps(plan)[0].id]
 
 
 @pytest.fixture
-def wedge(plans):
-    return str(plans / "wedge" / "grasps.json")
+def words(wedge_plan):
+    return of_first(wedge_plan)
 
 
 def moved(path):
@@ -44,10 +40,10 @@ def moved(path):
     return float(np.linalg.norm(data.body("object").xipos - place)), 2.0 * np.arccos(cosine), model
 
 
-@pytest.mark.parametrize("name", ["wedge", "l-bracket"])
-def test_an_object_of_true_mass_is_held_from_the_keyframe_on(plans, tmp_path, name):
-    words = ["scene", str(plans / name / "grasps.json"), "--density-kg-m3", "500"]
-    assert main([*words, "--out", str(tmp_path), "-q"]) == Exit.GOOD
+@pytest.mark.parametrize(("name", "plan"), [("wedge", "wedge_plan"), ("l-bracket", "bracket_plan")])
+def test_an_object_of_true_mass_is_held_from_the_keyframe_on(request, tmp_path, name, plan):
+    words = of_first(request.getfixturevalue(plan))
+    assert main([*words, "--density-kg-m3", "500", "--out", str(tmp_path), "-q"]) == Exit.GOOD
     (path,) = tmp_path.iterdir()
     distance, angle, model = moved(path)
     assert distance < 2e-3
@@ -57,9 +53,9 @@ def test_an_object_of_true_mass_is_held_from_the_keyframe_on(plans, tmp_path, na
     assert model.opt.gravity.tolist() == [0.0, 0.0, -9.80665]
 
 
-def test_flags_of_the_hand_are_in_the_scene(wedge, tmp_path):
+def test_flags_of_the_hand_are_in_the_scene(words, tmp_path):
     flags = "--mass-kg 0.2 --tip-stiffness-n-per-m 3000 --tip-mass-kg 0.03 --tip-radius-m 0.004"
-    words = ["scene", wedge, *flags.split(), "--down", "2", "0", "0", "--friction", "0.6"]
+    words += [*flags.split(), "--down", "2", "0", "0", "--friction", "0.6"]
     assert main([*words, "--out", str(tmp_path), "-q"]) == Exit.GOOD
     (path,) = tmp_path.iterdir()
     distance, _, model = moved(path)
@@ -72,16 +68,16 @@ def test_flags_of_the_hand_are_in_the_scene(wedge, tmp_path):
     assert model.opt.gravity.tolist() == [9.80665, 0.0, 0.0]
 
 
-def test_a_mass_that_is_too_large_is_warned_of(wedge, tmp_path, capsys):
-    words = ["scene", wedge, "--mass-kg", "3", "--out", str(tmp_path)]
+def test_a_mass_that_is_too_large_is_warned_of(words, tmp_path, capsys):
+    words += ["--mass-kg", "3", "--out", str(tmp_path)]
     assert main(words) == Exit.GOOD
     assert "certified for 0.278 of the weight only" in capsys.readouterr().err
     (path,) = tmp_path.iterdir()
     assert moved(path)[0] > 2e-3
 
 
-def test_a_grasp_that_no_squeeze_holds_has_no_scene(wedge, tmp_path, capsys):
-    words = ["scene", wedge, "--mass-kg", "0.3", "--friction", "0.01"]
+def test_a_grasp_that_no_squeeze_holds_has_no_scene(words, tmp_path, capsys):
+    words += ["--mass-kg", "0.3", "--friction", "0.01"]
     assert main([*words, "--out", str(tmp_path)]) == Exit.NEGATIVE
     assert "no scene: no squeeze carries any part of the weight" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
@@ -96,7 +92,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("flags", REFUSED)
-def test_flags_of_the_other_kind_of_scene_are_refused(wedge, tmp_path, capsys, flags):
-    assert main(["scene", wedge, *flags.split(), "--out", str(tmp_path)]) == Exit.USAGE
+def test_flags_of_the_other_kind_of_scene_are_refused(words, tmp_path, capsys, flags):
+    assert main([*words, *flags.split(), "--out", str(tmp_path)]) == Exit.USAGE
     assert REFUSED[flags] in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -1,4 +1,7 @@
-"""Settings of executions; `tests/public_values` tries bad values of each."""
+"""Settings of executions, and the table `[execution]` of a file that holds them.
+
+`tests/public_values` tries bad values of each.
+"""
 
 from dataclasses import replace
 from typing import get_args
@@ -7,7 +10,41 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
+from scenes.example_objects import example_object
 from sim_validate.settings import KINDS, TrialKind
+
+TABLE = {
+    "density_kg_m3": 700, "trials": ["lift", "weight"], "tip_radius_m": 0.004, "down": [1, 0, 0],
+}  # fmt: skip
+
+
+def of_table(table):
+    return sv.ExecutionSettings.of_table(table, "execution")
+
+
+def test_a_table_says_how_objects_are_executed():
+    asked = of_table(TABLE)
+    assert asked.trials == ("weight", "lift")
+    assert asked.down == (1.0, 0.0, 0.0)
+    wedge = example_object("wedge")
+    mass = wedge.mass_at(700.0)
+    assert asked.for_body(wedge) == replace(asked, mass_kg=mass, density_kg_m3=None)
+    assert of_table({"mass_kg": 2}).for_body(wedge) == sv.ExecutionSettings(mass_kg=2.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("soft", "execution: expected a table of settings, got 'soft'"),
+        ({"mass_kg": 1.0, "density_kg_m3": 1.0}, "execution: mass_kg and density_kg_m3 exclude"),
+        ({"mass_kg": 1.0, "left": 1}, "execution: no setting is named 'left'"),
+        ({"density_kg_m3": True}, "execution.density_kg_m3 must be a number"),
+    ],
+)
+def test_what_is_refused_names_the_setting(table, message):
+    with pytest.raises(gc.InputError) as raised:
+        of_table(table)
+    assert message in str(raised.value)
 
 
 def test_trials_are_put_in_order_and_counted_once():

@@ -16,12 +16,22 @@ from sim_validate.execution.bench import (
     outcome,
 )
 from sim_validate.execution.paths import Table, idle
-from tests.judges import random_rotation
-from tests.scenes.mujoco.test_turns import quaternions, turn_about
 from tests.sim_validate.execution.held_rigs import box_scene
 
 COUNT = 400
 FRICTION = np.full(4, 0.5)
+
+
+def turn_about(axis, angle):
+    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    c = np.cross(np.eye(3), axis)
+    return np.eye(3) + np.sin(angle) * c + (1 - np.cos(angle)) * c @ c
+
+
+def quaternions(axis, angles):
+    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    half = 0.5 * np.asarray(angles)
+    return np.column_stack([np.cos(half), np.sin(half)[:, None] * axis])
 
 
 def motion_of(moved=None, turned=None, palm=None, centers=None, forces=None):
@@ -54,14 +64,6 @@ def loaded():
 
 def judged(motion, drive=None):
     return outcome(motion, drive or loaded(), FRICTION)
-
-
-def test_nothing_that_moves_has_slipped():
-    found = judged(motion_of())
-    assert (found.slip_m, found.displacement_m, found.turn_rad) == (0.0, 0.0, 0.0)
-    assert not found.slipped
-    assert not found.dropped
-    assert found.first_slip > 1.0
 
 
 def test_a_palm_that_carries_everything_along_shows_no_motion():
@@ -121,20 +123,6 @@ def test_a_fingertip_that_slides_by_a_millimetre_has_slipped_by_it(along):
     assert found.first_slip <= 1.0
 
 
-def test_a_fingertip_that_leaves_the_surface_has_not_slid():
-    layout = box_scene().layout
-    centers = (
-        layout.tip_centers - 1e-3 * np.linspace(0, 1, COUNT)[:, None, None] * layout.frames[:, :, 0]
-    )
-    assert judged(motion_of(centers=centers)).slip_m == pytest.approx(0.0, abs=1e-15)
-
-
-def test_an_object_that_slides_through_the_fingers_is_displaced_by_as_much():
-    moved = np.linspace(0.0, 2e-3, COUNT)[:, None] * np.array([0.0, 0.0, -1.0])
-    found = judged(motion_of(moved=moved))
-    assert found.slip_m == found.displacement_m == pytest.approx(2e-3)
-
-
 def test_what_happened_before_the_trial_began_does_not_count():
     moved = np.zeros((COUNT, 3))
     moved[:100, 1] = np.linspace(3e-3, 0.0, 100)
@@ -175,27 +163,6 @@ def test_the_first_slip_is_where_forces_reach_the_cone(largest):
     found = judged(motion_of(forces=tangential(largest)))
     assert found.slipped
     assert found.first_slip == pytest.approx(1.0 / largest, abs=1.0 / COUNT)
-
-
-def test_what_is_seen_does_not_depend_on_where_the_palm_is():
-    """A motion with all of it moved and turned with the palm gives the same outcome."""
-    layout = box_scene().layout
-    centers = np.tile(layout.tip_centers, (COUNT, 1, 1))
-    centers[:, 1, 1] += np.linspace(0.0, 1e-3, COUNT)
-    here = motion_of(centers=centers, forces=tangential(0.5))
-    rng = np.random.default_rng(1)
-    R = random_rotation(rng)
-    b = np.arcsin(R[0, 2])
-    a, c = np.arctan2(-R[1, 2], R[2, 2]), np.arctan2(-R[0, 1], R[0, 0])
-    place = rng.normal(size=3)
-    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    angle = np.arctan2(np.linalg.norm(axis), np.trace(R) - 1.0)
-    moved, turned = here.moved + place, quaternions(axis, np.full(COUNT, angle))
-    palm = np.tile(np.append(place, [a, b, c]), (COUNT, 1))
-    there = replace(here, joints=np.hstack([moved, turned, palm, here.joints[:, 13:]]))
-    one, other = judged(here), judged(there)
-    assert (other.slip_m, other.first_slip) == pytest.approx((one.slip_m, one.first_slip), rel=1e-6)
-    assert one.slip_m == pytest.approx(1e-3)
 
 
 def taken_off(samples, by):

@@ -11,7 +11,6 @@ import grasp_core as gc
 from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.reach import stance_of
-from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.hands.dexgraspbench import (
     FREE,
     DexRecord,
@@ -57,27 +56,6 @@ def test_a_round_trip_keeps_contacts(hand, tmp_path):
         assert again.fingers.tolist() == np.sort(reach.fingers).tolist()
         assert again.palm_pose == pytest.approx(reach.palm_pose, abs=SAME)
         assert again.certificate.verify()
-
-
-@pytest.mark.parametrize("hand", HANDS)
-def test_a_round_trip_does_not_depend_on_where_the_object_is(hand):
-    body, model = scaled("dodecahedron", 0.035), gc.load_hand(hand)
-    record = dex_record(model, reached(hand)[0], "o")
-    moved = np.array([0.3, -0.2, 0.5, 0.5, -0.5, 0.5, 0.5])
-    poses = [pose_of(moved) @ pose_of(each) for each in (record.object_pose, record.grasp)]
-
-    def seven(pose):
-        return np.concatenate([pose[:3, 3], quaternion(pose[:3, :3])])
-
-    root = seven(poses[1])
-    other = DexRecord(
-        "o", 1.0, seven(poses[0]),
-        *(np.concatenate([root, each[FREE:]])
-          for each in (record.pregrasp, record.grasp, record.squeeze)),
-    )  # fmt: skip
-    one, two = (reach_of_record(each, model, body, FRICTION) for each in (record, other))
-    for here, there in zip(one.contacts, two.contacts, strict=True):
-        assert here.position == pytest.approx(there.position, abs=SAME)
 
 
 def test_dexgraspbench_finds_what_it_looks_for(tmp_path):
@@ -126,34 +104,6 @@ def test_fingertips_of_a_record_meet_the_object_at_one_moment(hand, gap):
     assert whole.pregrasp[FREE:] == pytest.approx(reach.pregrasp)
 
 
-@pytest.mark.parametrize("hand", HANDS)
-def test_the_file_of_a_hand_has_an_inertial_for_palm_and_links(hand):
-    model = gc.load_hand(hand)
-    found = hand_file(model).inertials
-    assert list(found) == ["palm", *(link.name for link in model.links)]
-    for link in model.links:
-        if link.mass_kg is not None:
-            assert found[link.name]["mass"] == pytest.approx(link.mass_kg)
-            assert found[link.name]["pos"] == pytest.approx(link.center_of_mass, abs=1e-5)
-    assert hand_file(gc.Hand("other", model.palm, model.fingers)).inertials == {}
-
-
-@pytest.mark.parametrize("hand", HANDS)
-def test_the_root_of_a_record_leads_to_the_fingertips(hand):
-    """Laid out by hand: root, palm in it, then the hand's own kinematics."""
-    model, reach = gc.load_hand(hand), reached(hand)[0]
-    record = dex_record(model, reach, "o")
-    palm = pose_of(record.grasp) @ hand_file(model).root
-    found, ends = places(model, record.grasp[FREE:], palm), np.cumsum(
-        [len(finger.links) for finger in model.fingers]
-    ) - 1  # fmt: skip
-    for contact, finger in zip(reach.contacts, reach.fingers, strict=True):
-        corners, rounding = model.fingers[finger].tip.core
-        R, p = found.link_rotations[0, ends[finger]], found.link_positions[0, ends[finger]]
-        ahead = (p + corners @ R.T - contact.position) @ contact.normal
-        assert ahead.max() == pytest.approx(-rounding, abs=1e-5)
-
-
 def test_a_record_away_from_the_object_touches_nothing_and_an_open_one_is_refuted():
     model, reach = gc.load_hand("allegro"), reached("allegro")[0]
     record = dex_record(model, reach, "o")
@@ -199,21 +149,6 @@ def saved(value, path, protocol=None):
     array = np.array(value, dtype=object)
     path.write_bytes(held.getvalue() + pickle.dumps(array, protocol=protocol))
     return path
-
-
-@pytest.mark.parametrize("protocol", [3, 4, 5])
-def test_records_of_any_pickle_protocol_are_read(protocol, tmp_path):
-    read = load_dex_record(saved(FIELDS, tmp_path / "0.npy", protocol))
-    assert read.object_scale == 0.06
-    assert read.grasp[7] == np.float32(0.2)
-    assert len(read.grasp) == 8
-
-
-@pytest.mark.parametrize("kind", [list, np.float32, np.dtype(">f8").type])
-def test_numbers_may_be_an_array_of_any_kind_or_a_list(kind, tmp_path):
-    turned = kind(FIELDS["squeeze_qpos"].tolist())
-    read = load_dex_record(saved(FIELDS | {"squeeze_qpos": turned}, tmp_path / "0.npy"))
-    assert read.squeeze == pytest.approx(FIELDS["squeeze_qpos"])
 
 
 class Runs:

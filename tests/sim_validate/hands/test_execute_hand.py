@@ -12,7 +12,6 @@ from sim_validate.hands.trials import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, stood
 
-HANDS = ("allegro", "leap")
 NEAR = 0.02
 """Relative error of multiples of first slip: predictions are linear, and under these loads objects
 move by a hundredth of their radius; contacts in simulation creep by as much again at most."""
@@ -24,25 +23,17 @@ def executed(name, **changes):
     return sv.execute_hand(hand, scaled(OBJECT, RADIUS), reach, FRICTION, settings)
 
 
-@pytest.mark.parametrize("name", HANDS)
-def test_a_hand_keeps_a_light_object_and_its_controls_let_go(name):
-    found = executed(name, trials=("weight", "shake", "stop", "misplaced"))
-    assert len(found.trials) == 18
+@pytest.mark.parametrize("name", ["allegro", pytest.param("leap", marks=pytest.mark.slow)])
+def test_a_hand_keeps_a_light_object_and_would_slip_where_it_is_predicted_to(name):
+    found = executed(name, trials=("weight", "shake", "stop", "misplaced"), misplacements=2)
+    assert len(found.trials) == 15
     assert found.survived, [trial for trial in found.trials if not trial.survived]
     assert len(found.controls) == 3
     assert found.controls_let_go
     assert found.load_multiple > 1.0
-
-
-@pytest.mark.parametrize("name", HANDS)
-def test_hands_slip_where_they_are_predicted_to(name):
-    found = executed(name, trials=("weight", "shake", "stop"))
-    most = max(trial.displacement_m for trial in found.trials)
-    assert most <= 0.5 * NEAR * RADIUS
-    multiples = np.array(
-        [(trial.predicted_first_slip, trial.simulated_first_slip) for trial in found.trials]
-    )
-    assert len(multiples) == 13
+    placed = [trial for trial in found.trials if trial.kind != "misplaced"]
+    assert max(trial.displacement_m for trial in placed) <= 0.5 * NEAR * RADIUS
+    multiples = np.array([(t.predicted_first_slip, t.simulated_first_slip) for t in placed])
     assert multiples.min() > 1.0
     errors = multiples[:, 1] / multiples[:, 0] - 1.0
     assert np.abs(errors).max() < NEAR, errors

@@ -40,18 +40,3 @@ def test_ranges_that_were_meant_in_radians_are_pointed_out(words, capsys):
     assert main(words) == Exit.GOOD
     said = " ".join(capsys.readouterr().out.split())
     assert "Every joint turns by less than 10 degrees: MJCF counts angles in degrees" in said
-
-
-def test_joints_that_follow_others_and_notes_are_said(tmp_path, capsys):
-    path = tmp_path / "coupled.xml"
-    rule = '<equality><joint joint1="left_curl" joint2="left_bend" polycoef="0.1 0.5 0 0 0"/>'
-    tendon = '<tendon><fixed name="cable"><joint joint="thumb_curl" coef="1"/></fixed></tendon>'
-    text = three_fingers_mjcf().replace("</mujoco>", f"{rule}</equality>{tendon}</mujoco>")
-    path.write_text(text)
-    words = ["hand", str(path), "--fingertips", ",".join(THREE_TIPS)]
-    assert main([*words, "--json"]) == Exit.GOOD
-    facts = json.loads(capsys.readouterr().out)
-    (coupling,) = facts["couplings"]
-    assert coupling == {"joint": "left_curl", "driver": "left_bend", "ratio": 0.5,
-                        "offset_rad": pytest.approx(0.1)}  # fmt: skip
-    assert len(facts["notes"]) == 1

@@ -73,6 +73,16 @@ def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(wedge_p
     assert not (run / "report").exists()
 
 
+@pytest.fixture(scope="module")
+def judged(wedge_plan, tmp_path_factory):
+    """A folder with a grasp that is judged."""
+    folder = tmp_path_factory.mktemp("judged")
+    shutil.copy(wedge_plan, folder)
+    words = ["validate", str(folder / "grasps.json"), "--limit", "1", "--out", str(folder), "-q"]
+    assert main([*words, "--protocol", "dexonomy"]) == Exit.GOOD
+    return folder
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [(lambda record: record["judgements"][0].pop("closed"), "closed"),
@@ -80,10 +90,9 @@ def test_a_report_shows_what_each_test_says_and_new_judgements_remove_it(wedge_p
      (lambda record: record["summary"]["dexonomy"].update(more=1), "summary")],
     ids=["field", "object", "unknown"],
 )  # fmt: skip
-def test_a_report_refuses_judgements_that_do_not_fit(change, said, wedge_plan, tmp_path, capsys):
-    shutil.copy(wedge_plan, tmp_path)
-    own = str(tmp_path / "grasps.json")
-    main(["validate", own, "--limit", "1", "--out", str(tmp_path), "-q", "--protocol", "dexonomy"])
+def test_a_report_refuses_judgements_that_do_not_fit(change, said, judged, tmp_path, capsys):
+    for path in judged.iterdir():
+        shutil.copy(path, tmp_path)
     changed(tmp_path / "judgements.json", change)
     assert main(["report", str(tmp_path), "-q"]) == Exit.INPUT
     found = capsys.readouterr().err
@@ -92,16 +101,8 @@ def test_a_report_refuses_judgements_that_do_not_fit(change, said, wedge_plan, t
 
 
 def test_a_hand_is_judged_and_its_records_are_written(bracket_plan, tmp_path, capsys):
-    words = [
-        "reach",
-        str(bracket_plan),
-        "--limit",
-        "2",
-        "--hand",
-        "allegro",
-        "--torque-limit-n-m",
-        "0.7",
-    ]
+    words = ["reach", str(bracket_plan), "--limit", "1", "--hand", "allegro"]
+    words += ["--torque-limit-n-m", "0.7"]
     more = ["--simulate", "--protocol", "dexgraspbench", "--out", str(tmp_path / "out")]
     code = main([*words, *more, "--dexgraspbench", str(tmp_path / "records")])
     found = capsys.readouterr()
@@ -112,7 +113,7 @@ def test_a_hand_is_judged_and_its_records_are_written(bracket_plan, tmp_path, ca
     assert [each["id"] for each in document["judgements"]] == ids
     assert all(each["hand"] == "allegro" for each in document["judgements"])
     good = all(e["theirs"] and e["held"] for e in document["judgements"])
-    assert code == (Exit.GOOD if good and len(ids) == 2 else Exit.NEGATIVE)
+    assert code == (Exit.GOOD if good else Exit.NEGATIVE)
     assert reached["complete"]
     assert all(each["simulated"] is None for each in reached["reaches"])
     assert "is not convex" in found.err

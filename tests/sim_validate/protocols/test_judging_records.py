@@ -122,13 +122,6 @@ def test_forces_are_along_the_axes_of_the_records_world():
     assert laid[1].commands == pytest.approx(laid[0].commands, abs=1e-7)
 
 
-def test_the_root_moves_as_a_record_says_and_takes_the_object_along():
-    lifted = np.array(record().squeeze)
-    lifted[2] += 0.02
-    for run in judged(replace(record(), squeeze=lifted)).runs:
-        assert run.displacement_m == pytest.approx(0.02, abs=0.005)
-
-
 def test_a_run_is_what_a_plain_loop_of_steps_gives():
     """An independent driver: the hand on its weld, told by setting the mocap body's pose."""
     made = scene(record())

@@ -1,13 +1,9 @@
 """Published tests are what their own files say: loads, durations, thresholds, physics."""
 
-import re
-
 import numpy as np
 import pytest
 
-import sim_validate as sv
-from sim_validate.kit.command_flags import ProtocolName
-from sim_validate.protocols.published import PROTOCOLS, protocol, protocol_names
+from sim_validate.protocols.published import protocol
 
 AXES = {(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)}
 
@@ -65,19 +61,3 @@ def test_dexonomy_is_its_file():
     assert directions(test) == AXES
     assert {step.seconds for run in test.runs for step in run} == {2.0}
     assert np.linalg.norm(test.forces(0.1), axis=1) == pytest.approx(0.98)
-
-
-def test_every_test_names_files_at_a_commit():
-    assert len(PROTOCOLS) == 5
-    for test in PROTOCOLS.values():
-        assert test.sources
-        for source in test.sources:
-            assert re.fullmatch(r"[\w.-]+/[\w.-]+", source.repository)
-            assert re.fullmatch(r"[0-9a-f]{40}", source.commit)
-            assert source.paths
-
-
-def test_flags_python_and_values_have_the_same_names():
-    assert protocol_names() == ProtocolName.__args__ == tuple(PROTOCOLS)
-    assert all(name == test.name for name, test in PROTOCOLS.items())
-    assert sv.protocol_names() == protocol_names()

@@ -54,19 +54,6 @@ def test_a_palm_that_starts_and_stops_pulls_the_object_back_and_forth():
     assert momenta[-1] == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-def test_a_wave_pulls_with_its_largest_acceleration():
-    """A sine of amplitude a and period T accelerates by a (2 pi / T)^2; second differences over
-    h are less by a share of (2 pi h / T)^2 / 12."""
-    period, amplitude = 4.0, 0.1
-    found = laid(Step(period, wave_m=(amplitude, 0.0, 0.0))).wrenches[20:, 0]
-    rate = 2.0 * np.pi / period
-    largest = 0.1 * amplitude * rate**2
-    slack = (rate * SAMPLE) ** 2
-    inner = found[1:-1]
-    assert np.abs(inner).max() == pytest.approx(largest, rel=slack)
-    assert inner.mean() == pytest.approx(0.0, abs=slack * largest)
-
-
 def test_a_turn_acts_by_the_inertia_about_its_axis():
     found = laid(Step(0.4, turn_deg=90.0)).wrenches[20:]
     rate = 0.5 * np.pi / 0.4
