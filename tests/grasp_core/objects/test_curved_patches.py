@@ -77,12 +77,6 @@ def test_no_patch_spans_a_hole_in_the_surface():
     assert away < 0.001 * whole.radius
 
 
-def test_the_centre_of_mass_can_be_given():
-    vertices, triangles = bumpy_ellipsoid()
-    body = gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.01, 0.0, -0.01])
-    np.testing.assert_array_equal(body.center_of_mass, [0.01, 0.0, -0.01])
-
-
 def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherwise():
     vertices, triangles = bumpy_ellipsoid(subdivisions=2)
     coarse = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=1))
@@ -136,14 +130,6 @@ def test_a_surface_without_flat_parts_is_refused_with_advice():
     assert refused.value.reason is MeshRefusal.NOT_FLAT
 
 
-def test_a_box_with_a_triangle_missing_has_six_flat_patches():
-    box = trimesh.creation.box(extents=(0.1, 0.08, 0.06))
-    body = gc.Polyhedron.from_mesh(box.vertices, box.faces[:-1], faces="patches")
-    assert len(body.faces) == 6
-    assert {round(math.degrees(face.spread), 6) for face in body.faces} == {0.0}
-    assert gc.plan(body, 0.5, families="concurrent", limit=1).grasps
-
-
 GAP = 1e-6
 
 
@@ -155,16 +141,6 @@ def fence(rng, corners=40, stretch=1.0):
     border = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
     ends = rng.uniform(-1.0, 1.0, (6, 1, 2))
     return np.concatenate([border, ends + rng.uniform(-0.1, 0.1, (6, 2, 2))])
-
-
-def test_a_long_clearing_grows_long():
-    """Between two parallel fences it fills the lane, not a square around the middle."""
-    ticks = np.linspace(-5.0, 5.0, 41)
-    lanes = [np.column_stack([ticks, np.full(41, side)]) for side in (-0.5, 0.5)]
-    ends = [np.array([[end, -0.5], [end, 0.5]]) for end in (-5.0, 5.0)]
-    segments = np.array([[a, b] for line in (*lanes, *ends) for a, b in itertools.pairwise(line)])
-    polygon = clearing(np.array([0.3, 0.1]), segments, GAP)
-    assert signed_area(polygon) == pytest.approx(10.0, rel=1e-3)
 
 
 def enters(polygon, segment):
@@ -197,31 +173,3 @@ def test_no_segment_enters_a_clearing_however_far_apart_its_teeth(stretch):
             E, b = edge_rows(polygon)
             assert (E @ start < b).all()
             assert signed_area(polygon) > 0.9 * np.pi * room**2
-
-
-def lane(rng, width):
-    """Border of a turned rectangle of length one, its long sides in pieces, and a point inside."""
-    ticks = np.linspace(-0.5, 0.5, int(rng.integers(2, 9)))
-    sides = [np.column_stack([s * ticks, np.full(len(ticks), -0.5 * s * width)]) for s in (1, -1)]
-    turn = rng.uniform(0.0, 2.0 * np.pi)
-    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    corners = np.concatenate(sides) @ axes.T
-    start = axes @ [rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3) * width]
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), start
-
-
-@pytest.mark.timeout(120)  # it never ended once
-@pytest.mark.parametrize("digits", range(1, 10))
-def test_no_segment_enters_the_clearing_of_a_lane_however_narrow(digits):
-    """Ordinary ones are filled; 1e-5 wide and narrower, the polygon may be smaller, never wrong."""
-    rng, gap = np.random.default_rng(digits), 1e-9
-    for _ in range(20):
-        width = 10.0**-digits * rng.uniform(0.5, 1.0)
-        segments, start = lane(rng, width)
-        polygon = clearing(start, segments, gap)
-        if polygon is None:
-            assert width < 1e-7
-            continue
-        assert not any(enters(polygon, segment) for segment in segments)
-        if width > 1e-4:
-            assert signed_area(polygon) == pytest.approx(width, rel=1e-3)

@@ -118,15 +118,6 @@ def test_a_given_flatness_decides_which_faces_are_one(tmp_path):
     assert len(read("stl %g", rounded, tmp_path, offset=2.0).faces) == 8
 
 
-def test_an_exact_mesh_has_no_rounding_to_allow_for():
-    mesh = box()
-    body = gc.Polyhedron.from_mesh(mesh.vertices @ TURN.T, mesh.faces)
-    assert body.surface.flatness_m == 0.0
-    assert body.notes == ()
-    single = (mesh.vertices @ TURN.T + 2.0 * SLANT).astype(np.float32).astype(float)
-    assert 1e-7 < gc.Polyhedron.from_mesh(single, mesh.faces).surface.flatness_m < 1e-5
-
-
 def test_vertices_that_rounding_moved_apart_are_joined():
     """Each triangle of a soup has corners of its own, off by less than half the flatness."""
     mesh = box().subdivide()
@@ -184,31 +175,6 @@ def around(mesh, place):
     return np.flatnonzero((mesh.faces == vertex).any(axis=1))
 
 
-def shared(one, two):
-    return len(set(one.tolist()) & set(two.tolist()))
-
-
-def ring(outline, height):
-    """The side walls and bottom of a prism over a star-shaped outline; the top is missing."""
-    count = len(outline)
-    points = [(x, y, z) for z in (0.0, height) for x, y in outline] + [(0.0, 0.0, 0.0)]
-    after = [(k + 1) % count for k in range(count)]
-    walls = [t for k, n in enumerate(after) for t in ((k, n, count + n), (k, count + n, count + k))]
-    return np.array(points), np.array([*walls, *((n, k, 2 * count) for k, n in enumerate(after))])
-
-
-def star(count, dent):
-    """An outline whose every other corner is dented."""
-    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    reach = np.where(np.arange(count) % 2, dent, 1.0)
-    return np.column_stack([reach * np.cos(angle), reach * np.sin(angle)])
-
-
-def outline_area(outline):
-    x, y = outline.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
 def check_whole(body, missing):
     """Check that a box has volume, centre, moments and faces of the whole one."""
     whole = trimesh.creation.box(SIZE)
@@ -252,26 +218,6 @@ def test_a_hole_of_many_corners_is_closed():
     assert body.surface.holes == 1
 
 
-def test_holes_that_meet_in_a_corner_are_closed_one_by_one():
-    mesh = grid(2)
-    found = around(mesh, [0.05, 0.0, 0.0])
-    pairs = [(a, b) for a in found for b in found
-             if a < b and shared(mesh.faces[a], mesh.faces[b]) == 1]  # fmt: skip
-    assert len(pairs) >= 6
-    closed = 0
-    for pair in pairs:
-        left = np.delete(mesh.faces, pair, axis=0)
-        caps = caps_of(Mesh(mesh.vertices, left))
-        assert len(caps.widths) == len(caps.triangles) == 2
-        assert {frozenset(t) for t in caps.triangles.tolist()} == {
-            frozenset(t) for t in mesh.faces[list(pair)].tolist()
-        }
-        if caps.hidden < 0.02 * mesh.volume:
-            check_whole(gc.Polyhedron.from_mesh(mesh.vertices, left), 2)
-            closed += 1
-    assert closed >= 3
-
-
 def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open():
     mesh = grid(2)
     gone = around(mesh, [0.05, 0.0, 0.0])
@@ -281,24 +227,6 @@ def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open(
         gc.Polyhedron.from_mesh(mesh.vertices, left)
     assert caught.value.reason is MeshRefusal.OPEN
     assert not gc.Polyhedron.from_mesh(mesh.vertices, left, faces="patches").surface.closed
-
-
-@pytest.mark.parametrize(("count", "dent"), [(6, 1.0), (64, 1.0), (12, 0.4), (90, 0.6)])
-def test_a_plane_border_of_any_shape_is_filled_without_overlap(count, dent):
-    outline = star(count, dent)
-    points, faces = ring(outline, 0.7)
-    caps = caps_of(Mesh(points, faces))
-    whole = np.concatenate([faces, caps.triangles])
-    assert Edges.of(whole).fault() is None
-    assert len(caps.triangles) == count - 2
-    assert caps.widths == pytest.approx([2.0], abs=0.002)
-    area = outline_area(outline)
-    assert Solid(points, whole).volume == pytest.approx(0.7 * area, rel=1e-12)
-    a, b, c = (points[caps.triangles[:, k]] for k in range(3))
-    crosses = np.cross(b - a, c - a)
-    assert (crosses[:, 2] >= 0.0).all()
-    assert 0.5 * np.linalg.norm(crosses, axis=1).sum() == pytest.approx(area)
-    assert caps.hidden == pytest.approx(area * caps.widths[0] / 3.0)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -376,17 +304,3 @@ def test_no_finger_stands_on_a_cap(kind):
     assert len(fingers) == 40
     assert not np.isin(nearest(body, fingers), body.surface.caps).any()
     assert np.isin(nearest(body, contacts(whole)), body.surface.caps).any()
-
-
-def test_a_crack_is_not_counted_as_a_hole_beside_one():
-    mesh = grid(2)
-    a, b, c = mesh.faces[0]
-    points = np.vstack([mesh.vertices, 0.5 * (mesh.vertices[a] + mesh.vertices[b])])
-    middle = len(mesh.vertices)
-    left = np.vstack([mesh.faces[1:-1], [a, middle, c], [middle, b, c]])
-    body = gc.Polyhedron.from_mesh(points, left)
-    assert body.surface.holes == len(body.surface.caps) == 1
-    cap = body.vertices[body.triangles[body.surface.caps[0]]]
-    np.testing.assert_allclose(sorted(cap.tolist()), sorted(mesh.triangles[-1].tolist()))
-    assert body.volume == pytest.approx(0.006, rel=1e-12)
-    assert len(body.notes) == 2

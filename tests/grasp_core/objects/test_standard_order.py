@@ -8,11 +8,9 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.objects.booleans import hull
-from grasp_core.objects.face_pieces import clear_of_edges, shared_quadruples, with_halves
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.standard_order import mirror_image, standard
 from grasp_core.planning.quadruples import FIRST_FACES
-from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from tests.judges import random_rotation
 
@@ -127,61 +125,6 @@ def test_an_object_planned_as_its_mirror_image_is_certified_and_proved_absent_as
     assert proved >= 2
 
 
-def test_standard_order_is_that_of_the_shape():
-    """Areas and mutual angles of faces, in standard order, are those of any copy."""
-    rng = np.random.default_rng(4)
-    for name in (*OBJECTS, "hex-nut", "icosahedron", "random-40-1"):
-        body = scenes.example_object(name)
-        here = standard(body).body
-        for kind in ("turned", "mirrored", "renumbered"):
-            there = standard(moved(body, kind, rng)[0]).body
-            for one, two in zip(here.faces, there.faces, strict=True):
-                assert one.area == pytest.approx(two.area, rel=1e-9)
-                assert len(one.pieces) == len(two.pieces)
-                edges = [np.linalg.norm(np.diff(f.polygon[:2], axis=0)) for f in (one, two)]
-                assert edges[0] == pytest.approx(edges[1], rel=1e-9)
-            np.testing.assert_allclose(
-                here.normals @ here.normals.T, there.normals @ there.normals.T, atol=1e-9
-            )
-
-
-@pytest.mark.parametrize("name", ["box", "l-bracket", "hex-nut", "random-10-1"])
-def test_halves_are_parts_of_their_face_and_stay_apart(name):
-    body = example_object(name)
-    apart = 0.1 * body.radius
-    halved, owners = with_halves(body, apart)
-    rng, tested = np.random.default_rng(0), 0
-    assert owners[: len(body.faces)] == tuple(range(len(body.faces)))
-    pairs = {}
-    for index in range(len(body.faces), len(owners)):
-        pairs.setdefault(owners[index], []).append(halved.faces[index])
-    for owner, halves in pairs.items():
-        points = [
-            np.vstack([rng.dirichlet(np.full(len(p), 0.2), 40) @ p for p in half.pieces])
-            for half in halves
-        ]
-        gaps = np.linalg.norm(points[0][:, None] - points[1][None], axis=2)
-        assert gaps.min() >= apart * (1.0 - 1e-9)
-        for point in np.vstack(points):
-            whole = body.faces[owner]
-            assert any(_holds(piece, point, whole.normal) for piece in whole.pieces)
-        tested += 1
-    assert tested >= 6
-
-
-def _holds(polygon, point, normal):
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    return (np.cross(edges, point - polygon) @ normal >= -1e-12).all()
-
-
-def test_quadruples_have_both_halves_of_a_face_or_of_two_and_no_face_beside_its_halves():
-    found = shared_quadruples((0, 1, 2, 3, 0, 0, 2, 2))
-    assert {tuple(faces) for faces in found.tolist()} == {
-        (1, 2, 4, 5), (1, 3, 4, 5), (2, 3, 4, 5),
-        (0, 1, 6, 7), (0, 3, 6, 7), (1, 3, 6, 7), (4, 5, 6, 7),
-    }  # fmt: skip
-
-
 def test_fingers_on_one_face_hold_and_keep_their_distance():
     body = example_object("box")
     apart = 0.02
@@ -197,15 +140,6 @@ def test_fingers_on_one_face_hold_and_keep_their_distance():
         assert gaps[same & ~np.eye(4, dtype=bool)].min() >= apart * (1.0 - 1e-9)
     assert plan.outcomes.held + plan.outcomes.absent + plan.outcomes.open == 90
     assert plan.counts.quadruples == 90
-
-
-@pytest.mark.parametrize("name", ["prism", "box"])
-def test_grasps_with_both_halves_have_ids_of_their_own_and_survive_a_file(name):
-    body = example_object(name)
-    plan = gc.plan(body, 0.5, families="pencil", share_faces_m=0.005)
-    assert len({grasp.id for grasp in plan.grasps}) == len(plan.grasps) >= 20
-    saved = grasps_from_json(plan_to_json(body, plan))
-    assert [grasp.id for grasp in saved.grasps] == [grasp.id for grasp in plan.grasps]
 
 
 def test_shared_faces_are_tried_after_blocks_that_are_too_small():
@@ -252,24 +186,6 @@ def from_edges(point, face):
         nearest = loop + np.clip(share, 0.0, 1.0)[:, None] * along
         least = min(least, np.linalg.norm(nearest - point, axis=1).min())
     return least
-
-
-@pytest.mark.parametrize("name", ["l-bracket", "hex-nut", "mug", "wedge"])
-def test_pieces_keep_the_margin_from_every_border_and_lose_little_else(name):
-    body, rng = example_object(name), np.random.default_rng(0)
-    margin = 0.03 * body.radius
-    inset, inner, lost = clear_of_edges(body, margin), 0, 0
-    for face, after in zip(body.faces, inset.faces, strict=True):
-        for piece in after.pieces:
-            for point in rng.dirichlet(np.full(len(piece), 0.3), 30) @ piece:
-                assert from_edges(point, face) >= margin * (1.0 - 1e-9)
-                inner += 1
-        for piece in face.pieces:
-            for point in rng.dirichlet(np.ones(len(piece)), 20) @ piece:
-                if from_edges(point, face) > 1.5 * margin:
-                    lost += not any(_holds(part, point, face.normal) for part in after.pieces)
-    assert inner >= 200
-    assert lost == 0
 
 
 def test_planned_contacts_and_regions_keep_the_margin():

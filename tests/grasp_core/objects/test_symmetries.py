@@ -9,8 +9,6 @@ import grasp_core as gc
 import scenes
 from grasp_core.objects.standard_order import SAME_GRASP, Copies, copies_of, symmetries
 from grasp_core.values import Contact, ContactRegion, ForceCone, Witness, four
-from tests.grasp_core.curved import bumpy_ellipsoid
-from tests.grasp_core.long_shapes import shape
 from tests.grasp_core.objects.test_standard_order import isometries
 from tests.judges import random_rotation
 from tests.sim_validate.rigs import grasps
@@ -73,18 +71,6 @@ def test_symmetries_are_found_within_a_tolerance_and_of_any_size(shake, kept):
         other = gc.Polyhedron.from_mesh(size * shaken @ random_rotation(rng).T, body.triangles)
         found = symmetries(other)
         assert (len(found.rotations), len(found.reflections)) == ((60, 60) if kept else (1, 0))
-
-
-def test_a_ringed_rod_of_thousands_of_vertices_has_those_of_its_48_sides():
-    found = symmetries(gc.Polyhedron.from_mesh(*shape("ringed rod")))
-    assert (len(found.rotations), len(found.reflections)) == (96, 96)
-
-
-def test_a_curved_surface_has_only_the_identity():
-    body = gc.Polyhedron.from_mesh(*bumpy_ellipsoid())
-    assert body.patches is not None
-    assert len(symmetries(body).rotations) == 1
-    assert not len(symmetries(body).reflections)
 
 
 @pytest.mark.parametrize(("name", "family"), [("tetrahedron", "concurrent"), ("box", "pencil")])
