@@ -23,18 +23,6 @@ def planned():
     return body, gc.plan(body, FRICTION).grasps
 
 
-def test_late_figures_are_those_of_the_public_functions():
-    body, grasps = planned()
-    for grasp in grasps[::5]:
-        friction = min(gc.critical_friction(grasp), FRICTION)
-        assert grasp.critical_friction == pytest.approx(friction, abs=2e-7)
-        quality = gc.ferrari_canny(
-            grasp, friction=FRICTION, center=body.center_of_mass, torque_scale=body.radius
-        )
-        assert grasp.ferrari_canny == pytest.approx((quality.lower, quality.upper), rel=1e-3)
-    assert len(grasps[::5]) >= 20
-
-
 def test_critical_frictions_found_together_are_those_found_one_by_one(monkeypatch):
     _, grasps = planned()
     alone = [grasp.critical_friction for grasp in grasps]

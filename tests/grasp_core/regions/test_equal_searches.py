@@ -20,10 +20,9 @@ from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.planning.given_contacts import seat
 from grasp_core.quality.wrench_limits import WrenchBody, weakest_from
 from grasp_core.records.grasps_json import ContactSet
-from grasp_core.regions.growth import Grounds, Proved, Sites, larger_inside, search_cover
+from grasp_core.regions.growth import Grounds
 from scenes.example_objects import example_object
 from sim_validate.planning import analyze as analysis
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 SHAKEN = 1e-14
 """In object radii: what another processor makes of a place, generously."""
@@ -65,25 +64,6 @@ def test_regions_do_not_depend_on_last_digits(name, family, more):
         assert found.radius == pytest.approx(own.radius, rel=SAME)
         for one, two in zip(found.regions, own.regions, strict=True):
             np.testing.assert_allclose(one.polygon, two.polygon, atol=SAME * body.radius)
-
-
-@pytest.mark.parametrize("corners", [0, 6])
-def test_covers_of_symmetric_contacts_share_all_bits(corners):
-    """Contacts of a regular tetrahedron, with discs and with regular polygons."""
-    rng = np.random.default_rng(1)
-    turns = 2.0 * np.pi * np.arange(max(corners, 1)) / max(corners, 1)
-    ring = (0.25 if corners else 0.0) * np.column_stack([np.cos(turns), np.sin(turns)])
-    frames = np.array([np.column_stack([n, *tangents(n)]) for n in TETRA_NORMALS])
-    radius = 0.0 if corners else 0.25
-    own = None
-    for _ in range(TRIALS):
-        sites = sites_of(shaken(rng, TETRA_CENTERS), shaken(rng, frames), shaken(rng, ring), radius)
-        found, _ = search_cover(sites, np.eye(6), 5000)
-        local = np.einsum("kij,mki->mkj", sites.frames, found.forces)
-        own = own or (found.codes, local)
-        np.testing.assert_array_equal(found.codes, own[0])
-        np.testing.assert_allclose(local, own[1], rtol=SAME, atol=SAME)
-    assert len(own[0]) > 64
 
 
 @pytest.mark.parametrize("name", ["octahedron", "wedge", "box"])
@@ -139,18 +119,6 @@ def test_a_ceiling_does_not_depend_on_last_digits(monkeypatch):
     monkeypatch.setattr(best_grasp, "grounds_on", shaken_grounds)
     for _ in range(TRIALS):
         assert ceiling().upper == pytest.approx(own.upper, rel=SAME)
-
-
-def test_discs_as_large_are_those_named_first():
-    body, grasp = planned("box", "concurrent")
-    pieces = pieces_under(body, grasp)
-    grounds = Grounds(pieces, np.full(4, 0.5), 64)
-    sizes = 0.1, 0.1 + SHAKEN, 0.1 - SHAKEN
-    first, larger, smaller = (Proved(np.zeros((4, 2)), r, None, None) for r in sizes)
-    assert larger_inside(grounds, first, larger) is first
-    assert larger_inside(grounds, first, smaller) is first
-    clearly = replace(first, radius=0.11)
-    assert larger_inside(grounds, first, clearly) is clearly
 
 
 def test_discs_that_touch_an_edge_are_cut():
@@ -250,20 +218,3 @@ def toward(piece):
     """The outward normal of the edge nearest to the middle of a piece."""
     middle = piece.corners.mean(axis=0)
     return piece.E[int((piece.b - piece.E @ middle).argmin())]
-
-
-def tangents(normal):
-    aside = np.cross(normal, [0.3, 0.5, 0.8])
-    aside /= np.linalg.norm(aside)
-    return aside, np.cross(normal, aside)
-
-
-def sites_of(points, frames, ring, radius):
-    return Sites(
-        points,
-        np.ascontiguousarray(frames),
-        np.full(4, 0.5),
-        np.array([ring] * 4),
-        np.full(4, radius),
-        np.zeros(4),
-    )

@@ -274,41 +274,6 @@ def test_new_ids_name_the_new_faces_and_are_unique():
     assert [grasp.id for grasp in twice] == [grasps[0].id, f"{grasps[0].id}-2"]
 
 
-def test_moving_both_parts_moves_what_is_carried(box):
-    body, grasps = box
-    turn = trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0])[:3, :3]
-    shift = np.array([0.3, -0.2, 0.1])
-
-    def moved(part):
-        return gc.Polyhedron.from_mesh(part.vertices @ turn.T + shift, part.triangles,
-                                       faces="planar")  # fmt: skip
-
-    at = grasps[0].positions[0] + [0.0, 3e-4, 5e-4]  # so that one point of the rim is nearest
-    new = with_hole(with_face_moved(body, 3, 1e-3), grasps[0].faces[0], at, 2e-3, 3e-3)
-    here = gc.transfer(body, new, grasps, FRICTION)
-    there_grasps = [
-        dataclasses.replace(
-            grasp, contacts=tuple(gc.Contact(turn @ c.position + shift, turn @ c.normal)
-                                  for c in grasp.contacts),
-            faces=tuple(face_at(moved(body), turn @ c.position + shift, turn @ c.normal)
-                        for c in grasp.contacts),
-        )
-        for grasp in grasps
-    ]  # fmt: skip
-    there = gc.transfer(moved(body), moved(new), there_grasps, FRICTION)
-    assert [e.status for e in here.grasps] == [e.status for e in there.grasps]
-    for one, other in zip(here.grasps, there.grasps, strict=True):
-        for a, b in zip(one.contacts, other.contacts, strict=True):
-            np.testing.assert_allclose(turn @ a.contact.position + shift, b.contact.position,
-                                       atol=1e-10)  # fmt: skip
-
-
-def face_at(body, point, normal):
-    at = [abs(float(face.normal @ (point - face.centroid))) < 1e-9 and face.normal @ normal > 0.99
-          for face in body.faces]  # fmt: skip
-    return at.index(True)
-
-
 def test_fingers_that_cannot_reach_a_carried_contact_are_named():
     """A finger as thick as the bracket's notch is wide cannot come to the faces of the notch."""
     body, finger = example_object("l-bracket"), gc.Finger(0.003, 0.03)
