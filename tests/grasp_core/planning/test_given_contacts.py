@@ -11,7 +11,7 @@ from grasp_core.objects.on_faces import check_on_faces, face_under, nearest_on_s
 from grasp_core.planning.given_contacts import LARGEST_LEAN, LARGEST_MOVE, grasp_of, seat
 from scenes.example_objects import example_object
 
-NAMES = ("tetrahedron", "wedge", "l-bracket", "hex-nut", "mug")
+NAMES = ("l-bracket", "mug")
 
 
 def random_contacts(body, rng, count):
@@ -63,7 +63,7 @@ def test_a_curved_surface_is_judged_everywhere():
     corners = body.vertices[body.triangles]
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    for _ in range(25):
+    for _ in range(8):
         chosen = rng.integers(len(corners), size=4)
         shares = rng.dirichlet(np.ones(3), size=4)
         points = np.einsum("ki,kij->kj", shares, corners[chosen])

@@ -21,7 +21,7 @@ def planned(body):
     return tables.PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
 
 
-@pytest.mark.parametrize("name", ["random-40-1", "l-bracket", "tetrahedron"])
+@pytest.mark.parametrize("name", ["random-30-1", "l-bracket"])
 def test_blocks_hold_every_quadruple_with_room_once(name):
     cones = planned(example_object(name))
     roomy = np.flatnonzero(cones.rooms > 0.0)

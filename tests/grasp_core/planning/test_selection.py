@@ -52,6 +52,7 @@ def test_the_best_of_all_are_kept_in_order(body, everything, rank_by, measure):
     assert len(everything) > 40
 
 
+@pytest.mark.slow
 def test_the_strongest_of_all_are_kept_in_order(payloads, strongest):
     """Payloads are searched to a gap of 1e-4, and equal ones keep an order of their own."""
     values = [payloads[grasp.id] for grasp in strongest]
