@@ -18,7 +18,7 @@ ROUNDING = 1e-9
 """Relative to the object, of heights and of lines through the edges between triangles."""
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.002])
+@pytest.mark.parametrize("noise", [0.002, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_over_each_point_of_a_patch_is_one_point_of_the_surface_as_near_as_it_says(noise):
     rng = np.random.default_rng(3)
     body = curved_body(noise=noise)
@@ -29,7 +29,7 @@ def test_over_each_point_of_a_patch_is_one_point_of_the_surface_as_near_as_it_sa
 def test_patches_keep_the_limits_and_come_largest_first():
     vertices, triangles = bumpy_ellipsoid(noise=0.001)
     extent = np.ptp(vertices, axis=0).max()
-    for limits in (gc.PatchLimits(8.0, 0.02, 12), gc.PatchLimits(25.0, 0.004, 30)):
+    for limits in (gc.PatchLimits(8.0, 0.02, 12), gc.PatchLimits(25.0, 0.004, 8)):
         found = flat_patches(Mesh(vertices, triangles), limits)
         assert 4 <= len(found) <= limits.most
         assert max(face.spread for face in found) <= math.radians(limits.spread_deg) + ROUNDING
@@ -58,6 +58,7 @@ def test_a_patch_of_one_large_triangle_keeps_the_limits_too():
     assert max(face.depth for face in found) <= limits.depth * 0.1
 
 
+@pytest.mark.slow
 def test_no_patch_spans_a_hole_in_the_surface():
     vertices, triangles = bumpy_ellipsoid()
     middles = vertices[triangles].mean(axis=1)
@@ -96,15 +97,7 @@ def test_an_open_mesh_is_refused_where_planar_faces_are_asked_for():
     assert refused.value.reason is MeshRefusal.OPEN
 
 
-def test_a_closed_scan_that_is_inside_out_is_turned():
-    vertices, triangles = bumpy_ellipsoid()
-    one, two = (gc.Polyhedron.from_mesh(vertices, t) for t in (triangles, triangles[:, ::-1]))
-    assert "inside out" in " ".join(two.notes)
-    assert one.volume == pytest.approx(two.volume)
-    for face in two.faces:
-        assert face.normal @ (face.centroid - two.center_of_mass) < 0.0
-
-
+@pytest.mark.slow
 def test_a_coarse_torus_whose_triangles_meet_regions_in_their_corners_is_planned():
     ring = trimesh.creation.torus(0.04, 0.012, 24, 12)
     limits = gc.PatchLimits(20.0, 0.02, 10)
@@ -163,7 +156,7 @@ def enters(polygon, segment):
 @pytest.mark.parametrize("stretch", [1.0, 6.0, 1e2, 1e4])
 def test_no_segment_enters_a_clearing_however_far_apart_its_teeth(stretch):
     rng = np.random.default_rng(1)
-    for _ in range(30):
+    for _ in range(10):
         segments = fence(rng, stretch=stretch)
         start, room = clearest_point(rng.uniform(-0.3, 0.3, (50, 2)), segments)
         polygon = clearing(start, segments, GAP)

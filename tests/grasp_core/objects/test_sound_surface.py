@@ -15,7 +15,7 @@ from grasp_core.objects.surface import Edges, Mesh
 from tests.bad_input import mesh_texts
 
 TURN = trimesh.transformations.rotation_matrix(0.7, [3.0, 1.0, 2.0])[:3, :3]
-OFFSETS = [0.0, 0.1, 0.3, 2.0]
+OFFSETS = [0.0, 2.0]
 SLANT = np.array([1.0, -0.4, 0.7]) / np.linalg.norm([1.0, -0.4, 0.7])
 
 
@@ -134,7 +134,7 @@ def test_vertices_that_rounding_moved_apart_are_joined():
     assert caught.value.reason in {MeshRefusal.OPEN, MeshRefusal.SEPARATE}
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0])
 def test_a_solid_wound_at_random_has_the_faces_of_the_clean_one(seed):
     mesh = prism()
     clean = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces)
@@ -194,7 +194,7 @@ def check_whole(body, missing):
     return lost
 
 
-@pytest.mark.parametrize("gone", range(0, 192, 31))
+@pytest.mark.parametrize("gone", [0, 93])
 def test_one_missing_triangle_does_not_change_volume_centre_and_moments(gone):
     mesh = grid(2)
     body = gc.Polyhedron.from_mesh(mesh.vertices, np.delete(mesh.faces, gone, axis=0))
@@ -209,15 +209,6 @@ def test_one_missing_triangle_does_not_change_volume_centre_and_moments(gone):
     assert "no finger is placed there" in note
 
 
-def test_a_hole_of_many_corners_is_closed():
-    mesh = grid(3)
-    gone = around(mesh, [0.05, 0.0, 0.0])
-    assert len(gone) >= 6
-    body = gc.Polyhedron.from_mesh(mesh.vertices, np.delete(mesh.faces, gone, axis=0))
-    check_whole(body, len(gone) - 2)
-    assert body.surface.holes == 1
-
-
 def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open():
     mesh = grid(2)
     gone = around(mesh, [0.05, 0.0, 0.0])
@@ -229,7 +220,7 @@ def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open(
     assert not gc.Polyhedron.from_mesh(mesh.vertices, left, faces="patches").surface.closed
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(2))
 def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
     rng = np.random.default_rng(seed)
     mesh = trimesh.creation.icosphere(subdivisions=3)
@@ -291,7 +282,7 @@ def contacts(body):
     return np.concatenate([grasp.positions for grasp in grasps])
 
 
-@pytest.mark.parametrize("kind", ["planar", "patches"])
+@pytest.mark.parametrize("kind", ["planar", pytest.param("patches", marks=pytest.mark.slow)])
 def test_no_finger_stands_on_a_cap(kind):
     """Triangles are missing just where the best grasps of the whole body have their fingers."""
     mesh = grid(3) if kind == "planar" else trimesh.creation.icosphere(subdivisions=3, radius=0.05)

@@ -7,14 +7,11 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.objects.booleans import hull
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.standard_order import mirror_image, standard
-from grasp_core.planning.quadruples import FIRST_FACES
 from scenes.example_objects import example_object
 from tests.judges import random_rotation
 
-OBJECTS = ("wedge", "box", "octahedron", "l-bracket", "hexagonal-pyramid", "random-10-3")
 SAME = 1e-7
 """Object radii."""
 
@@ -72,7 +69,9 @@ def same_grasps(some, others):
 
 
 @pytest.mark.parametrize("kind", ["turned", "mirrored", "renumbered"])
-@pytest.mark.parametrize("name", ["wedge", "hexagonal-pyramid"])
+@pytest.mark.parametrize(
+    "name", ["wedge", pytest.param("hexagonal-pyramid", marks=pytest.mark.slow)]
+)
 def test_an_object_from_another_file_has_the_same_grasps_up_to_that_motion(name, kind):
     """And up to the object's symmetries, as it may have been taken for its image under one."""
     body = scenes.example_object(name)
@@ -106,7 +105,7 @@ def test_fingers_are_listed_by_the_faces_of_the_object_as_it_was_given():
 
 def test_an_object_planned_as_its_mirror_image_is_certified_and_proved_absent_as_it_is():
     seen, proved = set(), 0
-    for name in OBJECTS[:2]:
+    for name in ("wedge", "box"):
         for body in (scenes.example_object(name), mirror_image(scenes.example_object(name))):
             seen.add(standard(body).mirrored)
             grasps = gc.plan(body, 0.3, limit=20).grasps
@@ -142,23 +141,7 @@ def test_fingers_on_one_face_hold_and_keep_their_distance():
     assert plan.counts.quadruples == 90
 
 
-def test_shared_faces_are_tried_after_blocks_that_are_too_small():
-    """A box with many narrow faces: the first grasps of two fingers on a wide one are larger."""
-    body = bevelled(example_object("box"))
-    assert len(body.faces) > FIRST_FACES  # a second block comes before the shared faces
-    plan = gc.plan(body, 0.5, families="concurrent", limit=25, share_faces_m=0.004)
-    assert any(len(set(grasp.faces)) < 4 for grasp in plan.grasps)
-
-
-def bevelled(body, radius=0.004):
-    """A box with edges rounded by two strips each, and corners by small triangles."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    centers = signs * (0.5 * np.ptp(body.vertices, axis=0) - radius)
-    ways = np.vstack([np.eye(3), (1.0 - np.eye(3)) / np.sqrt(2.0), np.full((1, 3), 3.0**-0.5)])
-    solid = hull((centers[:, None] + radius * signs[:, None] * ways).reshape(-1, 3))
-    return gc.Polyhedron.from_mesh(solid.vertices, solid.triangles, name="bevelled")
-
-
+@pytest.mark.slow
 def test_absence_is_proved_for_whole_faces_not_for_their_halves():
     """Random contacts on the whole faces of quadruples that are called absent never close."""
     body, rng, tested = example_object("wedge"), np.random.default_rng(0), 0
@@ -191,14 +174,14 @@ def from_edges(point, face):
 def test_planned_contacts_and_regions_keep_the_margin():
     body = example_object("l-bracket")
     margin, tested = 0.05 * body.radius, 0
-    plan = gc.plan(body, 0.5, edge_clearance_m=margin)
+    plan = gc.plan(body, 0.5, edge_clearance_m=margin, families="concurrent")
     for grasp in plan.grasps:
         for face, contact, region in zip(grasp.faces, grasp.contacts, grasp.regions, strict=True):
             for point in (contact.position, *region.polygon):
                 assert from_edges(point, body.faces[face]) >= margin * (1.0 - 1e-6)
                 tested += 1
-    assert tested >= 500
-    assert len(plan.grasps) >= 40
+    assert tested >= 200
+    assert len(plan.grasps) >= 10
 
 
 def test_a_margin_wider_than_all_faces_leaves_nothing():

@@ -121,15 +121,3 @@ def test_other_families_cones_and_foci_make_other_grasps():
     )
     for other in others:
         assert len(copies_of(body, [grasp, other])) == 2
-
-
-def test_every_grasp_is_in_one_class():
-    body, planned = grasps("octahedron", 0.5, 30, ("concurrent", "pencil", "regulus"), "tilted")
-    classes = copies_of(body, planned)
-    assert len(classes) < len(planned)
-    assert sorted(place for each in classes for place in each.places) == list(range(len(planned)))
-    for each in classes:
-        quality = [planned[place].ferrari_canny[1] for place in each.places]
-        friction = [planned[place].critical_friction for place in each.places]
-        np.testing.assert_allclose(quality, quality[0], atol=1e-2)
-        np.testing.assert_allclose(friction, friction[0], atol=1e-2)

@@ -39,7 +39,7 @@ def perturbed(seed):
     return (TETRA_NORMALS + 0.1 * rng.normal(size=(4, 3))) @ turn.T, normals @ turn.T
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_cover_that_is_found_passes_its_check(seed):
     sites = sites_around(*perturbed(seed), radius=0.1, depth=0.02)
     cover, _ = search.search_cover(sites, np.eye(6), CONES)
@@ -50,7 +50,7 @@ def test_a_cover_that_is_found_passes_its_check(seed):
     assert not cover.verify(larger, sites.frames[:, :, 0], sites.friction)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_an_open_choice_is_open_and_in_the_sites(seed):
     points, normals = perturbed(seed)
     sites = sites_around(points, normals, radius=0.5)

@@ -12,7 +12,7 @@ import scenes
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import EDGES, LEAF, TwistCover
 
-SMALL = 3_000
+SMALL = 1_000
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def cones_of(cover):
     return np.concatenate([rays for _, rays in cover.leaves()])
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_every_twist_is_in_a_cone_and_inside_of_one_only(seed):
     """In coordinates of the axes: a twist is a sum of rays with weights that are not negative."""
     rng = np.random.default_rng(seed)
@@ -78,7 +78,7 @@ def test_a_cover_holds_in_rational_arithmetic():
     """Every number as the fraction that it is: nothing is rounded, nothing allowed for."""
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps
-    small = certify_regions(body, grasp, 0.5, max_cones=300)
+    small = certify_regions(body, grasp, 0.5, max_cones=100)
     cover, mu = small.cover, fractions(small.friction)
     axes, normals = fractions(cover.axes), fractions(small.normals)
     origin, scale = fractions(small.origin), Fraction(small.scale)
