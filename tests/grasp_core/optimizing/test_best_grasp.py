@@ -249,7 +249,7 @@ def test_a_search_of_too_many_nodes_ends_with_a_proved_bound(monkeypatch):
 
 
 def test_a_time_limit_ends_the_search_with_a_proved_bound():
-    found = gc.best_grasp(example_object("octahedron"), FRICTION, gap=0.001, time_limit_s=0.0)
+    found = gc.best_grasp(example_object("tetrahedron"), FRICTION, gap=0.001, time_limit_s=0.0)
     assert found.ended == "time"
     assert found.gap > 0.001
     assert found.verify()
