@@ -90,13 +90,6 @@ def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherw
     assert {face.spread for face in exact.faces} == {0.0}
 
 
-def test_an_open_mesh_is_refused_where_planar_faces_are_asked_for():
-    vertices, triangles = bumpy_ellipsoid(subdivisions=2)
-    with pytest.raises(gc.MeshError) as refused:
-        gc.Polyhedron.from_mesh(vertices, triangles[:-60], faces="planar")
-    assert refused.value.reason is MeshRefusal.OPEN
-
-
 @pytest.mark.slow
 def test_a_coarse_torus_whose_triangles_meet_regions_in_their_corners_is_planned():
     ring = trimesh.creation.torus(0.04, 0.012, 24, 12)

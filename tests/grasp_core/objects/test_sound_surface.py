@@ -235,18 +235,6 @@ def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
         assert abs(abs(Solid(mesh.vertices, whole).volume) - mesh.volume) <= caps.hidden
 
 
-def test_edges_of_three_triangles_are_not_closed():
-    mesh = grid(1)
-    edge = mesh.faces[0][:2]
-    points = np.vstack([mesh.vertices, [0.3, 0.3, 0.3]])
-    fin = [*edge, len(mesh.vertices)]
-    for added in (fin, fin[::-1]):
-        assert caps_of(Mesh(points, np.vstack([mesh.faces, added]))) is None
-        with pytest.raises(gc.MeshError) as caught:
-            gc.Polyhedron.from_mesh(points, np.vstack([mesh.faces, added]), faces="planar")
-        assert caught.value.reason in {MeshRefusal.OPEN, MeshRefusal.NON_MANIFOLD}
-
-
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-8])
 def test_a_vertex_on_the_edge_of_a_neighbour_costs_no_face_a_place(off):
     mesh = trimesh.creation.box(SIZE)

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.objects.standard_order import SAME_GRASP, Copies, copies_of, symmetries
+from grasp_core.objects.standard_order import SAME_GRASP, copies_of, symmetries
 from grasp_core.values import Contact, ContactRegion, ForceCone, Witness, four
 from tests.grasp_core.objects.test_standard_order import isometries
 from tests.judges import random_rotation
@@ -84,19 +84,6 @@ def test_images_are_copies_and_mirror_images_are_named_apart(name, family):
     assert copies.first == 0
     assert set(range(1, 1 + len(turned))) <= set(copies.rotated)
     assert copies.places == tuple(range(1 + len(turned) + len(mirrored)))
-
-
-def test_what_only_a_reflection_makes_is_called_mirrored():
-    body = scenes.example_object("l-bracket")
-    found = symmetries(body)
-    grasp = gc.plan(body, 0.5, limit=20).grasps
-    crooked = [
-        each for each in grasp
-        if len(copies_of(body, [each, moved(body, each, found.reflections[0])])[0].mirrored)
-    ]  # fmt: skip
-    assert crooked
-    image = moved(body, crooked[0], found.reflections[0])
-    assert copies_of(body, [crooked[0], image]) == (Copies(0, (), (1,)),)
 
 
 @pytest.mark.parametrize(("off", "same"), [(0.5 * SAME_GRASP, True), (2.0 * SAME_GRASP, False)])

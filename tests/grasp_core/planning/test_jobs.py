@@ -11,7 +11,6 @@ import pytest
 import grasp_core as gc
 from grasp_core.planning import plan_search
 from grasp_core.planning.plan_search import PlanSearch
-from grasp_core.planning.result import PlanRequest
 from grasp_core.processes import receive, send, unpacked
 from scenes.example_objects import example_object
 from tests.patience import HANGING_S
@@ -89,16 +88,6 @@ def test_an_error_of_a_part_reaches_the_caller_with_its_own_type(monkeypatch):
     monkeypatch.setattr(PlanSearch, "found_at_once", fails)
     with pytest.raises(gc.SolverError, match="no answer on"):
         gc.plan(example_object("random-14-7"), jobs=2)
-
-
-def test_few_quadruples_and_searches_that_end_early_start_no_process():
-    request = PlanRequest(0.5, ("pencil",))
-    assert plan_search.worth_starting(example_object("box"), request, 8) == 0
-    large = example_object("random-24-1")
-    limited = PlanRequest(0.5, ("pencil",), limit=5)
-    assert plan_search.worth_starting(large, limited, 8) == 0
-    assert plan_search.worth_starting(large, request, 1) == 0
-    assert plan_search.worth_starting(large, request, 8) <= 2
 
 
 INTERRUPTED = """

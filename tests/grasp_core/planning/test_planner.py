@@ -1,8 +1,8 @@
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
+import trimesh
 
 import grasp_core as gc
 from grasp_core.families.placements import LEAST_RADIUS
@@ -118,6 +118,12 @@ def test_progress_is_reported_as_quadruples_are_tried():
     assert len(seen) >= 13
 
 
+def test_an_object_with_too_many_faces_is_refused_at_once():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    with pytest.raises(gc.InputError, match="over the limit of 1000"):
+        gc.plan(gc.Polyhedron.from_mesh(ball.vertices, ball.faces, faces="planar"), limit=4)
+
+
 def test_more_than_200_faces_need_simpler_plans():
     body = sphere_hull(240)
     for options in ({}, {"limit": 4}, {"families": FAMILIES}):
@@ -177,19 +183,6 @@ def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
             assert counts.rejected == 0
 
 
-def test_what_less_friction_holds_more_friction_holds():
-    tested = 0
-    plans = [
-        gc.plan(example_object("box"), friction, families=METHODS, cones="tilted")
-        for friction in (0.1, 0.3, 0.7)
-    ]
-    for pair in pairwise(plans):
-        held = [{tuple(sorted(g.faces)) for g in plan.grasps} for plan in pair]
-        assert held[0] <= held[1]
-        tested += len(held[0])
-    assert tested >= 25
-
-
 def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():
     """Long faces on which whole patches balance though no contacts do, or only few."""
     body = example_object("double-wedge-bar")
@@ -204,14 +197,6 @@ def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():
     }
     assert settled == set(quick.undecided)
     assert all(proof.verify() for faces in settled for proof in complete.absences.get(faces, ()))
-
-
-@pytest.mark.parametrize("name", ["box", "hex-nut"])
-def test_objects_without_spanning_quadruples_say_why(name):
-    found = gc.plan(example_object(name), 0.5, families=FAMILIES, cones="normal")
-    assert not found.grasps
-    assert found.counts.spanning == 0
-    assert "positively spanning" in found.absence
 
 
 def test_every_family_is_planned_and_every_witness_is_of_its_family():
