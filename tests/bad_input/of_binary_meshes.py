@@ -2,13 +2,10 @@
 
 import json
 import struct
-from functools import partial
-from pathlib import Path
 
-from tests.bad_input.cases import Case, file_case
+from tests.bad_input.cases import read, refused
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
 
-GROUP = "binary meshes"
 NAN = struct.pack("<f", float("nan"))
 HUGE = struct.pack("<I", 4_000_000_000)
 STL, STL_TEXT = stl(), stl_text()
@@ -188,22 +185,10 @@ GOODS = {
     "textures.glb": changed("images", [{"uri": "../../etc/passwd"}]),
     "materials.glb": changed("extensionsUsed", ["KHR_materials_unlit"]),
 }
-
-
-def _good(name: str, data: bytes, folder: Path) -> list[str]:
-    (folder / name).write_bytes(data)
-    return ["inspect", name]
-
-
-def cases() -> list[Case]:
-    """All of the group, with files beside them that must be read."""
-    tables = {"stl": STLS, "ply": PLYS, "off": OFFS, "glb": GLBS}
-    found = [
-        file_case(GROUP, f"{kind}: {name}", f"part.{kind}", *said)
-        for kind, table in tables.items()
-        for name, said in table.items()
-    ]
-    found += [
-        Case(GROUP, f"read: {n}", partial(_good, n, data), 0, ()) for n, data in GOODS.items()
-    ]
-    return found
+TABLES = {"stl": STLS, "ply": PLYS, "off": OFFS, "glb": GLBS}
+CASES = [
+    refused(f"{kind}: {name}", f"part.{kind}", *said)
+    for kind, table in TABLES.items()
+    for name, said in table.items()
+]
+CASES += [read(name, data) for name, data in GOODS.items()]

@@ -1,13 +1,11 @@
 """Group 7: settings and data that are no such files, of another kind, or of the future."""
 
 import json
-from functools import partial
-from pathlib import Path
+from dataclasses import replace
 
-from tests.bad_input.cases import Case, file_case
-from tests.bad_input.good_files import good, reading, with_value, without
+from tests.bad_input.cases import Case, refused
+from tests.bad_input.good_files import changed, good
 
-GROUP = "data files"
 DEEP = "[" * 100_000
 TEXTS = {
     "no JSON": ("{", "JSON"),
@@ -19,12 +17,12 @@ TEXTS = {
 }
 READERS = {
     "grasps.json": "validate", "contacts.json": "analyze", "a.baseline.json": "baseline check",
-    "verdicts.json": "replay", "task.json": "validate {grasps} --wrenches FILE",
+    "verdicts.json": "replay", "task.json": "validate good.json --wrenches FILE",
 }  # fmt: skip
 TOMLS = {
     "flags.toml": "plan box --config FILE",
-    "setup.toml": "validate {grasps} --setup FILE",
-    "physics.toml": "execute {grasps} --setup FILE",
+    "setup.toml": "validate good.json --setup FILE",
+    "physics.toml": "execute good.json --setup FILE",
     "dataset.toml": "dataset build FILE --out made",
 }
 TOML_TEXTS = {
@@ -40,19 +38,19 @@ VALUES_OF_FLAGS = {"friction", "colour"}
 GRASPS, BASELINE = good("grasps.json"), good("a.baseline.json")
 SPOILT = {
     "grasps.json": {
-        "of the future": with_value(GRASPS, "schema", 99) + "|newer",
-        "of schema 0": with_value(GRASPS, "schema", 0) + "|schema",
-        "with an id of a path": with_value(GRASPS, "grasps.0.id", "../../x") + "|id",
-        "with an id of codes": with_value(GRASPS, "grasps.0.id", "\x1b[2J") + "|id",
-        "with a long id": with_value(GRASPS, "grasps.0.id", "x" * 10**5) + "|id",
+        "of the future": changed(GRASPS, "schema", 99) + "|newer",
+        "of schema 0": changed(GRASPS, "schema", 0) + "|schema",
+        "with an id of a path": changed(GRASPS, "grasps.0.id", "../../x") + "|id",
+        "with an id of codes": changed(GRASPS, "grasps.0.id", "\x1b[2J") + "|id",
+        "with a long id": changed(GRASPS, "grasps.0.id", "x" * 10**5) + "|id",
         "with a grasp twice": json.dumps(
             (lambda d: {**d, "grasps": d["grasps"] * 2})(json.loads(GRASPS))
         ) + "|same id",
     },
     "a.baseline.json": {
-        "of the future": with_value(BASELINE, "schema", 99) + "|newer",
-        "with no grasps": without(BASELINE, "grasps") + "|grasps",
-        "with a path that climbs": with_value(BASELINE, "grasps", "../../etc/passwd") + "|grasps",
+        "of the future": changed(BASELINE, "schema", 99) + "|newer",
+        "with no grasps": changed(BASELINE, "grasps") + "|grasps",
+        "with a path that climbs": changed(BASELINE, "grasps", "../../etc/passwd") + "|grasps",
     },
     "contacts.json": {
         "one contact": '{"contacts": [{"position_m": [0,0,0], "normal": [0,0,1]}]}|contacts',
@@ -82,33 +80,24 @@ def _text(said: str, file: str) -> str | bytes:
     return said
 
 
-def _make(file: str, command: str, text: str | bytes, folder: Path) -> list[str]:
-    (folder / file).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return reading(file, command, folder)
-
-
 def _of_text(file: str, command: str, name: str, text: str | bytes, says: str) -> Case:
-    words = () if says in VALUES_OF_FLAGS and file == "flags.toml" else (file,)
-    code = 4 if words else 2
-    make = partial(_make, file, command, text)
-    return Case(GROUP, f"{file}: {name}", make, code, (*words, *filter(None, [says])))
+    case = refused(f"{file}: {name}", file, text, says, command)
+    of_flag = says in VALUES_OF_FLAGS and file == "flags.toml"
+    return replace(case, says=says, code=2) if of_flag else case
 
 
-def cases() -> list[Case]:
-    """All of the group."""
-    found = [
-        _of_text(file, command, name, _text(text, file), says)
-        for file, command in READERS.items()
-        for name, (text, says) in TEXTS.items()
-    ]
-    found += [
-        _of_text(file, command, name, text, says)
-        for file, command in TOMLS.items()
-        for name, (text, says) in TOML_TEXTS.items()
-    ]
-    for file, table in SPOILT.items():
-        for name, both in table.items():
-            text, _, says = both.rpartition("|")
-            name = f"{file} {name}"
-            found.append(file_case(GROUP, name, file, text, says, command=READERS[file]))
-    return found
+CASES = [
+    _of_text(file, command, name, _text(text, file), says)
+    for file, command in READERS.items()
+    for name, (text, says) in TEXTS.items()
+]
+CASES += [
+    _of_text(file, command, name, text, says)
+    for file, command in TOMLS.items()
+    for name, (text, says) in TOML_TEXTS.items()
+]
+CASES += [
+    refused(f"{file} {name}", file, *both.rsplit("|", 1), READERS[file])
+    for file, table in SPOILT.items()
+    for name, both in table.items()
+]

@@ -3,14 +3,11 @@
 import io
 import os
 import zipfile
-from functools import partial
 from pathlib import Path
 
-from tests.bad_input.cases import Case, file_case
-from tests.bad_input.good_files import reading
+from tests.bad_input.cases import Case, refused
 from tests.bad_input.mesh_texts import obj, off, ply, stl_text
 
-GROUP = "files"
 READERS = {
     "inspect": ("part.obj", "inspect FILE"),
     "plan": ("part.stl", "plan FILE"),
@@ -18,8 +15,8 @@ READERS = {
     "scene": ("grasps.json", "scene FILE"),
     "export": ("grasps.json", "export FILE --to gltf --out made.glb"),
     "analyze": ("contacts.json", "analyze FILE"),
-    "wrenches": ("task.json", "validate {grasps} --wrenches FILE"),
-    "setup": ("setup.toml", "validate {grasps} --setup FILE"),
+    "wrenches": ("task.json", "validate good.json --wrenches FILE"),
+    "setup": ("setup.toml", "validate good.json --setup FILE"),
     "config": ("flags.toml", "plan box --config FILE"),
     "replay": ("grasps.json", "replay FILE --out made"),
     "baseline": ("baseline.json", "baseline check FILE"),
@@ -39,16 +36,6 @@ KINDS = {
     "of all bytes": lambda path: path.write_bytes(bytes(range(256)) * 4),
     "in UTF-16": lambda path: path.write_text('{"a": 1}\n', encoding="utf-16"),
 }
-
-
-def _read(command: str, file: str, spoil, folder: Path) -> list[str]:
-    spoil(folder / file)
-    return reading(file, command, folder)
-
-
-def _named(name: str, folder: Path) -> list[str]:
-    (folder / name).write_text("v 0 0 0\n")
-    return ["inspect", name]
 
 
 NAMES = {
@@ -91,40 +78,25 @@ OTHERS = {
     "a GLB called obj": ("part.obj", b"glTF\x02\0\0\0" + bytes(99), "GLB|rename"),
     "one byte": ("part.stl", b"s", "STL|export"),
     "65 MB": ("part.stl", bytes(65 * 2**20), "over|bytes|simplify"),
-    "a kilobyte over a limit": ("part.obj", obj() + "#" * 2000, "1024|simplify"),
 }
 
 
 ALL_LEFT_OUT = {(file, "without a byte") for file in ("config", "setup")}
-
-
-def _yaml(folder: Path) -> list[str]:
-    (folder / "grasps.yaml").write_text("a: !!python/object/apply:os.system ['touch owned']\n")
-    return [
-        "dataset",
-        "import",
-        "grasps.yaml",
-        "tetrahedron",
-        "--frictions",
-        "0.5",
-        "--out",
-        "made",
-    ]
-
-
-def cases() -> list[Case]:
-    """All of the group."""
-    found = [
-        Case(GROUP, f"{reader}: a file {name}", partial(_read, command, file, spoil),
-             *((0, ()) if (reader, name) in ALL_LEFT_OUT else (4, (file,))))
-        for reader, (file, command) in READERS.items()
-        for name, spoil in KINDS.items()
-    ]  # fmt: skip
-    found += [
-        Case(GROUP, f"a name {name}", partial(_named, word), 2 if word.startswith("-") else 4, ())
-        for name, word in NAMES.items()
-    ]
-    for name, (file, data, says) in OTHERS.items():
-        command = "inspect --max-mesh-bytes 1024" if "kilobyte" in name else "inspect"
-        found.append(file_case(GROUP, name, file, data, says, command=command))
-    return [*found, Case(GROUP, "YAML that runs", _yaml, 4, ("grasps.yaml",))]
+CASES = [
+    Case(f"{reader}: a file {name}", command.replace("FILE", file), "", 0, {file: spoil})
+    if (reader, name) in ALL_LEFT_OUT
+    else refused(f"{reader}: a file {name}", file, spoil, command=command)
+    for reader, (file, command) in READERS.items()
+    for name, spoil in KINDS.items()
+]
+CASES += [
+    Case(f"a name {name}", ["inspect", word], "", 2 if word.startswith("-") else 4, {word: "v 0 0"})
+    for name, word in NAMES.items()
+]
+CASES += [refused(name, *said) for name, said in OTHERS.items()]
+CASES += [
+    refused("a kilobyte over a limit", "part.obj", obj() + "#" * 2000, "1024|simplify",
+            "inspect --max-mesh-bytes 1024"),
+    refused("YAML that runs", "grasps.yaml", "a: !!python/object/apply:os.system ['touch owned']",
+            command="dataset import FILE tetrahedron --frictions 0.5 --out made"),
+]  # fmt: skip

@@ -1,12 +1,8 @@
 """Group 2: OBJ texts that a lenient reader takes for something else."""
 
-from functools import partial
-from pathlib import Path
+from tests.bad_input.cases import read, refused
+from tests.bad_input.mesh_texts import CORNERS, obj
 
-from tests.bad_input.cases import Case, file_case
-from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, obj
-
-GROUP = "OBJ"
 GOOD = obj()
 
 
@@ -20,7 +16,6 @@ DENT = [(0, 0, 0), (0.1, 0, 0), (0.1, 0.1, 0), (0.05, 0.02, 0), (0, 0.1, 0)]
 BAD = {
     "nan": (_with(X, "v nan 0 0"), "finite|repair"),
     "inf": (_with(X, "v inf 0 0"), "finite|repair"),
-    "-Infinity": (_with(X, "v -Infinity 0 0"), "finite"),
     "1e400": (_with(X, "v 1e400 0 0"), "finite"),
     "1e300": (_with(X, "v 1e300 0 0"), "GP-MESH-SIZE|unit"),
     "1e-300 everywhere": (GOOD.replace("0.1", "1e-300"), "GP-MESH-SIZE|unit"),
@@ -44,20 +39,16 @@ BAD = {
     "a curved surface": (GOOD + "cstype bezier\nsurf 0 1 0 1 1 2 3\n", "cstype|polygons"),
     "an unknown word": (GOOD + "extrude 1\n", "extrude"),
     "a comment that may go on": ("# in C:\\\n" + GOOD, "comment"),
-    "a million digits and no number": (GOOD + "v " + "1" * 10**6 + "x 0 0\n", "export"),
-    "a million hashes": (GOOD + "#" * 10**6 + "\nx\n", "polygons"),
+    "many digits and no number": (GOOD + "v " + "1" * 10**4 + "x 0 0\n", "export"),
+    "many hashes": (GOOD + "#" * 10**4 + "\nx\n", "polygons"),
     "a zero byte": (GOOD + "# \0\n", "control character"),
     "a line of two megabytes": (GOOD + "#" + "x" * 2**21 + "\n", "longer"),
-    "a line of fifty megabytes": ("v " + "1 " * (25 * 2**20), "longer"),
-    "a million comments only": ("# nothing here\n" * 10**6, "no triangles"),
+    "comments only": ("# nothing here\n" * 100, "no triangles"),
     "vertices only": (GOOD.split("f ")[0], "no triangles"),
     "lines only": (GOOD.split("f ")[0] + "l 1 2 3 4\n", "no triangles"),
-    "points only": (GOOD.split("f ")[0] + "p 1 2 3 4\n", "no triangles"),
     "all in one line": (GOOD.replace("\n", " "), "export"),
     "UTF-16 without a mark": (GOOD.encode("utf-16-le"), "control character"),
     "UTF-32": (GOOD.encode("utf-32"), "control character"),
-    "three hundred thousand faces": (
-        obj(CORNERS, TRIANGLES * 75_000), "GP-MESH-TOO-MANY|simplify"),
 }  # fmt: skip
 GOOD_TEXTS = {
     "a continued line": _with("f 1 3 2", "f 1 \\\n3 2").encode(),
@@ -66,18 +57,5 @@ GOOD_TEXTS = {
     "names in any script": "o деталь\ng 部品\n".encode() + GOOD.encode(),
 }
 """Texts that must be read; `tests/grasp_core/mesh_files/test_reading.py` has more of them."""
-
-
-def _good(data: bytes, folder: Path) -> list[str]:
-    (folder / "good.obj").write_bytes(data)
-    return ["inspect", "good.obj"]
-
-
-def cases() -> list[Case]:
-    """All of the group, with texts beside them that must be read."""
-    found = [file_case(GROUP, name, "part.obj", *said) for name, said in BAD.items()]
-    found += [
-        Case(GROUP, f"read: {name}", partial(_good, data), 0, ())
-        for name, data in GOOD_TEXTS.items()
-    ]
-    return found
+CASES = [refused(name, "part.obj", *said) for name, said in BAD.items()]
+CASES += [read(f"{name}.obj", data) for name, data in GOOD_TEXTS.items()]

@@ -1,13 +1,9 @@
 """Group 6: numbers of physics that nothing in the world has, as flags and in files."""
 
-from functools import partial
-from pathlib import Path
-
 from grasp_core.kinds import LARGEST_FRICTION, MOST_EDGES, MOST_SEED
-from tests.bad_input.cases import Case, file_case, flag_case
-from tests.bad_input.good_files import grasps_text, with_value
+from tests.bad_input.cases import Case, refused
+from tests.bad_input.good_files import changed, good
 
-GROUP = "physics"
 NUMBERS = ("nan", "inf", "-1", "wide")
 FLAGS = {
     "plan box --friction": (*NUMBERS, "0", "1e9", "1e-300", f"{LARGEST_FRICTION + 1.0}"),
@@ -24,7 +20,7 @@ FLAGS = {
     "run box --jobs": ("0", "-1", "1.5"),
 }
 """Each value is to be refused, and the flag named; that every number of every command has bounds is
-asked by `tests/public_values/test_same_bounds.py`."""
+asked by `tests/public_values/test_flags.py`."""
 VECTORS = {
     "run box --approach 0 0 0": "--approach|zero",
     "run box --approach nan 0 0": "--approach",
@@ -96,43 +92,22 @@ GRASPS = {
     "a family that is none": ("grasps.0.family", "spiral", "family"),
     "a finger of no size": ("finger", {"radius_m": 0, "approach_m": 0.1}, "radius_m"),
 }
-
-
-def _with_setup(text: str, folder: Path) -> list[str]:
-    (folder / "good.json").write_text(grasps_text())
-    (folder / "setup.toml").write_text(text)
-    return ["validate", "good.json", "--setup", "setup.toml"]
-
-
-def _with_wrenches(text: str, folder: Path) -> list[str]:
-    (folder / "good.json").write_text(grasps_text())
-    (folder / "task.json").write_text(text)
-    return ["validate", "good.json", "--wrenches", "task.json"]
-
-
-def cases() -> list[Case]:
-    """All of the group."""
-    found = [
-        flag_case(GROUP, f"{line} {value}", line.split()[-1])
-        for line, values in FLAGS.items()
-        for value in values
-    ]
-    found += [
-        flag_case(GROUP, line, says, 4 if "built-in" in says else 2)
-        for line, says in VECTORS.items()
-    ]
-    found += [
-        Case(GROUP, f"setup: {text!r}", partial(_with_setup, text), 4, ("setup.toml", says))
-        for text, says in SETUP.items()
-    ]
-    found += [
-        Case(GROUP, f"wrenches: {name}", partial(_with_wrenches, text), 4, ("task.json", says))
-        for name, (text, says) in WRENCHES.items()
-    ]
-    return found + [
-        file_case(
-            GROUP, f"grasps: {name}", "grasps.json", with_value(grasps_text(), path, value), says,
-            command="validate",
-        )
-        for name, (path, value, says) in GRASPS.items()
-    ]  # fmt: skip
+CASES = [
+    Case(f"{line} {value}", f"{line} {value}", line.split()[-1], 2)
+    for line, values in FLAGS.items()
+    for value in values
+]
+CASES += [Case(line, line, says, 4 if "built-in" in says else 2) for line, says in VECTORS.items()]
+CASES += [
+    refused(f"setup: {text!r}", "setup.toml", text, says, "validate good.json --setup")
+    for text, says in SETUP.items()
+]
+CASES += [
+    refused(f"wrenches: {name}", "task.json", text, says, "validate good.json --wrenches")
+    for name, (text, says) in WRENCHES.items()
+]
+CASES += [
+    refused(f"grasps: {name}", "grasps.json", changed(good("grasps.json"), path, value), says,
+            "validate")
+    for name, (path, value, says) in GRASPS.items()
+]  # fmt: skip

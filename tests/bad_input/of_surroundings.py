@@ -1,22 +1,13 @@
 """Group 8: surroundings in which a program wakes up and cannot do what it is asked."""
 
-from functools import partial
-from pathlib import Path
-
-from tests.bad_input.cases import Case, flag_case
+from tests.bad_input.cases import Case
 from tests.bad_input.good_files import good
 
-GROUP = "surroundings"
-
-
-def _grasps(line: str, folder: Path) -> list[str]:
-    (folder / "grasps.json").write_bytes(good("grasps.json"))
-    (folder / "taken").write_text("mine")
-    (folder / "full").mkdir()
-    (folder / "full" / "mine.txt").write_text("mine")
-    return line.split()
-
-
+FOLDER = {
+    "grasps.json": lambda path: path.write_bytes(good("grasps.json")),
+    "taken": "mine",
+    "full/mine.txt": "mine",
+}
 ON_GRASPS = {
     "validate grasps.json --out taken": "taken",
     "validate grasps.json --out taken/deeper": "taken",
@@ -41,20 +32,10 @@ ON_GRASPS = {
     "plan random-3-1": "random",
     "inspect http://localhost/part.obj": "part.obj",
 }
-WORDS = {
-    "NUMBA_NUM_THREADS=0": ("plan tetrahedron --limit 1", "NUMBA_|unset"),
-}
-
-
-def cases() -> list[Case]:
-    """All of the group."""
-    found = [
-        Case(GROUP, line, partial(_grasps, line), 4, (says,)) for line, says in ON_GRASPS.items()
-    ]
-    line = "view grasps.json --picture a.docx"
-    found.append(Case(GROUP, line, partial(_grasps, line), 2, ("--picture", "a.docx")))
-    for said, (line, says) in WORDS.items():
-        name, value = said.split("=")
-        case = flag_case(GROUP, line, says, 4)
-        found.append(Case(GROUP, said, case.make, 4, case.says, ((name, value),)))
-    return found
+CASES = [Case(line, line, says, files=FOLDER) for line, says in ON_GRASPS.items()]
+CASES += [
+    Case("a picture of no kind", "view grasps.json --picture a.docx", "--picture|a.docx", 2,
+         FOLDER),
+    Case("NUMBA_NUM_THREADS=0", "plan tetrahedron --limit 1", "NUMBA_|unset",
+         environment={"NUMBA_NUM_THREADS": "0"}),
+]  # fmt: skip

@@ -147,7 +147,7 @@ CALLS = [
         "angle_deg": NOT_NEGATIVE | {"too wide": 46.0},
         "finger": optional(VALUE) | {"radius": 0.006},
     }),
-    Call("gc.certify_regions", of_grasp(friction=0.5), {
+    Call("gc.certify_regions", of_grasp(friction=0.5, max_cones=64), {
         "reserve": NOT_NEGATIVE | {"all": 1.0},
         "recenter": SWITCH,
         "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},

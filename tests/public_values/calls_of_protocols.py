@@ -7,7 +7,6 @@ import sim_validate as sv
 from sim_validate.hands.trials import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     NOT_NEGATIVE,
-    NOT_NUMBERS,
     PATH,
     POSITIVE,
     SEVERAL,
@@ -23,7 +22,6 @@ ROOT = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
 NAME = unless(WORD, "list") | {"list": ["dexgraspbench"]}
 POSE = array(np.eye(4)) | {"scaled": 2.0 * np.eye(4), "mirrored": np.diag([-1.0, 1.0, 1.0, 1.0])}
 QPOS = array([*ROOT, 0.1]) | {"no turn": np.zeros(8)}
-OF_NUMBER = unless(NOT_NUMBERS, "none") | {"fraction": 0.5, "negative": -1}
 
 
 def record():

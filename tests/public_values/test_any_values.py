@@ -25,7 +25,6 @@ FINITE = st.one_of(
     st.sampled_from([number for number in WEIRD if abs(number) < 1e50]), st.floats(-2.0, 2.0)
 )
 SHAPES = st.sampled_from([(2, 3), (3, 3), (4, 3)])
-SIZES = st.sampled_from([1e-49, 1e-30, 1e-9, 1.0, 1e9, 1e30, 1e49])
 OF_CONTACTS = {
     "closure": lambda x, n: gc.force_closure(x, n, 0.5).verify(),
     "critical friction": gc.critical_friction,
@@ -58,28 +57,12 @@ def answered(ask, *arguments):
 @pytest.mark.parametrize("what", OF_CONTACTS)
 @settings(max_examples=25)
 @given(shape=SHAPES, data=st.data())
-def test_any_arrays_are_answered_or_refused(what, shape, data):
-    numbers = arrays(np.float64, shape, elements=ANY)
-    answered(OF_CONTACTS[what], data.draw(numbers), data.draw(numbers))
-
-
-@pytest.mark.parametrize("what", OF_CONTACTS)
-@settings(max_examples=25)
-@given(shape=SHAPES, data=st.data())
 def test_any_contacts_with_unit_normals_are_answered_or_refused(what, shape, data):
     points = data.draw(arrays(np.float64, shape, elements=FINITE))
     ways = data.draw(arrays(np.float64, shape, elements=st.floats(-1.0, 1.0)))
     lengths = np.linalg.norm(ways, axis=1, keepdims=True)
     assume(lengths.min() > 1e-3)
     answered(OF_CONTACTS[what], points, ways / lengths)
-
-
-@settings(max_examples=40)
-@given(size=SIZES, friction=st.sampled_from([1e-3, 0.5, 1e3]))
-def test_closure_of_a_tetrahedron_is_answered_at_any_size(size, friction):
-    assert gc.force_closure(size * TETRA_CENTERS, TETRA_NORMALS, friction).closed
-    assert gc.critical_friction(size * TETRA_CENTERS, TETRA_NORMALS) == 0.0
-    assert gc.classify_lines(size * TETRA_CENTERS, TETRA_NORMALS) == "concurrent"
 
 
 @settings(max_examples=30)
@@ -93,7 +76,7 @@ def test_any_wrench_center_and_limit_is_answered_or_refused(wrench, center, most
     answered(lambda: gc.ferrari_canny(*contacts, center=center, torque_scale=most, gap=0.1))
 
 
-@settings(max_examples=100)
+@settings(max_examples=30)
 @given(st.one_of(st.text(), st.from_regex(r"random-\w{1,4}-\w{1,3}", fullmatch=True)))
 def test_any_name_of_an_object_is_answered_or_refused(name):
     answered(scenes.example_object, name)

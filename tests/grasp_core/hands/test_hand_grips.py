@@ -13,7 +13,7 @@ from tests.tampering.changes import forged
 
 SMALL = 1e-7
 """Size of a motion [m, rad] whose square is nothing beside it."""
-HANDS = ("allegro", "leap")
+HANDS = ("leap", pytest.param("allegro", marks=pytest.mark.slow))
 
 
 def torques(hand, reach, k, joints, point_normal, force):

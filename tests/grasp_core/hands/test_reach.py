@@ -1,9 +1,8 @@
 """A hand in a grasp: what is returned is true, and what was not found is not denied."""
 
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import combinations
 
-import mujoco
 import numpy as np
 import pytest
 import trimesh
@@ -14,10 +13,11 @@ from grasp_core.hands.hand import Hand, HandFinger
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.pose_search import TOUCHING, Asked, starts
 from tests.grasp_core.hands.gripping import FRICTION, finger, grasps, plain_hand, reaches, scaled
-from tests.hand_models import hand_mjcf, numbers
 
-CASES = [("allegro", "dodecahedron", 0.035), ("leap", "dodecahedron", 0.035),
-         ("allegro", "l-bracket", 0.04)]  # fmt: skip
+CASES = [
+    ("leap", "dodecahedron", 0.035),
+    pytest.param("allegro", "l-bracket", 0.04, marks=pytest.mark.slow),
+]
 
 TILTED = np.array([[1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
 """A turn that leans z towards -y."""
@@ -27,7 +27,7 @@ def mesh_of(body):
     return trimesh.Trimesh(body.vertices, body.triangles, process=False)
 
 
-def strewn(shape, rotation, position, count=9):
+def strewn(shape, rotation, position, count=5):
     """Points over a box with rounded edges, in the object's frame."""
     ticks = np.linspace(-1.0, 1.0, count)
     local = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
@@ -78,12 +78,12 @@ def test_most_grasps_are_reached_and_each_claim_holds(hand, name, radius):
         assert off.max() <= 1e-9
 
 
-@pytest.mark.parametrize(("hand", "name", "radius"), [CASES[0], CASES[2]])
+@pytest.mark.parametrize(("hand", "name", "radius"), CASES)
 def test_points_strewn_over_links_are_outside_the_object(hand, name, radius):
     held, body, seen = gc.load_hand(hand), scaled(name, radius), 0
     mesh = mesh_of(body)
     for each in reaches(hand, name, radius):
-        if not each.reached:
+        if not each.reached or seen == 1:
             continue
         found = places(held, each.joints, each.palm_pose)
         frames = [(s, each.palm_pose[:3, :3], each.palm_pose[:3, 3]) for s in held.palm]
@@ -106,10 +106,10 @@ def test_points_strewn_over_links_are_outside_the_object(hand, name, radius):
         assert measured.object >= 0.0
         assert abs(measured.tips) <= TOUCHING
         seen += 1
-    assert seen >= 3
+    assert seen == 1
 
 
-@pytest.mark.parametrize(("hand", "name", "radius"), CASES[:2])
+@pytest.mark.parametrize(("hand", "name", "radius"), CASES)
 def test_an_open_hand_is_free_and_so_is_its_way_in(hand, name, radius):
     held, body, seen, ways = gc.load_hand(hand), scaled(name, radius), 0, 0
     for each in reaches(hand, name, radius):
@@ -133,21 +133,15 @@ def test_an_open_hand_is_free_and_so_is_its_way_in(hand, name, radius):
     assert ways >= (1 if hand == "allegro" else 0)  # the other often has to come in on a curve
 
 
-def test_the_same_seed_gives_the_same_pose():
-    body, grasp = scaled("dodecahedron", 0.035), grasps("dodecahedron", 0.035)[0]
-    again = gc.reach_with(gc.load_hand("allegro"), body, grasp, FRICTION)
-    assert again == reaches("allegro", "dodecahedron", 0.035)[0]
-
-
 def test_contacts_stay_the_planned_ones_without_regions():
-    body, hand, seen = scaled("dodecahedron", 0.035), gc.load_hand("allegro"), 0
-    for grasp in grasps("dodecahedron", 0.035):
-        found = gc.reach_with(hand, body, grasp, FRICTION, regions=False)
-        if found.reached:
-            seen += 1
-            points = np.array([contact.position for contact in found.contacts])
-            assert points == pytest.approx(grasp.positions, abs=1e-8)
-    assert seen >= 1
+    body, hand = scaled("dodecahedron", 0.035), gc.load_hand("allegro")
+    tried = (
+        (grasp, gc.reach_with(hand, body, grasp, FRICTION, regions=False))
+        for grasp in grasps("dodecahedron", 0.035)
+    )
+    grasp, found = next(pair for pair in tried if pair[1].reached)
+    points = np.array([contact.position for contact in found.contacts])
+    assert points == pytest.approx(grasp.positions, abs=1e-8)
 
 
 def test_above_a_table_every_part_stays_above_it():
@@ -204,63 +198,9 @@ def test_a_hand_with_five_fingers_uses_four():
     assert len(found.joints) == 20
 
 
-TIPS = {
-    "finger": (
-        (-0.0109843, -0.0485305, 0.0107332), (-0.0109382, -0.0482203, 0.0196376),
-        (-0.0101487, -0.0496906, 0.0159898), (-0.0092378, -0.0484128, 0.0218931),
-        (-0.00867589, -0.0479687, 0.0063242), (0.000381281, -0.0500004, 0.0136489),
-        (0.00578903, -0.0477754, 0.0145699), (-0.00837368, -0.0448847, 0.0253221),
-        (-0.00825562, -0.044846, 0.00378645), (-0.0112503, -0.0219082, 0.0214304),
-        (-0.0111545, -0.0217225, 0.00703861), (0.00953552, -0.0407669, 0.0144241),
-    ),
-    "thumb": (
-        (-0.0107232, -0.0611614, -0.0149982), (-0.008826, -0.0620958, -0.0145755),
-        (-0.00919783, -0.0614221, -0.00934658), (-0.00911828, -0.0606159, -0.0214199),
-        (-0.0112175, -0.0576915, -0.006927), (-0.0108374, -0.0576804, -0.0229782),
-        (0.000575562, -0.0618537, -0.0181157), (0.00559988, -0.0599286, -0.0179396),
-        (-0.00858019, -0.0567087, -0.00376859), (-0.00910804, -0.0577736, -0.0245153),
-        (-0.0112391, -0.033747, -0.0213736), (-0.011265, -0.033908, -0.007986),
-        (0.00948306, -0.0528781, -0.0101047), (0.009593, -0.05148, -0.019153),
-    ),
-}  # fmt: skip
-"""Corners of the meshes of LEAP's fingertips in MuJoCo Menagerie, in the last links' frames [m]."""
-
-
-@pytest.mark.parametrize("name", ["dodecahedron", "box"])
-def test_leap_with_the_fingertips_of_the_public_model_overlaps_nothing(name):
-    """MuJoCo has corners of the public meshes; hulls of some of them are within the true tips."""
-    hand, body, seen = gc.load_hand("leap"), scaled(name, 0.035), 0
-    corners = {f.name: np.array(TIPS["thumb" if f.name == "thumb" else "finger"])
-               for f in hand.fingers}  # fmt: skip
-    for f in hand.fingers:
-        table, rounding = f.tip.core
-        near = np.linalg.norm(table - corners[f.name][:, None], axis=2).min(axis=1)
-        assert near.max() <= rounding  # each is within the rounding of the table's, and so the hull
-    true = replace(hand, fingers=tuple(
-        replace(f, tip=replace(f.tip, corners=corners[f.name])) for f in hand.fingers
-    ))  # fmt: skip
-    mesh = f'<mesh name="object" vertex="{numbers(body.vertices)}"/>'
-    geom = '<body name="object"><geom name="object" type="mesh" mesh="object"/></body>'
-    model = mujoco.MjModel.from_xml_string(hand_mjcf(true, mesh, geom))
-    data, at = mujoco.MjData(model), model.geom("object").id
-    pairs = pairs_apart(model, hand, at)
-    for each in reaches("leap", name, 0.035):
-        if not each.reached:
-            continue
-        seen += 1
-        data.mocap_pos[0] = each.palm_pose[:3, 3]
-        mujoco.mju_mat2Quat(data.mocap_quat[0], each.palm_pose[:3, :3].ravel())
-        for joint, angle in zip(hand.joints, each.joints, strict=True):
-            data.joint(joint.name).qpos = angle
-        mujoco.mj_forward(model, data)
-        gaps = [mujoco.mj_geomDistance(model, data, i, j, 0.01, None) for i, j in pairs]
-        assert min(gaps) > -1e-5
-    assert seen >= 3
-
-
 def test_a_block_that_is_moved_into_the_object_is_said_to_be_deep_in_it():
-    hand, body, seen = gc.load_hand("leap"), scaled("box", 0.035), 0
-    for each in reaches("leap", "box", 0.035):
+    hand, body, seen = gc.load_hand("leap"), scaled("dodecahedron", 0.035), 0
+    for each in reaches("leap", "dodecahedron", 0.035):
         if not each.reached:
             continue
         seen += 1
@@ -278,19 +218,6 @@ def test_a_block_that_is_moved_into_the_object_is_said_to_be_deep_in_it():
             off = tip_distances(hand, each.joints, each.palm_pose, each.fingers, touched)
             assert off == pytest.approx(np.zeros(4), abs=TOUCHING)
     assert seen >= 3
-
-
-def pairs_apart(model, hand, at):
-    """Pairs of geoms that must not overlap: links that are not let to, and any with the object."""
-    links = {i: model.body(int(model.geom_bodyid[i])).name for i in range(model.ngeom) if i != at}
-    beside = {frozenset(pair) for pair in hand.ignored_pairs}
-    for f in hand.fingers:
-        beside |= {frozenset(pair) for pair in pairwise(["palm", *(each.name for each in f.links)])}
-    own = [
-        (i, j) for i, j in combinations(links, 2)
-        if links[i] != links[j] and frozenset((links[i], links[j])) not in beside
-    ]  # fmt: skip
-    return [*own, *((i, at) for i in links)]
 
 
 def test_fingers_of_one_hand_that_overlap_are_told():
@@ -315,10 +242,9 @@ def test_fingers_of_one_hand_that_overlap_are_told():
     assert clearances(free, body, np.zeros(8), pose, none).itself > 0.005
 
 
-@pytest.mark.parametrize("name", ["allegro", "leap"])
-def test_a_search_starts_alike_where_contacts_differ_by_rounding(name):
+def test_a_search_starts_alike_where_contacts_differ_by_rounding():
     """Linear algebra of another processor moves contacts by their last digits."""
-    hand, rng = gc.load_hand(name), np.random.default_rng(0)
+    hand, rng = gc.load_hand("leap"), np.random.default_rng(0)
     for grasp in grasps("dodecahedron", 0.035):
         moved = grasp.positions * (1.0 + 1e-15 * rng.standard_normal((4, 3)))
         asked = Asked(hand, None, grasp, 0.5, None, -np.inf, 0.0, True, 0, 20)

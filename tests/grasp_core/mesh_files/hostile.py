@@ -1,7 +1,6 @@
 """Mesh files of any size made to cost as much time as they can for each of their bytes."""
 
 import json
-import struct
 
 from tests.bad_input.mesh_texts import obj
 from tests.bad_input.of_binary_meshes import glb, tree
@@ -26,11 +25,6 @@ def counted_off(vertices, faces, size):
     return b"OFF\n%d %d 0\n" % counts + body
 
 
-def text_ply_faces(size):
-    count = size // 8
-    return HEAD % b"ascii" + FACES % count + b"end_header\n0 0 0\n" + b"3 0 0 0\n" * count
-
-
 def binary_ply(size, row, point=bytes(12)):
     """Binary PLY of so many equal rows of faces as fit."""
     return (
@@ -52,15 +46,6 @@ def many_elements_ply(size):
     return HEAD % LITTLE + FACES % 0 + elements + tail + b"end_header\n" + bytes(12 + max(rows, 1))
 
 
-def varying_ply(size):
-    """Rows whose lists differ in length, of an element that nobody asks for."""
-    row = b"\0\1\0"
-    head = (
-        HEAD % LITTLE + FACES % 0 + b"element e %d\nproperty list uchar uchar a\n" % (size // 3 * 2)
-    )
-    return head + b"end_header\n" + bytes(12) + row * (size // 3)
-
-
 def shared_vertices_glb(size):
     """Many parts of one triangle each among the same, many vertices."""
     parts = size // 2 // 60
@@ -72,19 +57,6 @@ def shared_vertices_glb(size):
     made["bufferViews"] = [{"buffer": 0, "byteOffset": 0, "byteLength": 12 * points},
                            {"buffer": 0, "byteOffset": 12 * points, "byteLength": 4}]  # fmt: skip
     return glb(made, bytes(12 * points + 4))
-
-
-def empty_parts_glb(size):
-    """Many nodes that place a mesh of many parts without triangles."""
-    made = tree()
-    count = max(1, min(size // 2 // 12, 9_000))
-    made["meshes"] = [
-        {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}] * (size // 2 // 60)}
-    ]
-    made["accessors"][1]["count"] = 0
-    made["nodes"] = [{"mesh": 0}] * count
-    made["scenes"] = [{"nodes": list(range(count))}]
-    return glb(made)
 
 
 def listed_glb(piece, size):
@@ -104,38 +76,27 @@ def many_children_glb(size):
 
 OBJ = obj().encode()
 FILES = {
-    "obj: one-letter lines": lambda n: repeated(b"g\n", n, OBJ),
     "obj: vertices": lambda n: repeated(b"v 0 0 0\n", n, OBJ),
     "obj: one polygon": lambda n: repeated(b" 1", n, OBJ + b"f", b"\n"),
     "obj: a line of hashes before a letter": lambda n: repeated(b"#", n, OBJ, b"\\\nv"),
-    "obj: continued lines": lambda n: repeated(b"\\\n", n, OBJ, b"g\n"),
-    "obj: comments that may go on": lambda n: repeated(b"#\\\n", n, OBJ),
     "obj: a long number that is none": lambda n: repeated(b"1", n, OBJ + b"v ", b"x 0 0\n"),
-    "obj: a long corner that is none": lambda n: repeated(b"1", n, OBJ + b"f 1/", b"x 2 3\n"),
     "obj: many long numbers": lambda n: repeated(b"v 0 0 0." + b"1" * 700 + b"e-300\n", n, OBJ),
     "stl: triangles": lambda n: repeated(
         b"facet normal\nouter loop\n" + b"vertex 0 0 0\n" * 3 + b"endloop\nendfacet\n", n,
         b"solid\n", b"endsolid\n"),
-    "stl: a long name": lambda n: repeated(b"solid ", n, b"solid", b"\nendsolid\n"),
-    "stl: empty lines": lambda n: repeated(b"\n", n, b"solid\n", b"endsolid\n"),
     "stl: a long number that is none": lambda n: repeated(
         b"1", n, b"solid\nfacet normal 0 0 0\nouter loop\nvertex ", b"x 0 0\n"),
-    "stl: binary": lambda n: bytes(80) + struct.pack("<I", n // 50) + bytes(n // 50 * 50),
     "off: vertices": lambda n: counted_off(b"0 0 0\n", b"", n),
     "off: one polygon": lambda n: b"OFF\n3 1 0\n" + b"0 0 0\n" * 3 + b"%d" % (n // 2)
     + b" 0" * (n // 2),
-    "ply: text faces": text_ply_faces,
     "ply: spaces before a missing end": lambda n: repeated(b"\nend_header ", n, b"ply"),
     "ply: many elements": many_elements_ply,
     "ply: binary triangles": lambda n: binary_ply(n, b"\3\0\0\0"),
     "ply: binary faces that differ": lambda n: binary_ply(n, b"\3\0\0\0\4\0\0\0\0"),
-    "ply: other rows that differ": varying_ply,
     "glb: deep lists": lambda n: glb(b"[" * n),
     "glb: empty lists": lambda n: listed_glb(b"[]", n),
-    "glb: a long whole number": lambda n: listed_glb(b"1" * n, 2 * n),
     "glb: a long string without an end": lambda n: glb(b'"' + b"\\" * n),
     "glb: parts among shared vertices": shared_vertices_glb,
-    "glb: parts without triangles": empty_parts_glb,
     "glb: many children": many_children_glb,
 }  # fmt: skip
 """Makers of files of about so many bytes, by format and what makes them slow."""

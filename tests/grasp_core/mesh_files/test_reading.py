@@ -156,7 +156,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("kind", FILES)
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(data=st.data())
 def test_a_word_that_is_damaged_is_refused_or_read_as_it_is(kind, data):
     """By the plain reading of the fuzzer, which knows nothing of ours."""
@@ -221,32 +221,22 @@ def ply_coloured(value):
 
 RIGHT = {
     "an OBJ with colours of nan": ("obj", coloured("nan nan nan")),
-    "an OBJ with colours of nan, as Windows spells it": ("obj", coloured("-nan(ind) nan -nan")),
     "an OBJ with colours of nan, as old Windows does": ("obj", coloured("1.#QNAN -1.#IND 1.#INF")),
     "an OBJ with four numbers of a colour": ("obj", coloured("0.5 0.5 0.5 1")),
-    "an OBJ with colours on lines of their own": ("obj", obj_text(more="vc 1 0 0\nvp 0 0\n")),
     "an OBJ with comments of C": ("obj", "// by hand\n; v 1 2 3\n" + obj_text()),
     "an OBJ with form feeds": ("obj", obj_text().replace("f 1 3", "\f\nf 1\v3")),
     "an OBJ with an end mark": ("obj", obj_text() + "\x1a"),
     "an OBJ in UTF-16": ("obj", obj_text().encode("utf-16")),
-    "an OBJ in the other UTF-16": ("obj", b"\xfe\xff" + obj_text().encode("utf-16-be")),
-    "an STL with a mark": ("stl", MARK + stl_text().encode()),
     "a binary STL whose header is a mark and solid": ("stl", stl(head=MARK + b"solid")),
-    "an STL in UTF-16": ("stl", stl_text().encode("utf-16")),
     "an STL with comments": ("stl", "# solid 1\n\n# b\n" + stl_text().replace("\nv", " # c\nv")),
     "an STL with the name against its word": ("stl", stl_text().replace("solid ", "solid")),
     "an STL without the word normal": ("stl", stl_text().replace(" normal 0 0 0", "")),
-    "an STL filled up with zeros": ("stl", stl_text().encode() + bytes(100)),
     "an OFF with a mark": ("off", MARK + off().encode()),
-    "an OFF with the word against its counts": ("off", off().replace("OFF\n", "OFF")),
     "an OFF with a mark, the word against its counts": (
         "off", MARK + COLOURED.replace("OFF\n", "OFF").replace("\n", "\r\n").encode()),
-    "an OFF in small letters": ("off", off().replace("OFF", "off")),
     "an OFF with colours of nan": ("off", COLOURED.replace(" 0.0\n", " 0.0 nan -nan(ind) inf\n")),
-    "a PLY with a mark": ("ply", MARK + ply()),
     "a binary PLY with a mark": (
         "ply", MARK + ply(form="binary_little_endian", body=ply_binary())),
-    "a PLY in large letters": ("ply", ply().replace(b"ply\n", b"PLY\n")),
     "a PLY with the line ends of old": ("ply", ply().replace(b"\n", b"\r")),
     "a binary PLY with the line ends of old": (
         "ply", ply(form="binary_little_endian", body=b"").replace(b"\n", b"\r") + ply_binary()),
@@ -260,17 +250,13 @@ RIGHT = {
     "OBJ faces before their vertices": ("obj", "\n".join([*LINES[4:], *LINES[:4]])),
     "corners of differing forms": ("obj", obj_text().replace("f 1 3 2", "f 1/1 3 2//7")),
     "a comment that ends in a backslash": ("obj", "# in C:\\\no a\n" + obj_text()),
-    "an OBJ with the line ends of old": ("obj", obj_text().replace("\n", "\r")),
     "an OFF comment that ends in a backslash": ("off", off().replace("OFF", "OFF # in C:\\")),
-    "an OFF with the line ends of old": ("off", off().replace("\n", "\r")),
     "an OFF with normals": (
         "off", off().replace("OFF", "NOFF").replace(" 0.1\n", " 0.1 1 0 0\n")),
-    "an STL name that means something": ("stl", stl_text().replace("hand", "a vertex 1 2 3")),
     "an STL that is called solid": ("stl", stl_text().replace("hand", "endsolid solid facet")),
     "an STL without normals": ("stl", stl_text().replace("normal 0 0 0", "normal")),
     "STL words in other lines": (
         "stl", stl_text().replace("\nouter", " outer").replace("endloop\n", "endloop ")),
-    "an STL with the line ends of old": ("stl", stl_text().replace("\n", "\r")),
     "vertices with lists that differ": (
         "ply",
         LISTED_VERTICES

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from grasp_core.mesh_files.polygons import most_digits, single_rounding, text_rounding
 from grasp_core.mesh_files.reading import mesh_of_bytes
 from tests.bad_input.mesh_texts import obj, off, ply, stl, stl_text
+from tests.marks import more
 
 MOST = 50_000
 FORMATS = {"%g": "%g", "%.6f": "%.6f", "%.5e": "%.5e", "%.9g": "%.9g"}
@@ -51,7 +51,7 @@ def shows_its_rounding(kind, data, corners):
     assert mesh.rounding <= LOOSEST * off_by, kind
 
 
-@pytest.mark.parametrize("offset", [0.0, 0.1, 0.3, 2.0])
+@pytest.mark.parametrize("offset", [0.0, 2.0])
 @pytest.mark.parametrize("unit", [1.0, 1000.0])
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_text_shows_its_own_rounding(form, unit, offset):
@@ -61,7 +61,7 @@ def test_a_text_shows_its_own_rounding(form, unit, offset):
         shows_its_rounding(kind, text.encode(), points[faces])
 
 
-@pytest.mark.parametrize("offset", [0.0, 0.1, 0.3, 2.0])
+@pytest.mark.parametrize("offset", [0.0, 2.0])
 @pytest.mark.parametrize("unit", [1.0, 1000.0])
 def test_a_binary_file_shows_that_of_single_precision(unit, offset):
     points, faces = shape(12)
@@ -82,13 +82,6 @@ def test_a_text_of_single_precision_shows_that(form, offset):
         shows_its_rounding(kind, text.encode(), points[faces])
 
 
-def test_a_fixed_number_of_decimals_shows_on_small_objects():
-    points, faces = shape(12)
-    for kind, text in texts(0.1 * points, faces, "%.6f").items():
-        mesh = mesh_of_bytes(kind, text.encode(), MOST)
-        assert mesh.rounding == pytest.approx(0.5e-6, rel=0.05), kind
-
-
 def test_numbers_in_full_length_are_not_rounded():
     points, faces = shape(12)
     for kind, text in texts(points, faces, "%r").items():
@@ -101,7 +94,7 @@ def test_numbers_typed_by_hand_are_exact():
         assert mesh_of_bytes(kind, text.encode(), MOST).rounding == 0.0, kind
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", ["%.6f", *more("%g", "%.5e", "%.9g")])
 def test_one_large_coordinate_far_down_a_long_file_counts(form):
     points, faces = shape(80)
     points[2048:] *= 7.0
@@ -111,26 +104,3 @@ def test_one_large_coordinate_far_down_a_long_file_counts(form):
         assert len(mesh.vertices) > 5000
         every = {"%g": 0.5e-4, "%.6f": 0.5e-6, "%.5e": 0.5e-4, "%.9g": 0.5e-7}
         assert mesh.rounding == pytest.approx(every[form], rel=0.05), kind
-
-
-@pytest.mark.parametrize(
-    ("words", "digits"),
-    [
-        ("0", 0), ("-0.000", 0), ("12300", 3), ("-100", 1), ("100.", 3), ("0.100000", 6),
-        ("+.0012", 2), ("1.5e-3", 2), ("1.23457E+06", 6), ("10 1.25", 3), ("123.4567890123", 13),
-        ("1e5", 1), ("0 0 0", 0),
-    ],
-)  # fmt: skip
-def test_significant_digits(words, digits):
-    assert most_digits(words.encode().split()) == digits
-
-
-def test_few_or_all_digits_and_double_precision_show_no_rounding():
-    points = np.array([[999.5, 0.0, -2.0]])
-    assert [text_rounding(points, digits) for digits in (0, 5, 16, 17)] == pytest.approx(
-        [0.0, 0.005, 0.5e-13, 0.0], rel=1e-12, abs=0.0
-    )
-    assert text_rounding(np.zeros((1, 3)), 6) == 0.0
-    assert single_rounding(points) == 999.5 * 2.0**-24
-    assert single_rounding(points + 1e-9) == 0.0
-    assert single_rounding(points * 1e300) == 0.0

@@ -18,7 +18,7 @@ ROUNDING = 1e-9
 """Relative to the object, of heights and of lines through the edges between triangles."""
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.002])
+@pytest.mark.parametrize("noise", [0.002, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_over_each_point_of_a_patch_is_one_point_of_the_surface_as_near_as_it_says(noise):
     rng = np.random.default_rng(3)
     body = curved_body(noise=noise)
@@ -29,7 +29,7 @@ def test_over_each_point_of_a_patch_is_one_point_of_the_surface_as_near_as_it_sa
 def test_patches_keep_the_limits_and_come_largest_first():
     vertices, triangles = bumpy_ellipsoid(noise=0.001)
     extent = np.ptp(vertices, axis=0).max()
-    for limits in (gc.PatchLimits(8.0, 0.02, 12), gc.PatchLimits(25.0, 0.004, 30)):
+    for limits in (gc.PatchLimits(8.0, 0.02, 12), gc.PatchLimits(25.0, 0.004, 8)):
         found = flat_patches(Mesh(vertices, triangles), limits)
         assert 4 <= len(found) <= limits.most
         assert max(face.spread for face in found) <= math.radians(limits.spread_deg) + ROUNDING
@@ -58,6 +58,7 @@ def test_a_patch_of_one_large_triangle_keeps_the_limits_too():
     assert max(face.depth for face in found) <= limits.depth * 0.1
 
 
+@pytest.mark.slow
 def test_no_patch_spans_a_hole_in_the_surface():
     vertices, triangles = bumpy_ellipsoid()
     middles = vertices[triangles].mean(axis=1)
@@ -77,12 +78,6 @@ def test_no_patch_spans_a_hole_in_the_surface():
     assert away < 0.001 * whole.radius
 
 
-def test_the_centre_of_mass_can_be_given():
-    vertices, triangles = bumpy_ellipsoid()
-    body = gc.Polyhedron.from_mesh(vertices, triangles, center_of_mass=[0.01, 0.0, -0.01])
-    np.testing.assert_array_equal(body.center_of_mass, [0.01, 0.0, -0.01])
-
-
 def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherwise():
     vertices, triangles = bumpy_ellipsoid(subdivisions=2)
     coarse = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=1))
@@ -95,22 +90,7 @@ def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherw
     assert {face.spread for face in exact.faces} == {0.0}
 
 
-def test_an_open_mesh_is_refused_where_planar_faces_are_asked_for():
-    vertices, triangles = bumpy_ellipsoid(subdivisions=2)
-    with pytest.raises(gc.MeshError) as refused:
-        gc.Polyhedron.from_mesh(vertices, triangles[:-60], faces="planar")
-    assert refused.value.reason is MeshRefusal.OPEN
-
-
-def test_a_closed_scan_that_is_inside_out_is_turned():
-    vertices, triangles = bumpy_ellipsoid()
-    one, two = (gc.Polyhedron.from_mesh(vertices, t) for t in (triangles, triangles[:, ::-1]))
-    assert "inside out" in " ".join(two.notes)
-    assert one.volume == pytest.approx(two.volume)
-    for face in two.faces:
-        assert face.normal @ (face.centroid - two.center_of_mass) < 0.0
-
-
+@pytest.mark.slow
 def test_a_coarse_torus_whose_triangles_meet_regions_in_their_corners_is_planned():
     ring = trimesh.creation.torus(0.04, 0.012, 24, 12)
     limits = gc.PatchLimits(20.0, 0.02, 10)
@@ -136,14 +116,6 @@ def test_a_surface_without_flat_parts_is_refused_with_advice():
     assert refused.value.reason is MeshRefusal.NOT_FLAT
 
 
-def test_a_box_with_a_triangle_missing_has_six_flat_patches():
-    box = trimesh.creation.box(extents=(0.1, 0.08, 0.06))
-    body = gc.Polyhedron.from_mesh(box.vertices, box.faces[:-1], faces="patches")
-    assert len(body.faces) == 6
-    assert {round(math.degrees(face.spread), 6) for face in body.faces} == {0.0}
-    assert gc.plan(body, 0.5, families="concurrent", limit=1).grasps
-
-
 GAP = 1e-6
 
 
@@ -155,16 +127,6 @@ def fence(rng, corners=40, stretch=1.0):
     border = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
     ends = rng.uniform(-1.0, 1.0, (6, 1, 2))
     return np.concatenate([border, ends + rng.uniform(-0.1, 0.1, (6, 2, 2))])
-
-
-def test_a_long_clearing_grows_long():
-    """Between two parallel fences it fills the lane, not a square around the middle."""
-    ticks = np.linspace(-5.0, 5.0, 41)
-    lanes = [np.column_stack([ticks, np.full(41, side)]) for side in (-0.5, 0.5)]
-    ends = [np.array([[end, -0.5], [end, 0.5]]) for end in (-5.0, 5.0)]
-    segments = np.array([[a, b] for line in (*lanes, *ends) for a, b in itertools.pairwise(line)])
-    polygon = clearing(np.array([0.3, 0.1]), segments, GAP)
-    assert signed_area(polygon) == pytest.approx(10.0, rel=1e-3)
 
 
 def enters(polygon, segment):
@@ -187,7 +149,7 @@ def enters(polygon, segment):
 @pytest.mark.parametrize("stretch", [1.0, 6.0, 1e2, 1e4])
 def test_no_segment_enters_a_clearing_however_far_apart_its_teeth(stretch):
     rng = np.random.default_rng(1)
-    for _ in range(30):
+    for _ in range(10):
         segments = fence(rng, stretch=stretch)
         start, room = clearest_point(rng.uniform(-0.3, 0.3, (50, 2)), segments)
         polygon = clearing(start, segments, GAP)
@@ -197,31 +159,3 @@ def test_no_segment_enters_a_clearing_however_far_apart_its_teeth(stretch):
             E, b = edge_rows(polygon)
             assert (E @ start < b).all()
             assert signed_area(polygon) > 0.9 * np.pi * room**2
-
-
-def lane(rng, width):
-    """Border of a turned rectangle of length one, its long sides in pieces, and a point inside."""
-    ticks = np.linspace(-0.5, 0.5, int(rng.integers(2, 9)))
-    sides = [np.column_stack([s * ticks, np.full(len(ticks), -0.5 * s * width)]) for s in (1, -1)]
-    turn = rng.uniform(0.0, 2.0 * np.pi)
-    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    corners = np.concatenate(sides) @ axes.T
-    start = axes @ [rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3) * width]
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), start
-
-
-@pytest.mark.timeout(120)  # it never ended once
-@pytest.mark.parametrize("digits", range(1, 10))
-def test_no_segment_enters_the_clearing_of_a_lane_however_narrow(digits):
-    """Ordinary ones are filled; 1e-5 wide and narrower, the polygon may be smaller, never wrong."""
-    rng, gap = np.random.default_rng(digits), 1e-9
-    for _ in range(20):
-        width = 10.0**-digits * rng.uniform(0.5, 1.0)
-        segments, start = lane(rng, width)
-        polygon = clearing(start, segments, gap)
-        if polygon is None:
-            assert width < 1e-7
-            continue
-        assert not any(enters(polygon, segment) for segment in segments)
-        if width > 1e-4:
-            assert signed_area(polygon) == pytest.approx(width, rel=1e-3)

@@ -5,9 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-import grasp_core as gc
-from grasp_core.objects.on_faces import Surface, nearest_on_triangles
-from tests.grasp_core.curved import bumpy_ellipsoid
+from grasp_core.objects.on_faces import nearest_on_triangles
 
 ROUNDING = 2.0**-52
 
@@ -78,20 +76,3 @@ def test_distances_are_those_of_rational_arithmetic(size, height):
             assert float(squared_distance(triangle, found)) ** 0.5 <= slack
             inside += truth <= 4.0 * ROUNDING * size
     assert inside >= 30
-
-
-@pytest.mark.parametrize("diameter", [1e-3, 2.0])
-def test_points_inside_of_every_triangle_are_on_the_surface(diameter):
-    """Whatever the size: triangles of an object of 1 mm have some 1e-9 square metres."""
-    body = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=2), patches=gc.PatchLimits(most=4))
-    vertices = body.vertices * (diameter / (2.0 * body.radius))
-    surface = Surface(vertices, body.triangles)
-    rng, slack = np.random.default_rng(3), 1e-9 * diameter
-    corners = vertices[body.triangles]
-    inward = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
-    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    for triangle, normal in zip(corners, inward, strict=True):
-        point = rng.dirichlet([1.0, 1.0, 1.0]) @ triangle
-        assert surface.holds(point, normal, slack)
-        assert not surface.holds(point - 0.01 * diameter * normal, normal, slack)
-    assert len(corners) >= 300

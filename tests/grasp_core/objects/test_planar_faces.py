@@ -5,7 +5,7 @@ import trimesh
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import coplanar_groups, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.objects.surface import Mesh, border_loops
+from grasp_core.objects.surface import Mesh
 from scenes.example_objects import example_object
 
 
@@ -13,30 +13,23 @@ def cube():
     return trimesh.creation.box(extents=(0.1, 0.2, 0.3))
 
 
-def test_a_box_has_six_convex_faces_with_inward_normals():
-    mesh = cube()
-    body = Polyhedron.from_mesh(mesh.vertices, mesh.faces)
-    assert len(body.faces) == 6
-    for face in body.faces:
-        assert len(face.pieces) == 1
-        assert len(face.polygon) == 4
-        assert face.normal @ (face.centroid - body.center_of_mass) < 0
-    assert sum(face.area for face in body.faces) == pytest.approx(mesh.area, rel=1e-12)
-
-
 def test_extra_triangles_and_border_points_do_not_change_the_faces():
     mesh = cube().subdivide().subdivide()
     body = Polyhedron.from_mesh(mesh.vertices, mesh.faces)
     assert len(body.triangles) == 192
     assert sorted(len(face.polygon) for face in body.faces) == [4] * 6
+    for face in body.faces:
+        assert len(face.pieces) == 1
+        assert face.normal @ (face.centroid - body.center_of_mass) < 0
+    assert sum(face.area for face in body.faces) == pytest.approx(mesh.area, rel=1e-12)
 
 
 def test_a_fine_sphere_keeps_its_facets():
-    """20,480 triangles with 0.6 degrees between neighbours: none may merge."""
-    mesh = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
+    """5,120 triangles with 1.2 degrees between neighbours: none may merge."""
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
     surface, slack = Mesh(mesh.vertices, mesh.faces), planar_slack(0.1, 0.0)
     groups = coplanar_groups(surface, slack)
-    assert len(groups) == len(mesh.faces) == 20480
+    assert len(groups) == len(mesh.faces) == 5120
     assert len(coplanar_groups(surface, slack, most=200)) == 201
 
 
@@ -64,13 +57,6 @@ def test_a_face_with_a_hole_is_tiled_by_convex_pieces():
     for face in rings:
         assert len(face.pieces) > 1
         assert sum(_area(piece, face.normal) for piece in face.pieces) == pytest.approx(face.area)
-
-
-def test_borders_that_touch_in_a_corner_stay_simple_loops():
-    """A square whose triangular hole shares its first corner: 4-5-0 is open."""
-    triangles = np.array([[0, 1, 4], [1, 2, 4], [2, 5, 4], [2, 3, 5], [3, 0, 5]])
-    loops = border_loops(triangles)
-    assert sorted(map(sorted, loops)) == [[0, 1, 2, 3], [0, 4, 5]]
 
 
 def _area(polygon, normal):

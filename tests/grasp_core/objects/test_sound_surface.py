@@ -15,7 +15,7 @@ from grasp_core.objects.surface import Edges, Mesh
 from tests.bad_input import mesh_texts
 
 TURN = trimesh.transformations.rotation_matrix(0.7, [3.0, 1.0, 2.0])[:3, :3]
-OFFSETS = [0.0, 0.1, 0.3, 2.0]
+OFFSETS = [0.0, 2.0]
 SLANT = np.array([1.0, -0.4, 0.7]) / np.linalg.norm([1.0, -0.4, 0.7])
 
 
@@ -118,15 +118,6 @@ def test_a_given_flatness_decides_which_faces_are_one(tmp_path):
     assert len(read("stl %g", rounded, tmp_path, offset=2.0).faces) == 8
 
 
-def test_an_exact_mesh_has_no_rounding_to_allow_for():
-    mesh = box()
-    body = gc.Polyhedron.from_mesh(mesh.vertices @ TURN.T, mesh.faces)
-    assert body.surface.flatness_m == 0.0
-    assert body.notes == ()
-    single = (mesh.vertices @ TURN.T + 2.0 * SLANT).astype(np.float32).astype(float)
-    assert 1e-7 < gc.Polyhedron.from_mesh(single, mesh.faces).surface.flatness_m < 1e-5
-
-
 def test_vertices_that_rounding_moved_apart_are_joined():
     """Each triangle of a soup has corners of its own, off by less than half the flatness."""
     mesh = box().subdivide()
@@ -143,7 +134,7 @@ def test_vertices_that_rounding_moved_apart_are_joined():
     assert caught.value.reason in {MeshRefusal.OPEN, MeshRefusal.SEPARATE}
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0])
 def test_a_solid_wound_at_random_has_the_faces_of_the_clean_one(seed):
     mesh = prism()
     clean = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces)
@@ -184,31 +175,6 @@ def around(mesh, place):
     return np.flatnonzero((mesh.faces == vertex).any(axis=1))
 
 
-def shared(one, two):
-    return len(set(one.tolist()) & set(two.tolist()))
-
-
-def ring(outline, height):
-    """The side walls and bottom of a prism over a star-shaped outline; the top is missing."""
-    count = len(outline)
-    points = [(x, y, z) for z in (0.0, height) for x, y in outline] + [(0.0, 0.0, 0.0)]
-    after = [(k + 1) % count for k in range(count)]
-    walls = [t for k, n in enumerate(after) for t in ((k, n, count + n), (k, count + n, count + k))]
-    return np.array(points), np.array([*walls, *((n, k, 2 * count) for k, n in enumerate(after))])
-
-
-def star(count, dent):
-    """An outline whose every other corner is dented."""
-    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    reach = np.where(np.arange(count) % 2, dent, 1.0)
-    return np.column_stack([reach * np.cos(angle), reach * np.sin(angle)])
-
-
-def outline_area(outline):
-    x, y = outline.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
 def check_whole(body, missing):
     """Check that a box has volume, centre, moments and faces of the whole one."""
     whole = trimesh.creation.box(SIZE)
@@ -228,7 +194,7 @@ def check_whole(body, missing):
     return lost
 
 
-@pytest.mark.parametrize("gone", range(0, 192, 31))
+@pytest.mark.parametrize("gone", [0, 93])
 def test_one_missing_triangle_does_not_change_volume_centre_and_moments(gone):
     mesh = grid(2)
     body = gc.Polyhedron.from_mesh(mesh.vertices, np.delete(mesh.faces, gone, axis=0))
@@ -243,35 +209,6 @@ def test_one_missing_triangle_does_not_change_volume_centre_and_moments(gone):
     assert "no finger is placed there" in note
 
 
-def test_a_hole_of_many_corners_is_closed():
-    mesh = grid(3)
-    gone = around(mesh, [0.05, 0.0, 0.0])
-    assert len(gone) >= 6
-    body = gc.Polyhedron.from_mesh(mesh.vertices, np.delete(mesh.faces, gone, axis=0))
-    check_whole(body, len(gone) - 2)
-    assert body.surface.holes == 1
-
-
-def test_holes_that_meet_in_a_corner_are_closed_one_by_one():
-    mesh = grid(2)
-    found = around(mesh, [0.05, 0.0, 0.0])
-    pairs = [(a, b) for a in found for b in found
-             if a < b and shared(mesh.faces[a], mesh.faces[b]) == 1]  # fmt: skip
-    assert len(pairs) >= 6
-    closed = 0
-    for pair in pairs:
-        left = np.delete(mesh.faces, pair, axis=0)
-        caps = caps_of(Mesh(mesh.vertices, left))
-        assert len(caps.widths) == len(caps.triangles) == 2
-        assert {frozenset(t) for t in caps.triangles.tolist()} == {
-            frozenset(t) for t in mesh.faces[list(pair)].tolist()
-        }
-        if caps.hidden < 0.02 * mesh.volume:
-            check_whole(gc.Polyhedron.from_mesh(mesh.vertices, left), 2)
-            closed += 1
-    assert closed >= 3
-
-
 def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open():
     mesh = grid(2)
     gone = around(mesh, [0.05, 0.0, 0.0])
@@ -283,25 +220,7 @@ def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open(
     assert not gc.Polyhedron.from_mesh(mesh.vertices, left, faces="patches").surface.closed
 
 
-@pytest.mark.parametrize(("count", "dent"), [(6, 1.0), (64, 1.0), (12, 0.4), (90, 0.6)])
-def test_a_plane_border_of_any_shape_is_filled_without_overlap(count, dent):
-    outline = star(count, dent)
-    points, faces = ring(outline, 0.7)
-    caps = caps_of(Mesh(points, faces))
-    whole = np.concatenate([faces, caps.triangles])
-    assert Edges.of(whole).fault() is None
-    assert len(caps.triangles) == count - 2
-    assert caps.widths == pytest.approx([2.0], abs=0.002)
-    area = outline_area(outline)
-    assert Solid(points, whole).volume == pytest.approx(0.7 * area, rel=1e-12)
-    a, b, c = (points[caps.triangles[:, k]] for k in range(3))
-    crosses = np.cross(b - a, c - a)
-    assert (crosses[:, 2] >= 0.0).all()
-    assert 0.5 * np.linalg.norm(crosses, axis=1).sum() == pytest.approx(area)
-    assert caps.hidden == pytest.approx(area * caps.widths[0] / 3.0)
-
-
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(2))
 def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
     rng = np.random.default_rng(seed)
     mesh = trimesh.creation.icosphere(subdivisions=3)
@@ -314,18 +233,6 @@ def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
         whole = np.concatenate([left, caps.triangles])
         assert not Edges.of(whole).balance.any()
         assert abs(abs(Solid(mesh.vertices, whole).volume) - mesh.volume) <= caps.hidden
-
-
-def test_edges_of_three_triangles_are_not_closed():
-    mesh = grid(1)
-    edge = mesh.faces[0][:2]
-    points = np.vstack([mesh.vertices, [0.3, 0.3, 0.3]])
-    fin = [*edge, len(mesh.vertices)]
-    for added in (fin, fin[::-1]):
-        assert caps_of(Mesh(points, np.vstack([mesh.faces, added]))) is None
-        with pytest.raises(gc.MeshError) as caught:
-            gc.Polyhedron.from_mesh(points, np.vstack([mesh.faces, added]), faces="planar")
-        assert caught.value.reason in {MeshRefusal.OPEN, MeshRefusal.NON_MANIFOLD}
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-8])
@@ -363,7 +270,7 @@ def contacts(body):
     return np.concatenate([grasp.positions for grasp in grasps])
 
 
-@pytest.mark.parametrize("kind", ["planar", "patches"])
+@pytest.mark.parametrize("kind", ["planar", pytest.param("patches", marks=pytest.mark.slow)])
 def test_no_finger_stands_on_a_cap(kind):
     """Triangles are missing just where the best grasps of the whole body have their fingers."""
     mesh = grid(3) if kind == "planar" else trimesh.creation.icosphere(subdivisions=3, radius=0.05)
@@ -376,17 +283,3 @@ def test_no_finger_stands_on_a_cap(kind):
     assert len(fingers) == 40
     assert not np.isin(nearest(body, fingers), body.surface.caps).any()
     assert np.isin(nearest(body, contacts(whole)), body.surface.caps).any()
-
-
-def test_a_crack_is_not_counted_as_a_hole_beside_one():
-    mesh = grid(2)
-    a, b, c = mesh.faces[0]
-    points = np.vstack([mesh.vertices, 0.5 * (mesh.vertices[a] + mesh.vertices[b])])
-    middle = len(mesh.vertices)
-    left = np.vstack([mesh.faces[1:-1], [a, middle, c], [middle, b, c]])
-    body = gc.Polyhedron.from_mesh(points, left)
-    assert body.surface.holes == len(body.surface.caps) == 1
-    cap = body.vertices[body.triangles[body.surface.caps[0]]]
-    np.testing.assert_allclose(sorted(cap.tolist()), sorted(mesh.triangles[-1].tolist()))
-    assert body.volume == pytest.approx(0.006, rel=1e-12)
-    assert len(body.notes) == 2

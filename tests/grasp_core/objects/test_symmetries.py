@@ -7,10 +7,8 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from grasp_core.objects.standard_order import SAME_GRASP, Copies, copies_of, symmetries
+from grasp_core.objects.standard_order import SAME_GRASP, copies_of, symmetries
 from grasp_core.values import Contact, ContactRegion, ForceCone, Witness, four
-from tests.grasp_core.curved import bumpy_ellipsoid
-from tests.grasp_core.long_shapes import shape
 from tests.grasp_core.objects.test_standard_order import isometries
 from tests.judges import random_rotation
 from tests.sim_validate.rigs import grasps
@@ -75,18 +73,6 @@ def test_symmetries_are_found_within_a_tolerance_and_of_any_size(shake, kept):
         assert (len(found.rotations), len(found.reflections)) == ((60, 60) if kept else (1, 0))
 
 
-def test_a_ringed_rod_of_thousands_of_vertices_has_those_of_its_48_sides():
-    found = symmetries(gc.Polyhedron.from_mesh(*shape("ringed rod")))
-    assert (len(found.rotations), len(found.reflections)) == (96, 96)
-
-
-def test_a_curved_surface_has_only_the_identity():
-    body = gc.Polyhedron.from_mesh(*bumpy_ellipsoid())
-    assert body.patches is not None
-    assert len(symmetries(body).rotations) == 1
-    assert not len(symmetries(body).reflections)
-
-
 @pytest.mark.parametrize(("name", "family"), [("tetrahedron", "concurrent"), ("box", "pencil")])
 def test_images_are_copies_and_mirror_images_are_named_apart(name, family):
     body, (grasp,) = grasps(name, 0.5, 1, (family,), "tilted")
@@ -98,19 +84,6 @@ def test_images_are_copies_and_mirror_images_are_named_apart(name, family):
     assert copies.first == 0
     assert set(range(1, 1 + len(turned))) <= set(copies.rotated)
     assert copies.places == tuple(range(1 + len(turned) + len(mirrored)))
-
-
-def test_what_only_a_reflection_makes_is_called_mirrored():
-    body = scenes.example_object("l-bracket")
-    found = symmetries(body)
-    grasp = gc.plan(body, 0.5, limit=20).grasps
-    crooked = [
-        each for each in grasp
-        if len(copies_of(body, [each, moved(body, each, found.reflections[0])])[0].mirrored)
-    ]  # fmt: skip
-    assert crooked
-    image = moved(body, crooked[0], found.reflections[0])
-    assert copies_of(body, [crooked[0], image]) == (Copies(0, (), (1,)),)
 
 
 @pytest.mark.parametrize(("off", "same"), [(0.5 * SAME_GRASP, True), (2.0 * SAME_GRASP, False)])
@@ -135,15 +108,3 @@ def test_other_families_cones_and_foci_make_other_grasps():
     )
     for other in others:
         assert len(copies_of(body, [grasp, other])) == 2
-
-
-def test_every_grasp_is_in_one_class():
-    body, planned = grasps("octahedron", 0.5, 30, ("concurrent", "pencil", "regulus"), "tilted")
-    classes = copies_of(body, planned)
-    assert len(classes) < len(planned)
-    assert sorted(place for each in classes for place in each.places) == list(range(len(planned)))
-    for each in classes:
-        quality = [planned[place].ferrari_canny[1] for place in each.places]
-        friction = [planned[place].critical_friction for place in each.places]
-        np.testing.assert_allclose(quality, quality[0], atol=1e-2)
-        np.testing.assert_allclose(friction, friction[0], atol=1e-2)

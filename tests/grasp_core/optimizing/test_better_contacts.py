@@ -1,6 +1,5 @@
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import grasp_core as gc
@@ -24,7 +23,7 @@ def checked(grasp, found, friction):
 
 @pytest.mark.parametrize(
     ("name", "limit"),
-    [("wedge", 3), ("tetrahedron", 3), ("double-wedge-bar", 1), ("random-20-7", 1)],
+    [("wedge", 2), pytest.param("double-wedge-bar", 1, marks=pytest.mark.slow)],
 )
 def test_grasps_get_better_and_stay_certified(name, limit):
     body = example_object(name)
@@ -43,25 +42,14 @@ def test_grasps_get_better_and_stay_certified(name, limit):
 
 def test_contacts_keep_a_fingers_radius_from_the_edges():
     body = example_object("wedge")
-    tested = 0
-    for grasp in gc.plan(body, 0.5, families="concurrent", limit=3).grasps:
-        radius = 0.02 * body.radius
-        found = gc.optimize_contacts(body, grasp, 0.5, finger_radius=radius)
-        pieces = pieces_under(body, found.grasp)
-        points = (found.grasp.positions - body.center_of_mass) / body.radius
-        for piece, point, own in zip(pieces, points, grasp.regions, strict=True):
-            room = float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
-            least = min(0.02, 0.5 * piece.inradius, own.inscribed_radius / body.radius)
-            assert room >= least - 1e-9
-            tested += 1
-    assert tested == 12
-
-
-def test_the_same_seed_gives_the_same_contacts():
-    body = example_object("wedge")
-    grasp = gc.plan(body, 0.5, limit=1).grasps[0]
-    one, two = (gc.optimize_contacts(body, grasp, 0.5, seed=3) for _ in range(2))
-    np.testing.assert_allclose(one.grasp.positions, two.grasp.positions, atol=1e-9)
+    (grasp,) = gc.plan(body, 0.5, families="concurrent", limit=1).grasps
+    found = gc.optimize_contacts(body, grasp, 0.5, finger_radius=0.02 * body.radius)
+    pieces = pieces_under(body, found.grasp)
+    points = (found.grasp.positions - body.center_of_mass) / body.radius
+    for piece, point, own in zip(pieces, points, grasp.regions, strict=True):
+        room = float((piece.b - piece.E @ (piece.frame.T @ (point - piece.origin))).min())
+        least = min(0.02, 0.5 * piece.inradius, own.inscribed_radius / body.radius)
+        assert room >= least - 1e-9
 
 
 def test_a_grasp_that_is_not_closed_or_not_there_is_refused():

@@ -9,13 +9,13 @@ import grasp_core as gc
 from scenes.example_objects import example_object
 
 
-@pytest.fixture(scope="module", params=["tetrahedron", "wedge", "box"])
+@pytest.fixture(
+    scope="module", params=["tetrahedron", pytest.param("wedge", marks=pytest.mark.slow)]
+)
 def bounded(request):
     """A body, four of its faces, a moved grasp on them and a ceiling."""
     body = example_object(request.param)
-    grasp = (
-        gc.plan(body, 0.5, limit=1).grasps or gc.plan(body, 0.5, families="free", limit=1).grasps
-    )[0]
+    (grasp,) = gc.plan(body, 0.5, limit=1).grasps
     found = gc.optimize_contacts(body, grasp, 0.5)
     known = found.after.lower
     ceiling = gc.quality_ceiling(
@@ -81,24 +81,19 @@ def test_the_bound_can_be_checked_again_and_does_not_survive_tampering(bounded):
     assert not spoiled(**alone, asked=np.zeros(1, int), threshold=1e-6).verify()
 
 
+@pytest.mark.slow
 def test_grasps_that_start_near_edges_do_not_end_above_the_ceiling():
     """Bounded without knowing what the search has found."""
     body = example_object("double-wedge-bar")
-    tested = 0
-    for grasp in gc.plan(body, 0.5, families="free", limit=4).grasps:
+    grasps = gc.plan(body, 0.5, families="free", limit=4).grasps
+    assert len(grasps) == 4
+    for grasp in grasps:
         found = gc.optimize_contacts(body, grasp, 0.5)
         ceiling = gc.quality_ceiling(
             body, grasp.faces, 0.5, parts=3000, finger_radius=found.clearances
         )
         assert ceiling.verify()
         assert found.after.lower <= ceiling.upper
-        strict = gc.optimize_contacts(body, grasp, 0.5, finger_radius=0.1 * body.radius)
-        clear = gc.quality_ceiling(
-            body, grasp.faces, 0.5, parts=3000, finger_radius=0.1 * body.radius
-        )
-        assert strict.grasp is grasp or strict.after.lower <= clear.upper
-        tested += 1
-    assert tested == 4
 
 
 def test_the_best_contacts_of_a_tetrahedron_are_known_within_a_twentieth():
@@ -110,6 +105,7 @@ def test_the_best_contacts_of_a_tetrahedron_are_known_within_a_twentieth():
     assert ceiling.verify()
 
 
+@pytest.mark.slow
 def test_a_search_whose_twists_are_many_goes_on():
     """With a full pool of twists, none of them used yet, two new ones took each other's place."""
     body = example_object("tetrahedron")

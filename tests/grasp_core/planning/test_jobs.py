@@ -11,17 +11,9 @@ import pytest
 import grasp_core as gc
 from grasp_core.planning import plan_search
 from grasp_core.planning.plan_search import PlanSearch
-from grasp_core.planning.result import PlanRequest
 from grasp_core.processes import receive, send, unpacked
 from scenes.example_objects import example_object
 from tests.patience import HANGING_S
-
-PLANS = {
-    "every method": ("random-9-7", {}),
-    "complete": ("prism", {"complete": True, "friction": 0.3}),
-    "the most different": ("octahedron", {"limit": 5, "rank_by": "diverse"}),
-}
-"""Objects, and keywords of `plan`, for searches that do not end early."""
 
 
 def bits(plan):
@@ -49,24 +41,22 @@ def bits(plan):
 
 
 @pytest.mark.parametrize(
-    ("what", "numbers"),
+    ("name", "keywords"),
     [
-        ("every method", (2, 3)),
-        ("complete", (2,)),
-        ("the most different", (2,)),
+        ("random-7-7", {}),
+        pytest.param("prism", {"complete": True, "friction": 0.3}, marks=pytest.mark.slow),
+        pytest.param("octahedron", {"limit": 5, "rank_by": "diverse"}, marks=pytest.mark.slow),
     ],
 )
-def test_any_number_of_processes_gives_the_same_plan(what, numbers, monkeypatch):
+def test_any_number_of_processes_gives_the_same_plan(name, keywords, monkeypatch):
     monkeypatch.setattr(plan_search, "QUADRUPLES_PER_PROCESS", 1)
-    name, keywords = PLANS[what]
     body = example_object(name)
-    one = gc.plan(body, **keywords, jobs=1)
+    one, *others = (gc.plan(body, **keywords, jobs=jobs) for jobs in (1, 2))
     assert one.grasps
-    for jobs in numbers:
-        assert bits(gc.plan(body, **keywords, jobs=jobs)) == bits(one)
+    assert all(bits(other) == bits(one) for other in others)
 
 
-@pytest.mark.parametrize("name", ["random-9-7", "box"])
+@pytest.mark.parametrize("name", ["random-7-7", pytest.param("box", marks=pytest.mark.slow)])
 def test_parts_that_another_process_finds_are_the_same(name, monkeypatch):
     """Every part is searched on another copy of the object, and sent as between processes."""
     body, seen = example_object(name), []
@@ -100,16 +90,6 @@ def test_an_error_of_a_part_reaches_the_caller_with_its_own_type(monkeypatch):
         gc.plan(example_object("random-14-7"), jobs=2)
 
 
-def test_few_quadruples_and_searches_that_end_early_start_no_process():
-    request = PlanRequest(0.5, ("pencil",))
-    assert plan_search.worth_starting(example_object("box"), request, 8) == 0
-    large = example_object("random-24-1")
-    limited = PlanRequest(0.5, ("pencil",), limit=5)
-    assert plan_search.worth_starting(large, limited, 8) == 0
-    assert plan_search.worth_starting(large, request, 1) == 0
-    assert plan_search.worth_starting(large, request, 8) <= 2
-
-
 INTERRUPTED = """
 import signal
 
@@ -130,6 +110,7 @@ gc.plan(example_object("random-24-1"), 0.3, jobs=2, progress=told)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="interrupts are sent in another way on Windows")
 def test_an_interrupt_ends_a_plan_and_its_processes():
     """The test ends only when the process has: it waits for the other one and for all threads."""

@@ -85,7 +85,7 @@ def faces(attempts):
 
 
 def test_quadruples_come_in_the_order_of_their_bounds_and_only_as_asked_for():
-    body, least = example_object("random-30-1"), [1e-3]
+    body, least = example_object("random-20-1"), [1e-3]
     quadruples, made = opened(body, "concurrent", least)
     first = [next(quadruples) for _ in range(12)]
     bounds = [bound(each) for each in first]

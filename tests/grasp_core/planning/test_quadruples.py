@@ -8,14 +8,10 @@ import pytest
 
 from grasp_core.cones.spanning import span_sines
 from grasp_core.cones.tilting import SLIGHT, tilted_cones, widest_half_angles
-from grasp_core.families.disc_bounds import corners_of, widths_apart
-from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.planning import quadruples as tables
 from scenes.example_objects import example_object
-from tests.benchmarks.objects import sphere_hull
 from tests.grasp_core.cones.reference_tilting import lowest_heights
-from tests.grasp_core.families.reference_corner_bounds import widths
 
 NONE = np.empty((0, 4), dtype=np.int64)
 BODIES = ("random-14-1", "chamfered-box", "l-bracket", "double-wedge-bar")
@@ -25,7 +21,7 @@ def planned(body):
     return tables.PlannedCones(body, face_shapes(body), math.atan(0.5), tilted=True)
 
 
-@pytest.mark.parametrize("name", ["random-40-1", "l-bracket", "tetrahedron"])
+@pytest.mark.parametrize("name", ["random-30-1", "l-bracket"])
 def test_blocks_hold_every_quadruple_with_room_once(name):
     cones = planned(example_object(name))
     roomy = np.flatnonzero(cones.rooms > 0.0)
@@ -35,26 +31,6 @@ def test_blocks_hold_every_quadruple_with_room_once(name):
     listed = np.concatenate(made)
     assert len(listed) == math.comb(len(roomy), 4)
     assert {tuple(each) for each in listed.tolist()} == set(combinations(roomy.tolist(), 4))
-
-
-@pytest.mark.parametrize("build", [tables.all_blocks, tables.spanning_blocks])
-def test_no_block_has_more_room_than_it_says_nor_than_the_one_before(build):
-    cones = planned(example_object("random-40-1"))
-    rooms, make = build(cones, 40, NONE) if build is tables.all_blocks else build(cones, 40)
-    assert len(rooms) >= 5
-    assert (np.diff(rooms) <= 0.0).all()
-    for place, room in enumerate(rooms):
-        assert make(place).rooms.max() <= room
-
-
-def test_the_blocks_of_800_faces_are_not_listed_before_they_are_asked_for():
-    body = sphere_hull(800)
-    assert len(body.faces) == 800
-    rooms, make = tables.all_blocks(planned(body), 800, NONE)
-    assert len(rooms) > math.comb(800, 4) / tables.LARGEST_BLOCK
-    last = make(len(rooms) - 1)
-    order = np.argsort(-last.cones.rooms, kind="stable")
-    assert np.sort(order[-4:]).tolist() in last.faces.tolist()
 
 
 def test_no_tilted_cones_are_wider_than_what_bounds_them():
@@ -109,42 +85,3 @@ def test_limits_before_cones_are_chosen_bound_those_after(name):
         assert (coned.limits[held, kind] <= limits[held] * (1.0 + 1e-9)).all()
         tested += held.sum()
     assert tested >= 30
-
-
-def test_no_pair_of_tilted_cones_has_larger_discs_than_its_widest_cones_allow():
-    """Axes that lean towards each other as far as P3 and friction let them."""
-    rng, count = np.random.default_rng(0), 200_000
-    halves, theta = rng.uniform(0.05, 1.57, size=count), rng.uniform(0.05, 1.2, size=count)
-    widest = theta * rng.uniform(0.05, 1.0, size=count)
-    psi = widest * rng.uniform(0.02, 1.0, size=count)
-    leaning = (theta - psi) * rng.uniform(0.5, 1.0, size=count)
-    between = halves - leaning  # half the angle between the axes; cones that span do not overlap
-    possible = between > psi
-    real = 0.5 * np.tan(0.5 * psi) / np.sin(np.where(possible, between, 1.0))
-    apart, angles = np.ones((2, 2)), np.zeros((2, 2))
-    tested = 0
-    for at in np.flatnonzero(possible)[:4000]:
-        angles[0, 1] = angles[1, 0] = halves[at]
-        faces = np.array([[0, 1, 0, 1]])
-        widths = widths_apart(faces, apart, angles, theta[[at]] - widest[[at]])
-        limit = 0.5 * widths[0, 0, 1] * np.tan(0.5 * widest[at])
-        assert real[at] <= limit * (1.0 + 1e-9)
-        tested += np.isfinite(limit) and halves[at] < theta[at]
-    assert tested >= 100
-
-
-def test_widths_from_distances_bound_those_from_corners_however_axes_lean():
-    body = example_object("random-14-1")
-    cones = planned(body)
-    _, make = tables.all_blocks(cones, 14, NONE)
-    coned = make(0).coned(slice(None))
-    held = coned.half_angles[:, tables.TILTED] > tables.LEAST_SPAN_ANGLE
-    faces, axes = coned.faces[held], coned.axes[held, tables.TILTED]
-    leaning = np.arccos(np.clip((axes * coned.normals[held]).sum(axis=-1), -1.0, 1.0))
-    bounds = widths_apart(faces, cones._distances, cones._halves, leaning.max(axis=1))
-    bounded = widths(corners_of(body).points[faces], axes)
-    pairs = np.triu_indices(4, 1)
-    assert (bounded[:, *pairs] <= bounds[:, *pairs] * (1.0 + 1e-9)).all()
-    finite = np.isfinite(bounds[:, *pairs])
-    assert finite.sum() >= 1000
-    assert LEAST_RADIUS < np.median(bounds[:, *pairs][finite]) < 5.0

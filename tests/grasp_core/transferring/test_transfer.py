@@ -49,7 +49,7 @@ def test_on_the_same_part_every_grasp_is_the_same(box):
         np.testing.assert_array_equal(each.grasp.normals, each.old.normals)
 
 
-@pytest.mark.parametrize("by_mm", [1.0, -0.7, 0.1])
+@pytest.mark.parametrize("by_mm", [1.0, -0.7])
 def test_contacts_of_a_moved_face_move_with_it_and_the_others_stay(box, by_mm):
     body, grasps = box
     face = 3
@@ -118,21 +118,6 @@ def test_a_face_that_turned_too_far_is_lost():
             assert f"turned {slope:.2f} deg" in found.faces_in_words
 
 
-def test_a_contact_in_a_new_hole_goes_to_its_rim(box):
-    body, grasps = box
-    grasp = grasps[0]
-    radius = 2e-3
-    new = with_hole(body, grasp.faces[0], grasp.positions[0], radius, depth=5e-3)
-    found = gc.transfer(body, new, [grasp], FRICTION).grasps[0]
-    contact = found.contacts[0]
-    # the hole is a polygon of 24 sides in a circle
-    assert radius * math.cos(math.pi / 24) - 1e-9 <= contact.distance <= radius + 1e-9
-    assert is_on_surface(new, contact.contact)
-    np.testing.assert_array_equal(contact.contact.normal, grasp.normals[0])
-    narrow = gc.transfer(body, new, [grasp], FRICTION, distance=1e-3).grasps[0]
-    assert narrow.status == "gone"
-
-
 def test_nothing_is_found_through_a_thin_plate():
     """A plate of 2 mm lowered by 1.5 mm.
 
@@ -155,9 +140,8 @@ def test_nothing_is_found_through_a_thin_plate():
 
 
 CHANGES = [
-    ("box", "moved", 1e-3), ("prism", "moved", -2e-3), ("l-bracket", "moved", 1.5e-3),
-    ("chamfered-box", "hole", 3e-3), ("l-bracket", "hole", 2e-3), ("prism", "chamfer", 4e-3),
-    ("box", "chamfer", 6e-3), ("hex-nut", "moved", 5e-3),
+    ("prism", "moved", -2e-3), ("l-bracket", "hole", 2e-3), ("box", "chamfer", 6e-3),
+    pytest.param("hex-nut", "moved", 5e-3, marks=pytest.mark.slow),
 ]  # fmt: skip
 
 
@@ -176,7 +160,7 @@ def changed(body, grasp, kind, size):
 
 
 @pytest.mark.parametrize(("name", "kind", "size"), CHANGES)
-def test_carried_contacts_are_on_the_new_surface_and_none_is_nearer(name, kind, size):
+def test_carried_contacts_are_nearest_on_the_new_surface_and_judged_as_by_hand(name, kind, size):
     """Measured on all triangles with plain NumPy: on the surface, its normal, and the nearest."""
     body, grasps = planned(name, limit=8)
     new = changed(body, grasps[0], kind, size)
@@ -198,37 +182,30 @@ def test_carried_contacts_are_on_the_new_surface_and_none_is_nearer(name, kind, 
             assert angle <= math.radians(5.0) + 1e-7
         if each.grasp is not None:
             check_on_faces(new, each.grasp)
+        if each.after is not None:
+            judged_by_hand(new, each)
     assert placed >= 16
+    assert sum(each.after is not None for each in found.grasps) >= 2
 
 
-@pytest.mark.parametrize(("name", "kind", "size"), CHANGES)
-def test_grasps_are_judged_as_their_contacts_are_by_hand(name, kind, size):
-    body, grasps = planned(name, limit=6)
-    new = changed(body, grasps[0], kind, size)
-    found = gc.transfer(body, new, grasps, FRICTION)
-    judged = 0
-    for each in found.grasps:
-        if each.after is None:
-            continue
-        points = np.array([contact.contact.position for contact in each.contacts])
-        normals = np.array([contact.contact.normal for contact in each.contacts])
-        by_hand = gc.force_closure(points, normals, FRICTION)
-        assert by_hand.closed == (each.grasp is not None)
-        critical = gc.critical_friction(points, normals)
-        assert each.after.critical_friction == pytest.approx(critical, abs=1e-7)
-        assert each.after.closure_margin == pytest.approx(by_hand.margin, abs=1e-9)
+def judged_by_hand(new, each):
+    points = np.array([contact.contact.position for contact in each.contacts])
+    normals = np.array([contact.contact.normal for contact in each.contacts])
+    by_hand = gc.force_closure(points, normals, FRICTION)
+    assert by_hand.closed == (each.grasp is not None)
+    critical = gc.critical_friction(points, normals)
+    assert each.after.critical_friction == pytest.approx(critical, abs=1e-7)
+    assert each.after.closure_margin == pytest.approx(by_hand.margin, abs=1e-9)
+    if by_hand.closed:
         quality = gc.ferrari_canny(points, normals, FRICTION, center=new.center_of_mass,
                                    torque_scale=new.radius)  # fmt: skip
-        if by_hand.closed:
-            assert each.after.ferrari_canny == (quality.lower, quality.upper)
-        judged += 1
-    assert judged >= 2
+        assert each.after.ferrari_canny == (quality.lower, quality.upper)
 
 
 def test_the_carried_grasps_of_a_file_can_be_read_back():
     """Witnesses whose forces all meet become skew, as the family of the file demands."""
     read = 0
-    for name in ("tetrahedron", "octahedron", "box"):
+    for name in ("octahedron", "box"):
         body, grasps = planned(name, limit=10)
         plan = gc.plan(body, FRICTION, limit=10)
         found = gc.transfer(body, scaled(body, 1.001), grasps, FRICTION)
@@ -238,7 +215,7 @@ def test_the_carried_grasps_of_a_file_can_be_read_back():
         for grasp in saved.grasps:
             assert gc.classify_lines(grasp.witness.points, grasp.witness.forces) == "regulus"
             read += 1
-    assert read >= 25
+    assert read >= 15
 
 
 def test_a_grasp_that_loses_force_closure_is_gone_and_says_what_it_would_need(box):
@@ -274,47 +251,12 @@ def test_new_ids_name_the_new_faces_and_are_unique():
     assert [grasp.id for grasp in twice] == [grasps[0].id, f"{grasps[0].id}-2"]
 
 
-def test_moving_both_parts_moves_what_is_carried(box):
-    body, grasps = box
-    turn = trimesh.transformations.rotation_matrix(0.7, [1.0, 2.0, 3.0])[:3, :3]
-    shift = np.array([0.3, -0.2, 0.1])
-
-    def moved(part):
-        return gc.Polyhedron.from_mesh(part.vertices @ turn.T + shift, part.triangles,
-                                       faces="planar")  # fmt: skip
-
-    at = grasps[0].positions[0] + [0.0, 3e-4, 5e-4]  # so that one point of the rim is nearest
-    new = with_hole(with_face_moved(body, 3, 1e-3), grasps[0].faces[0], at, 2e-3, 3e-3)
-    here = gc.transfer(body, new, grasps, FRICTION)
-    there_grasps = [
-        dataclasses.replace(
-            grasp, contacts=tuple(gc.Contact(turn @ c.position + shift, turn @ c.normal)
-                                  for c in grasp.contacts),
-            faces=tuple(face_at(moved(body), turn @ c.position + shift, turn @ c.normal)
-                        for c in grasp.contacts),
-        )
-        for grasp in grasps
-    ]  # fmt: skip
-    there = gc.transfer(moved(body), moved(new), there_grasps, FRICTION)
-    assert [e.status for e in here.grasps] == [e.status for e in there.grasps]
-    for one, other in zip(here.grasps, there.grasps, strict=True):
-        for a, b in zip(one.contacts, other.contacts, strict=True):
-            np.testing.assert_allclose(turn @ a.contact.position + shift, b.contact.position,
-                                       atol=1e-10)  # fmt: skip
-
-
-def face_at(body, point, normal):
-    at = [abs(float(face.normal @ (point - face.centroid))) < 1e-9 and face.normal @ normal > 0.99
-          for face in body.faces]  # fmt: skip
-    return at.index(True)
-
-
 def test_fingers_that_cannot_reach_a_carried_contact_are_named():
     """A finger as thick as the bracket's notch is wide cannot come to the faces of the notch."""
     body, finger = example_object("l-bracket"), gc.Finger(0.003, 0.03)
-    grasps = gc.plan(body, FRICTION, finger=finger).grasps
+    grasps = gc.plan(body, FRICTION, finger=finger).grasps[::4]
     found = gc.transfer(body, body, grasps, FRICTION, finger=finger)
-    assert found.count("same") == len(grasps) > 10
+    assert found.count("same") == len(grasps) > 5
     for each in found.grasps:
         np.testing.assert_allclose(each.grasp.approach_directions, each.old.approach_directions,
                                    atol=1e-9)  # fmt: skip
