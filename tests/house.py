@@ -12,33 +12,16 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 57_106,
+    "lines of packages": 57_115,
     "modules of packages": 239,
-    "lines of tests": 48_982,
-    "lines of docs": 7_204,
+    "lines of tests": 41_733,
+    "lines of docs": 4_133,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
 RISES = (
-    "lines of packages, 65,686 to 65,711: searches for poses of hands start from rounded places",
-    "lines of tests, 47,928 to 47,947: they start alike where contacts differ by rounding",
-    "lines of tests, 47,947 to 48,022: a test of settings, and each flag's number tried",
-    "lines of docs, 6,508 to 6,530: how a setting is declared, what each required package does",
-    "lines of docs, 6,530 to 7,174: the tables of files are made from the classes of records",
-    "lines of tests, 48,022 to 48,724: damaged copies of each kind of file; fields",
-    "lines of tests, 48,724 to 48,885: the programs of the families as the paper has them",
-    "lines of packages, 60,317 to 60,323: uneven rows in files are refused; tilts are compiled",
-    "lines of docs, 7,165 to 7,189: the way of an object and of a grasp, drawn",
-    "lines of packages, 60,323 to 60,426: first slips of sudden loads; the object's surface",
-    "lines of tests, 48,885 to 49,006: a benchmark of the object's surface against pads",
-    "lines of docs, 7,189 to 7,193: what fingertips touch",
-    "lines of tests, 49,006 to 49,028: objects that are not convex; margins that files hold",
-    "lines of docs, 7,193 to 7,200: durations of trials; fidelity on objects that are not convex",
-    "lines of tests, 49,028 to 49,035: loops that are called once; counts of many sets of faces",
-    "lines of tests, 48,947 to 48,970: linear programs by another rule; golden on any processor",
     "lines of packages, 57,054 to 57,106: linear programs whose rows nearly coincide",
-    "lines of tests, 48,970 to 48,982: such programs, and shaken objects",
-    "lines of docs, 7,196 to 7,204: how letters differ from the paper's; what it leaves open",
+    "lines of packages, 57,106 to 57,115: a working folder that is gone is named",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
 
