@@ -312,7 +312,8 @@ class _Judge:
     def _lost(self, lost: CarriedContact) -> str:
         near = f"no face is within {math.degrees(self.rule.angle):.4g} deg of it"
         if math.isfinite(lost.distance):
-            near = f"the nearest face like it is {MM * lost.distance:.2f} mm away"
+            reach = f"distance_m allows {MM * self.rule.reach:.2f} mm"
+            near = f"the nearest face like it is {MM * lost.distance:.2f} mm away, {reach}"
         return f"finger {lost.finger} has lost face {lost.old_face}: {near}"
 
 

@@ -324,8 +324,8 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
     if split is not None and not chosen.manifest.count("objects", split):
         warnings.warn(
             f"{folder}: the split {split} has no objects; the dataset has "
-            f"{splits_in_words(chosen.manifest)}. Another seed splits the objects in another way, "
-            "and docs/datasets.md says how to choose",
+            f"{splits_in_words(chosen.manifest)}. Load all of a small dataset, and split it "
+            "by object as docs/datasets.md shows",
             stacklevel=2,
         )
     return {name: read_columns(chosen.paths(name), name, chosen.tables) for name in chosen.tables}

@@ -87,7 +87,8 @@ def test_a_face_that_moved_too_far_is_named_with_finger_face_and_distance(box):
         assert lost.contact is None
         assert lost.distance == pytest.approx(2e-3, abs=1e-12)
         assert each.reason == (
-            f"finger {finger} has lost face 3: the nearest face like it is 2.00 mm away"
+            f"finger {finger} has lost face 3: the nearest face like it is 2.00 mm away, "
+            "distance_m allows 1.50 mm"
         )
     assert "face 3 moved 2.00 mm outward" in found.faces_in_words
     exactly = gc.transfer(body, with_face_moved(body, 3, 2e-3), grasps, FRICTION, distance=2e-3)
