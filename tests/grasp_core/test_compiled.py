@@ -103,6 +103,7 @@ def copies(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_another_environment_finds_what_one_has_compiled_until_what_it_calls_is_changed(
     copies, tmp_path
 ):

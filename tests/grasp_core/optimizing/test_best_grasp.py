@@ -139,6 +139,7 @@ PROOFS = [
 
 
 @pytest.mark.parametrize(("name", "gap", "measure", "wrenches", "least"), PROOFS)
+@pytest.mark.slow
 def test_fractions_confirm_a_small_proof(
     name, gap, measure, wrenches, least, tmp_path, monkeypatch
 ):
@@ -195,6 +196,7 @@ def test_files_that_are_damaged_are_refused(tmp_path):
     ("name", "gap"),
     [("tetrahedron", 0.4), pytest.param("octahedron", 0.3, marks=pytest.mark.slow)],
 )
+@pytest.mark.slow
 def test_corners_shaken_by_last_digits_give_the_same_grasp_and_proof(name, gap):
     """Symmetric objects have equal twists and equal contacts, between which rounding may choose."""
     body, rng = example_object(name), np.random.default_rng(0)
@@ -229,6 +231,7 @@ def test_contacts_that_no_learned_twist_refutes_are_divided(monkeypatch):
     assert in_a_row.count(2) > CLIMBED  # more than climbs that stay where they begin
 
 
+@pytest.mark.slow
 def test_parts_that_leave_nodes_to_others_prove_as_much(monkeypatch):
     body, whole = example_object("tetrahedron"), easy()
     monkeypatch.setattr(search, "PART_NODES", 60)

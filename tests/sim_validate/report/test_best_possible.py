@@ -20,6 +20,7 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_each_page_says_the_share_that_its_grasp_reaches_of_the_bound(folder):
     best = json.loads((folder / "best.json").read_text())
     report = write_report(folder, jobs=1)
