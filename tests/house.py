@@ -14,8 +14,8 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 57_116,
     "modules of packages": 239,
-    "lines of tests": 41_719,
-    "lines of docs": 3_785,
+    "lines of tests": 41_717,
+    "lines of docs": 3_784,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""

@@ -60,7 +60,7 @@ def test_only_folders_that_were_made_for_nothing_go_again(tmp_path):
 
 
 def test_a_new_plan_removes_results_about_another_and_nothing_else(tmp_path):
-    """Those about ids of people's own as well; other files stay, even if they end as results do."""
+    """Results about ids of people's own go as well; files that only end as results do stay."""
     out, grasps = str(tmp_path), tmp_path / "grasps.json"
     assert main([*PLAN, "--limit", "1", "--out", out]) == 0
     document = json.loads(grasps.read_text())

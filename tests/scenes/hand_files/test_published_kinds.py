@@ -225,7 +225,7 @@ COUPLED = {
 
 @pytest.mark.parametrize("case", COUPLED)
 def test_equalities_are_about_the_angles_in_which_a_file_is_drawn(case, tmp_path):
-    """As c - 0 = 0.2 + 0.5 (b - 10 degrees); chains end at one free joint."""
+    """The rule is c - 0 = 0.2 + 0.5 (b - 10 degrees), and a chain of rules ends at a free joint."""
     rules, wanted = COUPLED[case]
     found = [(c.joint, c.driver, c.ratio, c.offset) for c in coupled(tmp_path, rules).couplings]
     assert [each[:2] for each in found] == [each[:2] for each in wanted]

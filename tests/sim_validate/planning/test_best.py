@@ -51,7 +51,6 @@ def test_a_time_limit_ends_with_the_gap_reached(capsys):
 
 
 def test_a_task_can_be_held_best(tmp_path, capsys):
-    """Of the weight see the reports."""
     task = tmp_path / "lift.json"
     task.write_text(
         '{"wrenches": [{"name": "lift", "force_n": [0, 0, -3]}, '

@@ -264,7 +264,6 @@ def test_the_pixels_of_a_map_are_where_its_directions_are():
 
 @pytest.mark.parametrize("pairs", [((0.013, 0.013), (0.4, 0.41)), ((1e-4, 1e-4), (0.5, 0.7))])
 def test_labels_of_fidelity_are_whole(pairs):
-    """Of the other charts see `tests/test_docs_pictures.py`."""
     assert_whole(fidelity_panel(Agreement("largest wrench [N], torques over grasp size", pairs)))
 
 
