@@ -2,6 +2,8 @@
 
 import numpy as np
 
+import grasp_core as gc
+
 NOT_NUMBERS = {
     "none": None,
     "text": "a",
@@ -93,6 +95,7 @@ def spread(good):
     return array(good) | {"tiny": 1e-300 * np.array(good)}
 
 
+MOTORS = optional(VALUE) | {"of three contacts": gc.Motors.of(np.eye(2, 9), 1.0)}
 USUAL = (
     dict.fromkeys(("body", "grasp", "hand", "reach", "scene", "record", "grip", "plan"), VALUE)
     | dict.fromkeys(("setup", "physics", "patches", "agenda", "view"), optional(VALUE))
@@ -103,6 +106,10 @@ USUAL = (
     | dict.fromkeys(("name", "object_path"), TEXT)
     | {
         "friction": FRICTION,
+        "torsion_m": each_of(NOT_NUMBERS, "tiny") | {"negative": -0.01, "ten million km": 1e10},
+        "motors": MOTORS,
+        "down": optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]},
+        "push_n": POSITIVE,
         "path": PATH,
         "seed": SEED,
         "flatness_m": optional(NOT_NEGATIVE),

@@ -8,12 +8,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 import grasp_core as gc
 import scenes
 import sim_validate as sv
 from tests.public_values.bad_values import PATH, USUAL
 
 FOLDER = TemporaryDirectory()
+WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
 @cache

@@ -1,5 +1,6 @@
-"""Functions about grasps as they are executed: a call of each, and what they must refuse."""
+"""Grasps as they are executed, hands and published tests: a call of each, what they must refuse."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,12 +9,16 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.forces.contact_forces import even_forces
+from sim_validate.hands.trials import cube, hinged_hand, stance
 from tests.public_values.bad_values import (
     AT_LEAST_ONE,
     FRICTION,
+    MOTORS,
     NOT_NEGATIVE,
+    PATH,
     POSITIVE,
     SEVERAL,
+    SWITCH,
     VALUE,
     WORD,
     array,
@@ -21,9 +26,8 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import Call, body, fields_of, grasp
+from tests.public_values.call import WRENCH, Call, body, fields_of, grasp, reading
 
-WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 GRAVITY = np.array([0.0, 0.0, -9.8])
 
 
@@ -34,11 +38,6 @@ def squeeze():
 @cache
 def gripped():
     return gc.grip(body(), grasp(), 0.5, squeeze())
-
-
-@cache
-def held_scene():
-    return scenes.build_held_scene(body(), gripped(), scenes.HeldSettings(mass_kg=0.1))
 
 
 def tilted():
@@ -55,7 +54,6 @@ ARGUMENTS = {
     "stiffness": each_of(POSITIVE) | {"not symmetric": np.triu(np.ones((4, 3, 3)))},
     "tip_radius_m": each_of(NOT_NEGATIVE),
 }
-MOTORS = optional(VALUE) | {"of three contacts": gc.Motors.of(np.eye(2, 9), 1.0)}
 CARRYING = gc.Motors.of(np.eye(2, 12), 1.0, 0.5)
 ONE_TRIAL = sv.ExecutionSettings(0.1, trials=("weight",))
 HELD = {
@@ -65,6 +63,45 @@ HELD = {
     "damping_ratio": POSITIVE | {"a hundred": 100.0},
     "down": array(GRAVITY) | {"zero": (0.0, 0.0, 0.0), "minute": (1e-300, 0.0, 0.0)},
 }
+
+
+def reaching():
+    return {
+        "hand": gc.load_hand("allegro"), "body": body(), "grasp": grasp(), "friction": 0.5,
+        "starts": 1,
+    }  # fmt: skip
+
+
+def standing():
+    return {"hand": hinged_hand(), "body": cube(), "reach": stance(0.5), "friction": 0.5}
+
+
+def weighing():
+    """The hand with links of ten grams."""
+    hand = hinged_hand()
+    fingers = tuple(
+        replace(finger, links=tuple(
+            replace(link, mass_kg=0.01, center_of_mass=np.zeros(3)) for link in finger.links
+        ))
+        for finger in hand.fingers
+    )  # fmt: skip
+    return replace(hand, fingers=fingers)
+
+
+ROOT = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+NAME = unless(WORD, "list") | {"list": ["dexgraspbench"]}
+QPOS = array([*ROOT, 0.1]) | {"no turn": np.zeros(8)}
+
+
+def record():
+    return sv.dex_record(hinged_hand(), stance(0.5), "object")
+
+
+def recorded():
+    qpos = [*ROOT, 0.1]
+    return {"object_path": "object", "object_scale": 1.0, "object_pose": ROOT, "pregrasp": qpos,
+            "grasp": qpos, "squeeze": qpos}  # fmt: skip
+
 
 CALLS = [
     Call("gc.grip", lambda: held(squeeze=squeeze())(), ARGUMENTS | {
@@ -79,7 +116,6 @@ CALLS = [
     Call("gc.best_squeeze", held(loads=gc.any_direction(0.1)), ARGUMENTS | {
         "loads": VALUE,
         "max_push_n": optional(POSITIVE),
-        "motors": MOTORS,
     }),
     Call("gc.payload", held(max_push_n=10.0), ARGUMENTS | {
         "max_push_n": POSITIVE,
@@ -102,7 +138,6 @@ CALLS = [
         "reach_m": optional(POSITIVE),
     }),
     Call("sv.ExecutionSettings", lambda: fields_of(sv.ExecutionSettings, ONE_TRIAL), HELD | {
-        "push_n": POSITIVE,
         "tip_stiffness_n_per_m": POSITIVE,
         "tip_radius_m": optional(POSITIVE),
         "trials": SEVERAL | {"none of them": (), "unknown": ("lift", "throw"), "one": "lift"},
@@ -128,4 +163,62 @@ CALLS = [
         "mass_kg": optional(POSITIVE),
         "physics": optional(VALUE) | {"other gravity": tilted()},
     }),
+    Call("gc.hand_motors", lambda: {"hand": hinged_hand(), "reach": stance(0.5)}, {
+        "any_orientation": SWITCH,
+    }),
+    Call("gc.hand_payload", lambda: {
+        "hand": weighing(), "body": cube(), "reach": stance(0.5), "friction": 0.5,
+        "max_push_n": 10.0,
+    }, {
+        "friction": each_of(FRICTION, "zero"),
+        "max_push_n": POSITIVE, "gap": POSITIVE | {"one": 1.0, "too fine": 1e-5},
+    }),
+    Call("scenes.build_hand_scene", standing),
+    Call("sv.hand_setup", dict),
+    Call("sv.validate_hand", standing),
+    Call("sv.execute_hand", lambda: standing() | {"mass_kg": 0.1}, {
+        "settings": optional(VALUE),
+    }, succeeds_in="tests/sim_validate/hands/test_execute_hand.py"),
+    Call("gc.load_hand", lambda: {"name": "leap"}, {"name": WORD}),
+    Call("gc.reach_with", reaching, {
+        "regions": SWITCH,
+        "table_down": optional(array([0.0, 0.0, -1.0])) | {"zero": [0.0, 0.0, 0.0]},
+        "clearance_m": NOT_NEGATIVE | {"large": 0.5},
+        "starts": AT_LEAST_ONE | {"many": 10**6},
+    }, slow=True),
+    Call("scenes.load_hand", lambda: {"hand": "allegro"}, {
+        "hand": WORD, "fingertips": unless(SEVERAL, "text") | {"for a built-in hand": ["tip"]},
+    }),
+    Call("sv.protocol_names", dict),
+    Call("sv.protocol", lambda: {"name": "dexonomy"}, {"name": NAME}),
+    Call("sv.judge_by", lambda: {
+        "protocol": "dexonomy", "body": body(), "grasp": grasp(), "friction": 0.5,
+    }, {"protocol": NAME, "grasp": SEVERAL}),
+    Call("sv.judge_hand_by", lambda: {
+        "protocol": "dexonomy", "hand": hinged_hand(), "body": cube(), "reach": stance(0.5),
+        "friction": 0.5,
+    }, {"protocol": NAME}),
+    Call("sv.DexRecord", recorded, {
+        "object_scale": POSITIVE,
+        "object_pose": array(ROOT) | {"no turn": np.zeros(7)},
+        **dict.fromkeys(("pregrasp", "grasp", "squeeze"), QPOS),
+    }),
+    Call("sv.dex_record", lambda: {
+        "hand": hinged_hand(), "reach": stance(0.5), "object_path": "object",
+    }, {
+        "servo_n_m_per_rad": optional(POSITIVE), "gap_m": optional(POSITIVE),
+    }),
+    Call("sv.reach_of_record", lambda: {
+        "record": record(), "hand": hinged_hand(), "body": cube(), "friction": 0.5,
+    }, {
+        "hand": VALUE | {"another": gc.load_hand("leap")},
+        "touch_m": NOT_NEGATIVE,
+    }),
+    reading("sv.load_dex_record", "no/such/0.npy",
+            "tests/sim_validate/hands/test_dexgraspbench.py"),
+    Call("sv.write_dex_record", lambda: {"record": record(), "path": "no/such/0.npy"},
+         succeeds_in="tests/sim_validate/hands/test_dexgraspbench.py"),
+    Call("sv.write_dex_object", lambda: {"body": body(), "folder": "no/such"}, {
+        "folder": PATH,
+    }, succeeds_in="tests/sim_validate/hands/test_dexgraspbench.py"),
 ]  # fmt: skip

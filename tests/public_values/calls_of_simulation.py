@@ -19,9 +19,8 @@ from tests.public_values.bad_values import (
     optional,
     unless,
 )
-from tests.public_values.call import Call, body, grasp, of_grasp, plan, reading, scene
+from tests.public_values.call import WRENCH, Call, body, grasp, of_grasp, plan, reading, scene
 
-WRENCH = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 CENTER = np.zeros(3)
 IN_HAND = {"hand": optional(VALUE), "reach": optional(VALUE)}
 CALLS = [

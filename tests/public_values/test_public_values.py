@@ -11,21 +11,10 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.declared import MOST
-from tests.public_values import (
-    calls_of_analysis,
-    calls_of_execution,
-    calls_of_hands,
-    calls_of_protocols,
-    calls_of_simulation,
-    calls_of_values,
-)
+from tests.public_values import calls_of_execution, calls_of_grasp_core, calls_of_simulation
 
 PACKAGES = {"gc": gc, "scenes": scenes, "sv": sv}
-CALLS = [
-    *calls_of_analysis.CALLS, *calls_of_execution.CALLS, *calls_of_hands.CALLS,
-    *calls_of_values.CALLS,
-    *calls_of_simulation.CALLS, *calls_of_protocols.CALLS,
-]  # fmt: skip
+CALLS = [*calls_of_grasp_core.CALLS, *calls_of_execution.CALLS, *calls_of_simulation.CALLS]
 BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
     "gc": "BestGrasp BestSqueeze CarriedContact CarriedGrasp CertifiedRegions ClosureCertificate "
