@@ -26,7 +26,7 @@ def damaged(document, count=200, seed=0):
     """
     rng = random.Random(seed)  # noqa: S311 - nothing is kept secret
     everywhere = dict[tuple, list[tuple]]()
-    for place in _places(document, ()):
+    for place in places(document, ()):
         everywhere.setdefault(tuple(k for k in place if isinstance(k, str)), []).append(place)
     faults = []
     for same in everywhere.values():
@@ -46,13 +46,13 @@ def damaged(document, count=200, seed=0):
         yield what, place, changed
 
 
-def _places(value, place):
+def places(value, place):
     """Yield where the values of a document are, at any depth."""
     items = value.items() if isinstance(value, dict) else enumerate(value)
     for key, item in items:
         yield (*place, key)
         if isinstance(item, dict | list):
-            yield from _places(item, (*place, key))
+            yield from places(item, (*place, key))
 
 
 def _fits(what, document, place):
