@@ -11,17 +11,7 @@ TETRA_CENTERS = -TETRAHEDRON / 3.0
 def pyramid_wrenches(positions, normals, friction, sides, *, outer):
     """Wrenches of the edges of pyramids inside (or, with `outer`, around) the friction cones.
 
-    About the contacts' mean point and at unit size; normal parts are one.
-
-    Args:
-        positions: (k, 3)
-        normals: (k, 3)
-        friction: One for all contacts or one each.
-        sides: Of each pyramid.
-        outer: Whether the cones lie in the pyramids or the pyramids in the cones.
-
-    Returns:
-        (k * sides, 6)
+    About the contacts' mean point and at unit size; normal parts are one; (k * sides, 6).
     """
     center = positions.mean(axis=0)
     size = np.linalg.norm(positions - center, axis=1).max()
@@ -40,21 +30,11 @@ def pyramid_wrenches(positions, normals, friction, sides, *, outer):
 def pyramid_margin(positions, normals, friction, sides, *, outer):
     """Closure margin with pyramids inside (or, with `outer`, around) the friction cones.
 
-    Maximises the smallest weight of the pyramids' edges over combinations that balance;
-    positive means closure of the pyramids when their wrenches have rank 6.
+    Positive means closure of the pyramids when their wrenches have rank 6.
     """
-    W = pyramid_wrenches(positions, normals, friction, sides, outer=outer).T
-    count = W.shape[1]
-    rows = np.hstack([-np.eye(count), np.ones((count, 1))])
-    equalities = np.vstack([np.append(W, np.zeros((6, 1)), axis=1), np.append(np.ones(count), 0.0)])
-    answer = linprog(
-        np.append(np.zeros(count), -1.0),
-        A_ub=rows, b_ub=np.zeros(count),
-        A_eq=equalities, b_eq=np.append(np.zeros(6), 1.0),
-        bounds=[(None, None)] * (count + 1), method="highs",
-    )  # fmt: skip
-    assert answer.status in (0, 2), answer.message
-    return answer.x[-1] if answer.status == 0 else -np.inf
+    W = pyramid_wrenches(positions, normals, friction, sides, outer=outer)
+    weights, _ = least_weight_program(W)
+    return weights.min() if weights.any() else -np.inf
 
 
 def pyramids_say(positions, normals, friction, sides):
@@ -80,14 +60,14 @@ carry rounding errors of some 1e-15."""
 
 
 def least_weight_program(W):
-    """The dual of the program of `pyramid_margin`, with seven variables only.
+    """Weights of wrenches that balance and sum to one, whose least is as large as can be.
 
-    Minimises z over twists y with w.y + z >= 0 for all wrenches w, where these slacks sum to
-    one. The multipliers are what the weights exceed their least by, which is z; where z is
-    negative, y separates.
+    By the dual of that program, which has seven variables only: it minimises z over twists y with
+    w.y + z >= 0 for all wrenches w, where these slacks sum to one. The multipliers are what the
+    weights exceed their least by, which is z; where z is negative, y separates.
 
     Returns:
-        Weights (n,), and the twist (6,).
+        Weights (n,), which are zero where no wrenches balance, and the twist (6,).
     """
     count = len(W)
     leaving = np.linalg.lstsq(W, np.ones(count), rcond=None)[0]
@@ -108,11 +88,7 @@ def picks_positively_span(axes, half_angle, sides):
 
     The determinant of three vectors is linear in each, so its sign over three pyramids is
     the sign over their edges: for pyramids this is Definition 3 without any approximation.
-
-    Args:
-        axes: (q, 4, 3).
-        half_angle: Of the cones on which the pyramids' edges lie, (q,).
-        sides: Edges of each pyramid.
+    The cones of axes (q, 4, 3) and half angles (q,) hold the pyramids' edges.
     """
     helper = np.eye(3)[np.argmin(np.abs(axes), axis=2)]
     u = np.cross(helper, axes)

@@ -1,6 +1,6 @@
 """Compares plans, regions and verdicts under other arithmetic: BLAS, NumPy features, threads.
 
-    python -m tests.benchmarks.machines [--quick] [--meshes FOLDER]
+    python -m tests.benchmarks.machines [--quick] [OBJECT ..]
 
 Each arithmetic stands for another machine: the environment of a process tells OpenBLAS, NumPy
 and Numba which processor to work for. Every object is planned at every friction in each of them,
@@ -66,24 +66,17 @@ def dispatched():
     return [name for name in module.__cpu_dispatch__ if module.__cpu_features__.get(name)]
 
 
-def objects(quick, meshes):
-    """Names of built-in objects and paths of meshes."""
+def objects(quick):
+    """Names of built-in objects."""
     built_in = [name for name in scenes.example_names() if name != "random-FACES-SEED"]
-    names = QUICK if quick else (*built_in, *HULLS)
-    files = sorted(p for p in meshes.rglob("*") if p.suffix in {".ply", ".obj", ".stl", ".off"}) \
-        if meshes else []  # fmt: skip
-    return [*names, *map(str, files)]
-
-
-def loaded(name):
-    return gc.load_polyhedron(name) if Path(name).suffix else scenes.example_object(name)
+    return QUICK if quick else (*built_in, *HULLS)
 
 
 def answers(names):
     """What is planned and simulated, by case, for JSON."""
     found = {}
     for name in names:
-        body = loaded(name)
+        body = scenes.example_object(name)
         for friction in FRICTIONS:
             plan = gc.plan(body, friction, limit=LIMIT)
             found[f"{name} at {friction:.4f}"] = [as_json(body, grasp) for grasp in plan.grasps]
@@ -203,18 +196,16 @@ def asked(environment, names):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="five objects, three arithmetics")
-    parser.add_argument("--meshes", type=Path, metavar="FOLDER", help="mesh files beside them")
-    parser.add_argument("--only", action="append", metavar="ARITHMETIC", help="beside the own one")
+    parser.add_argument("--quick", action="store_true", help="five objects, two arithmetics")
     parser.add_argument("--answer", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("names", nargs="*", help="objects, instead of all")
     options = parser.parse_args()
     if options.answer:
         options.answer.write_text(json.dumps(answers(options.names)))
         return
-    names = options.names or objects(options.quick, options.meshes)
+    names = options.names or objects(options.quick)
     every = arithmetics()
-    kept = options.only or (("least of all",) if options.quick else list(every)[1:])
+    kept = ("least of all",) if options.quick else list(every)[1:]
     own, differing = asked({}, names), 0
     grasps = sum(len(each) for each in own.values() if isinstance(each, list))
     print(f"{len(names)} objects, {len(own)} cases, {grasps} grasps", flush=True)

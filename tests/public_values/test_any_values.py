@@ -1,8 +1,8 @@
 """Whatever numbers and letters are handed in, there is an answer or a refusal of our own."""
 
+import contextlib
 import math
 import pickle
-from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from hypothesis.extra.numpy import arrays
 
 import grasp_core as gc
 import scenes
-import sim_validate as sv
 from grasp_core.kinds import FieldError
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
@@ -36,22 +35,12 @@ OF_CONTACTS = {
     "lines": gc.classify_lines,
     "singular value": lambda x, _: gc.smallest_singular_value(x, torque_scale=1.0),
 }
-SETTINGS = [
-    (kind, each.name)
-    for kind in (scenes.FingerSettings, scenes.PhysicsSettings, sv.HoldProtocol, sv.Noise,
-                 gc.PatchLimits)
-    for each in fields(kind)
-    if each.type in {"float", "float | None", float, float | None}
-]  # fmt: skip
 
 
 def answered(ask, *arguments):
-    """Whether there was an answer, or a refusal of our own; anything else is raised."""
-    try:
+    """There is an answer, or a refusal of our own; anything else is raised."""
+    with contextlib.suppress(gc.GraspError):
         ask(*arguments)
-    except gc.GraspError:
-        return False
-    return True
 
 
 @pytest.mark.parametrize("what", OF_CONTACTS)
@@ -80,14 +69,6 @@ def test_any_wrench_center_and_limit_is_answered_or_refused(wrench, center, most
 @given(st.one_of(st.text(), st.from_regex(r"random-\w{1,4}-\w{1,3}", fullmatch=True)))
 def test_any_name_of_an_object_is_answered_or_refused(name):
     answered(scenes.example_object, name)
-
-
-@pytest.mark.parametrize(("kind", "name"), SETTINGS)
-@given(number=ANY)
-def test_a_setting_is_refused_or_finite_and_kept(kind, name, number):
-    if answered(lambda: kind(**{name: number})):
-        assert math.isfinite(number)
-        assert getattr(kind(**{name: number}), name) == number
 
 
 GIVEN = {gc.MeshError: (gc.MeshRefusal.OPEN, "mended so"), FieldError: ("size_m", "is wrong")}
