@@ -11,7 +11,7 @@ import numpy as np
 from grasp_core.optimizing import best_grasp as result
 from grasp_core.optimizing.support_cuts import CutTree
 from grasp_core.quality.ferrari_canny import FerrariCanny
-from tests.attacks.searching import Attack, always, cycled, power
+from tests.attacks.searching import Attack, always, power
 from tests.attacks.wrench_sets import hull_radius
 from tests.tampering import table
 
@@ -108,5 +108,5 @@ def any_quality(monkeypatch):
     monkeypatch.setattr(result, "are_contacts_of", always(True))
 
 
-TREE = Attack(lambda rng: cycled(rng, [lower_bounds]), (unreplayed,), 2000)
-BEST = Attack(lambda rng: cycled(rng, [lower_best]), (unreplayed, any_quality), 600)
+TREE = Attack((lower_bounds,), (unreplayed,), 2000)
+BEST = Attack((lower_best,), (unreplayed, any_quality), 600)

@@ -12,7 +12,7 @@ import numpy as np
 import grasp_core as gc
 from grasp_core.closure import force_closure as closure
 from grasp_core.closure import friction_interval
-from tests.attacks.searching import Attack, cycled, power, tiny
+from tests.attacks.searching import Attack, power, tiny
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
 from tests.judges import random_contacts
 from tests.tampering.exact_closure import margin_of
@@ -108,9 +108,7 @@ def too_small_a_margin(rng):
 
 
 CLOSURE = Attack(
-    lambda rng: cycled(
-        rng, [open_though_closed, closed_though_open, too_large_a_margin, too_small_a_margin]
-    ),
+    (open_though_closed, closed_though_open, too_large_a_margin, too_small_a_margin),
     (lambda monkeypatch: monkeypatch.setattr(closure, "of_order_one", lambda *arrays: arrays),),
     3000,
 )  # fmt: skip
@@ -146,7 +144,7 @@ def too_large_a_soft_margin(rng):
 
 
 SOFT = Attack(
-    lambda rng: cycled(rng, [soft_though_open, too_large_a_soft_margin]),
+    (soft_though_open, too_large_a_soft_margin),
     (lambda monkeypatch: monkeypatch.setattr(closure, "_lower_bound", lambda *_: math.inf),),
     1500,
 )  # fmt: skip
@@ -204,6 +202,5 @@ def nearly_at_rest(monkeypatch):
 
 
 FRICTION = Attack(
-    lambda rng: cycled(rng, [too_low_an_upper_end, too_high_a_lower_end, put_to_rest]),
-    (nearly_at_rest,), 2000,
-)  # fmt: skip
+    (too_low_an_upper_end, too_high_a_lower_end, put_to_rest), (nearly_at_rest,), 2000
+)

@@ -15,7 +15,7 @@ from grasp_core.families.free import Absence
 from grasp_core.geometry import polygons as flat_polygons
 from grasp_core.regions import proof as covers
 from grasp_core.regions.proof import CertifiedRegions
-from tests.attacks.searching import Attack, always, cycled, power
+from tests.attacks.searching import Attack, always, power
 from tests.grasp_core.exact_judges import open_exactly
 from tests.tampering import on_planes, table
 from tests.tampering.exact_closure import closed, tangents
@@ -65,7 +65,7 @@ def without_slack(monkeypatch):
     monkeypatch.setattr(covers, "slack_of", lambda F, _: np.full(len(F), -1e9))
 
 
-COVER = Attack(lambda rng: cycled(rng, [cover_at_less_friction]), (without_slack,), 600)
+COVER = Attack((cover_at_less_friction,), (without_slack,), 600)
 
 
 def with_scale(r, rng, **changed):
@@ -131,7 +131,7 @@ def beyond_borders(rng):
 
 
 REGIONS = Attack(
-    lambda rng: cycled(rng, [farther_discs, regions_at_less_friction, beyond_borders]),
+    (farther_discs, regions_at_less_friction, beyond_borders),
     (
         lambda monkeypatch: monkeypatch.setattr(
             CertifiedRegions, "_has_fitting_scale", always(True)
@@ -190,7 +190,7 @@ def absent_though_held(rng):
 
 
 ABSENCE = Attack(
-    lambda rng: cycled(rng, [absent_though_held]),
+    (absent_though_held,),
     (lambda monkeypatch: monkeypatch.setattr(Absence, "_separated", always(True)),),
     1200,
 )

@@ -16,7 +16,7 @@ from grasp_core.execution import carried_mass, squeeze_certificate
 from grasp_core.execution.carried_mass import Payload
 from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.quality.wrench_limits import body_of
-from tests.attacks.searching import Attack, cycled, power, tiny
+from tests.attacks.searching import Attack, power, tiny
 from tests.tampering import table
 from tests.tampering.exact_closure import unit_arms
 from tests.tampering.hand_payloads import held
@@ -134,10 +134,7 @@ def any_slack(monkeypatch):
     monkeypatch.setattr(checked, "bounds", bounds)
 
 
-LIMIT = Attack(
-    lambda rng: cycled(rng, [long_facets, huge_multipliers, higher_limits, small_loads]),
-    (any_slack,), 4000,
-)  # fmt: skip
+LIMIT = Attack((long_facets, huge_multipliers, higher_limits, small_loads), (any_slack,), 4000)
 
 
 @cache
@@ -222,12 +219,7 @@ def keeping(monkeypatch):
     monkeypatch.setattr(squeeze_certificate, "replace", lambda value, **_: value)
 
 
-SQUEEZE = Attack(
-    lambda rng: cycled(
-        rng, [other_multipliers, surviving_more, kept_values]
-    ),
-    (short_counts, keeping), 2500,
-)  # fmt: skip
+SQUEEZE = Attack((other_multipliers, surviving_more, kept_values), (short_counts, keeping), 2500)
 
 
 def holding_most(c):
@@ -283,23 +275,19 @@ def holds_more(rng, c, least):
     )
 
 
-def of_hand(claim):
-    """A claim about the payload of a hand."""
-    return lambda rng: claim(rng, *hand(any_seed(rng)))
+def hand_holds_less(rng):
+    return holds_less(rng, *hand(any_seed(rng)))
 
 
-def of_contacts(claim):
+def hand_holds_more(rng):
+    return holds_more(rng, *hand(any_seed(rng)))
+
+
+def contacts_hold_otherwise(rng):
     """A claim about the payload of contacts, beside a genuine squeeze."""
-
-    def made(rng):
-        fixed, known = payload(any_seed(rng))
-        free = claim(rng, *known)
-        return None if free is None else lambda: Payload(fixed, free())
-
-    return made
-
-
-CLAIMS = [holds_less, holds_more]
+    fixed, known = payload(any_seed(rng))
+    free = (holds_less, holds_more)[rng.integers(2)](rng, *known)
+    return None if free is None else lambda: Payload(fixed, free())
 
 
 def short_facets(monkeypatch):
@@ -307,7 +295,5 @@ def short_facets(monkeypatch):
     monkeypatch.setattr(carried_mass, "of_order_one", lambda *arrays: list(arrays))
 
 
-PAYLOAD = Attack(
-    lambda rng: cycled(rng, [of_contacts(claim) for claim in CLAIMS]), (short_facets,), 1500
-)
-HAND = Attack(lambda rng: cycled(rng, [of_hand(claim) for claim in CLAIMS]), (short_facets,), 2000)
+PAYLOAD = Attack((contacts_hold_otherwise,), (short_facets,), 1500)
+HAND = Attack((hand_holds_less, hand_holds_more), (short_facets,), 2000)

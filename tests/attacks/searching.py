@@ -7,9 +7,9 @@ or by conic programs, never by the checker.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,8 @@ import grasp_core as gc
 class Attack:
     """A search for false certificates of one class."""
 
-    forge: Callable[[np.random.Generator], Iterator[tuple[str, Callable[[], Any]]]]
-    """Yields the name of a way, and a function that makes a false certificate."""
+    ways: tuple[Callable[[np.random.Generator], Callable[[], Any] | None], ...]
+    """Forgers: each gives a function that makes a false certificate, or None."""
     weaken: tuple[Callable[[Any], None], ...]
     """Each takes one check out of the checker, given pytest's monkeypatch; false claims verify
     then."""
@@ -31,18 +31,19 @@ class Attack:
 
 @dataclass
 class Score:
-    """What became of the forged certificates."""
+    """What became of false certificates."""
 
     tries: Counter = field(default_factory=Counter)
-    """By way."""
+    """By way of forging, or by field."""
     accepted: list = field(default_factory=list)
     raised: list = field(default_factory=list)
 
 
-def attacked(attack, tries, seed=0):
-    """Try so many false certificates."""
-    score = Score()
-    for way, make in islice(attack.forge(np.random.default_rng(seed)), tries):
+def attacked(attack, tries):
+    """Try so many false certificates, of each way in turn."""
+    score, rng = Score(), np.random.default_rng(0)
+    forged = ((way.__name__, way(rng)) for way in cycle(attack.ways))
+    for way, make in islice((each for each in forged if each[1] is not None), tries):
         score.tries[way] += 1
         try:
             with np.errstate(all="ignore"):
@@ -61,15 +62,6 @@ def attacked(attack, tries, seed=0):
 def power(rng, low, high):
     """A number whose logarithm is spread evenly."""
     return 10.0 ** rng.uniform(low, high)
-
-
-def cycled(rng, ways):
-    """Yield ways, (name, function of the generator), in turn; a way may give None."""
-    while True:
-        for way in ways:
-            make = way(rng)
-            if make is not None:
-                yield way.__name__, make
 
 
 def tiny(rng, size):

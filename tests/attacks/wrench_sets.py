@@ -17,7 +17,7 @@ from grasp_core.closure.wrench_sets import WrenchSet, into_cones
 from grasp_core.quality import ferrari_canny
 from grasp_core.quality.ferrari_canny import RAYS, FerrariCanny, InnerPolytope, wrench_set_quality
 from grasp_core.quality.measures import Measure, resisted_loads, task_limits
-from tests.attacks.searching import Attack, always, cycled, power
+from tests.attacks.searching import Attack, always, power
 from tests.judges import random_contacts
 from tests.tampering.exact_closure import conic
 from tests.tampering.wrench_bounds import demand, scaled, support
@@ -254,10 +254,10 @@ def less_resisted(rng):
 
 
 QUALITY = Attack(
-    lambda rng: cycled(rng, [doubled_slivers, thin_borders, far_only, upper_too_low, far_levers]),
+    (doubled_slivers, thin_borders, far_only, upper_too_low, far_levers),
     (crossed_by_sign, far_slack), 5000,
 )  # fmt: skip
 LOADS = Attack(
-    lambda rng: cycled(rng, [more_resisted, less_resisted]),
+    (more_resisted, less_resisted),
     (lambda monkeypatch: monkeypatch.setattr(resisted, "are_allowed", always(True)),),
 )

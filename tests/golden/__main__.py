@@ -10,18 +10,22 @@ anything differs. Under OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic it judg
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.golden.cases import CASES
+from tests.golden.cases import CASES, GIVEN
 from tests.golden.comparing import differences, kept_of, unlike, unlike_kept
-from tests.golden.making import made
+from tests.golden.fields import fields_of
 
 ROOT = Path(__file__).parent.parent.parent
 KEPT = Path(__file__).with_name("kept.json")
+AT_ONCE = 2
 
 
 def main():
@@ -62,6 +66,39 @@ def write_kept(small):
         lines = [f"{json.dumps(field)}: {json.dumps(kept)}" for field, kept in fields.items()]
         cases.append(f"{json.dumps(name)}: {{\n" + ",\n".join(sorted(lines)) + "\n}")
     KEPT.write_text("{\n" + ",\n".join(cases) + "\n}\n")
+
+
+def made(tree, folder, cases):
+    """Run cases with the packages of a tree; return the fields of each case by its name."""
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        found = pool.map(lambda case: _fields(Path(tree), Path(folder) / case.name, case), cases)
+        return dict(zip([case.name for case in cases], found, strict=True))
+
+
+def _fields(tree, folder, case):
+    folder.mkdir(parents=True)
+    for name, text in GIVEN.items():
+        (folder / name).write_text(text)
+    ended = [_run(tree, folder, *command) for command in case.commands]
+    return fields_of(folder, GIVEN) | {"exit codes": ended}
+
+
+def _run(tree, folder, arguments, file):
+    """Run a command in a folder, and return its exit code."""
+    script = tomllib.loads((tree / "pyproject.toml").read_text())["project"]["scripts"]
+    module, function = script["graspproof"].split(":")
+    code = f"from {module} import {function}; {function}()"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code, *arguments],
+        cwd=folder, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(tree)},
+    )  # fmt: skip
+    if done.returncode > 1:  # 1 is an answer: something was not held or not reached
+        print(f"{folder.name}: {' '.join(arguments)}: exit code {done.returncode}")
+        print(done.stderr[-2000:])
+    if file and not done.returncode:
+        (folder / file).write_text(done.stdout)
+    return done.returncode
 
 
 @contextmanager
