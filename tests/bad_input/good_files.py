@@ -7,6 +7,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from sim_validate.main import main
+from tests.damaged import value_at
 
 
 @cache
@@ -33,12 +34,9 @@ def changed(text: str | bytes, path: str, *values: Any) -> str:
     """A JSON text with another value at a path of keys and places, or without any there."""
     document = json.loads(text)
     *way, last = [int(part) if part.isdigit() else part for part in path.split(".")]
-    place = document
-    for part in way:
-        place = place[part]
-    del place[last]
-    if values and isinstance(place, list):
-        place.insert(last, *values)
-    elif values:
+    place = value_at(document, way)
+    if values:
         (place[last],) = values
+    else:
+        del place[last]
     return json.dumps(document)

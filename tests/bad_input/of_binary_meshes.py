@@ -3,6 +3,7 @@
 import json
 import struct
 
+from tests.bad_input import good_files
 from tests.bad_input.cases import read, refused
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
 
@@ -110,13 +111,7 @@ def glb(said: object, binary: bytes = NUMBERS) -> bytes:
 
 def changed(path: str, value: object) -> bytes:
     """A GLB whose tree has another value at a path of keys and places."""
-    made = tree()
-    *way, last = [int(part) if part.isdigit() else part for part in path.split(".")]
-    place = made
-    for part in way:
-        place = place[part]
-    place[last] = value
-    return glb(made)
+    return glb(good_files.changed(json.dumps(tree()), path, value).encode())
 
 
 GOOD = glb(tree())

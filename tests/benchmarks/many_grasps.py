@@ -6,10 +6,8 @@ Processor seconds of `gc.plan`, with everything between an object and its certif
 The ratio r is the processor time per grasp over that of one linear program of 90 random rows and 16
 variables, solved by `scipy.optimize.linprog` with HiGHS in turns with the plans: it carries over to
 other machines, seconds do not. Where all grasps are planned, the figures that grasps compute when
-they are asked for are timed too. Last come seconds of the clock with one process and with two: they
-find the same grasps, and say something only where two cores have nothing else to do. First the
-plans of small objects are checked: every grasp is in force closure by `gc.force_closure`, and in
-the order of its radius within its family.
+they are asked for are timed too. First the plans of small objects are checked: every grasp is in
+force closure by `gc.force_closure`, and in the order of its radius within its family.
 """
 
 import sys
@@ -26,8 +24,6 @@ ALL = (11, 18, 24, 30)
 """Numbers of faces of random objects all of whose quadruples are decided, by all methods."""
 NORMAL = (18, 24)
 BEST, LIMIT = (100, 200, 400, 800), 20
-SHARED = (24, 30)
-"""Numbers of faces of random objects whose grasps are also planned by two processes."""
 ROWS, VARIABLES, PROGRAMS = 90, 16, 25
 CHECKED = ("random-11-1", "wedge")
 UNDECIDED = 0.001
@@ -78,20 +74,6 @@ def row(what, plan, figures=False):
     )
 
 
-def shared(faces):
-    """Print the seconds of one process and of two, which must find the same grasps."""
-    body, seconds, found = example_object(f"random-{faces}-1"), [], []
-    for jobs in (1, 2):
-        begun = time.perf_counter()
-        plan = gc.plan(body, TEN_DEGREES, jobs=jobs)
-        seconds.append(time.perf_counter() - begun)
-        found.append([(grasp.id, grasp.positions.tobytes()) for grasp in plan.grasps])
-    assert found[0] == found[1]
-    one, two = seconds
-    print(f"all methods, {faces} faces: {one:.1f} s alone, {two:.1f} s by two processes, "
-          f"{one / two:.2f} times as fast", flush=True)  # fmt: skip
-
-
 def main():
     """Print the table; only the small objects with `--quick`."""
     quick = "--quick" in sys.argv
@@ -116,8 +98,6 @@ def main():
             lambda b=body: gc.plan(b, TEN_DEGREES, families=PAPER, limit=LIMIT),
         )
     row("all methods, wedge", lambda: gc.plan(example_object("wedge"), 0.5), figures=True)
-    for faces in SHARED[: 1 if quick else None]:
-        shared(faces)
 
 
 if __name__ == "__main__":

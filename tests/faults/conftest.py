@@ -1,18 +1,17 @@
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from grasp_core.compiled import copy_of
+from tests.bad_input.cases import COMMAND as CLI
 from tests.patience import HANGING_S
 
 ROOT = Path(__file__).parent.parent.parent
 KERNEL = "grasp_core.solvers.lp_kernel"
 KEPT = copy_of(KERNEL, str(ROOT / "grasp_core" / "solvers" / "lp_kernel.py")).parent
 """Where the loops are kept that other tests compile, so that a new home need not compile them."""
-CLI = [sys.executable, "-c", "from sim_validate.main import run_and_exit; run_and_exit()"]
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.bad_input.mesh_texts import obj
-from tests.faults.conftest import KEPT
+from tests.faults.conftest import CLI, KEPT
 from tests.patience import HANGING_S
 
 AUDITING = Path(__file__).with_name("auditing")
@@ -51,14 +51,8 @@ class Witness:
             "TMPDIR": str(self.folder / "scratch"), "PYTHONPATH": f"{AUDITING}:{ROOT}",
             "XDG_CACHE_HOME": str(KEPT.parent),
         }  # fmt: skip
-        command = [
-            sys.executable,
-            "-P",
-            "-c",
-            "from sim_validate.main import run_and_exit as r; r()",
-        ]
         ended = subprocess.run(
-            [*command, *line.split()], cwd=self.folder, env=environment, capture_output=True,
+            [*CLI, *line.split()], cwd=self.folder, env=environment, capture_output=True,
             timeout=HANGING_S, check=False,
         )  # fmt: skip
         os.write(handle, b'["end"]\n')
