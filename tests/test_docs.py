@@ -237,6 +237,7 @@ def test_the_settings_of_a_dataset_are_all_shown_and_its_contacts_are_read(tmp_p
     assert [each.name for each in read_given(path)] == [json.loads(given)["grasps"][0]["id"]]
 
 
+@pytest.mark.slow
 def test_the_lines_of_python_run(tmp_path, monkeypatch, capsys):
     pytest.importorskip("pyarrow")
     build_small(tmp_path / "ds")

@@ -18,10 +18,9 @@ from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.quality.wrench_limits import body_of
 from tests.attacks.searching import Attack, power, tiny
 from tests.tampering import table
-from tests.tampering.exact_closure import unit_arms
 from tests.tampering.hand_payloads import held
 from tests.tampering.squeezes import GRAVITY, largest_scale, responding
-from tests.tampering.wrench_bounds import largest_multiple, torques_of
+from tests.tampering.wrench_bounds import multiple_of
 
 SEEDS = 12
 SURE = 1e-5
@@ -32,13 +31,10 @@ SURE = 1e-5
 def limit(seed):
     """A genuine limit, the multiple by a program of the tests, and by how much claims are off."""
     c = table.wrench_limit(seed) if seed % 2 else on_a_line(seed)
-    x, n, most = c.positions, c.normals, c.max_normal_force
-    mu = np.full(len(x), c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
-    _, size = unit_arms(x)
-    w = c.found.wrench
-    load = np.append(w[:3], (w[3:] - np.cross(x.mean(axis=0) - c.center, w[:3])) / size)
-    best = largest_multiple(x, n, mu, np.zeros(len(x)), load, torques_of(c.motors, n, most), most)
-    off = SURE * most * len(x) * np.sqrt(1.0 + mu.max() ** 2) / np.linalg.norm(load)
+    k, most = len(c.positions), c.max_normal_force
+    mu = np.full(k, c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
+    load, _, best = multiple_of(c, mu, np.zeros(k))
+    off = SURE * most * k * np.sqrt(1.0 + mu.max() ** 2) / np.linalg.norm(load)
     return c, best, off
 
 

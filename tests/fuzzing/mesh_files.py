@@ -1,7 +1,6 @@
 """Readers of mesh files as targets, against another reading, and the making of solids."""
 
 import io
-import json
 import struct
 from functools import partial
 
@@ -10,7 +9,9 @@ import trimesh
 
 import grasp_core as gc
 from grasp_core.mesh_files.reading import FORMATS, mesh_of_bytes
-from tests.bad_input.of_binary_meshes import glb
+from tests.bad_input.mesh_texts import CORNERS, TRIANGLES
+from tests.bad_input.of_binary_meshes import glb, tree
+from tests.fuzzing.array_files import npz
 from tests.fuzzing.plain_meshes import PLAIN
 from tests.fuzzing.targets import Target
 
@@ -51,8 +52,7 @@ def same_triangles(kind, data, found):
 
 
 def tetrahedron():
-    return trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]],
-                           [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # fmt: skip
+    return trimesh.Trimesh(CORNERS, TRIANGLES)
 
 
 OBJ = """# a wedge
@@ -106,22 +106,12 @@ def big_endian():
 
 
 def moved_scene():
-    """Two nodes above a mesh, turned, stretched and moved; a strip beside it."""
-    scene = trimesh.Scene()
-    scene.add_geometry(tetrahedron(), geom_name="part")
-    data = scene.export(file_type="glb")
-    tree, binary = glb_parts(data)
-    tree["nodes"].append(
-        {"rotation": [0.6, 0, 0, 0.8], "translation": [1, 2, 3], "scale": [1, 2, -1],
-         "children": tree["scenes"][0]["nodes"]}
-    )  # fmt: skip
-    tree["scenes"][0]["nodes"] = [len(tree["nodes"]) - 1]
-    return glb(tree, binary)
-
-
-def glb_parts(data):
-    size = struct.unpack_from("<I", data, 12)[0]
-    return json.loads(data[20 : 20 + size]), data[28 + size :]
+    """A node above a mesh, turned, stretched and moved."""
+    scene = tree()
+    turned = {"rotation": [0.6, 0, 0, 0.8], "translation": [1, 2, 3], "scale": [1, 2, -1]}
+    scene["nodes"].append(turned | {"children": [0]})
+    scene["scenes"][0]["nodes"] = [1]
+    return glb(scene)
 
 
 SEEDS = {
@@ -171,25 +161,12 @@ def same_volume(_, found):
 
 
 def solid_seeds():
-    held = io.BytesIO()
-    mesh = tetrahedron()
-    np.savez(held, vertices=mesh.vertices, triangles=mesh.faces)
-    box = io.BytesIO()
-    mesh = trimesh.creation.box(extents=(0.1, 0.2, 0.3))
-    np.savez(box, vertices=mesh.vertices, triangles=mesh.faces)
-    return [held.getvalue(), box.getvalue()]
+    meshes = tetrahedron(), trimesh.creation.box(extents=(0.1, 0.2, 0.3))
+    return [npz(vertices=mesh.vertices, triangles=mesh.faces) for mesh in meshes]
 
 
 TARGETS = [
-    *(
-        Target(
-            kind,
-            partial(triangles_of, kind),
-            partial(seeds, kind),
-            partial(same_triangles, kind),
-            WRITTEN[kind],
-        )
-        for kind in FORMATS
-    ),
+    *(Target(kind, *(partial(each, kind) for each in (triangles_of, seeds, same_triangles)),
+             WRITTEN[kind]) for kind in FORMATS),
     Target("solid", solid, solid_seeds, same_volume, "npz"),
-]
+]  # fmt: skip

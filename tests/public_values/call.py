@@ -13,6 +13,7 @@ import numpy as np
 import grasp_core as gc
 import scenes
 import sim_validate as sv
+from tests.bad_input import mesh_texts
 from tests.public_values.bad_values import PATH, USUAL
 
 FOLDER = TemporaryDirectory()
@@ -43,10 +44,7 @@ def scene():
 def mesh_file():
     """An OBJ file, as long as the tests last."""
     path = Path(FOLDER.name) / "tetrahedron.obj"
-    points = [" ".join(map(str, point)) for point in body().vertices.tolist()]
-    corners = [" ".join(map(str, corner)) for corner in (body().triangles + 1).tolist()]
-    lines = [f"v {point}" for point in points] + [f"f {corner}" for corner in corners]
-    path.write_text("\n".join(lines))
+    path.write_text(mesh_texts.obj(body().vertices.tolist(), body().triangles.tolist()))
     return path
 
 

@@ -115,11 +115,8 @@ def wrench_limit(c):
     if np.ndim(c.torsion_m) and not torsions_make_sense(mu, mu_t):
         return False
     k, (arms, size) = len(x), unit_arms(x)
-    lever = np.cross(x.mean(axis=0) - c.center, found.wrench[:3])
-    load = np.append(found.wrench[:3], (found.wrench[3:] - lever) / size)
+    load, (torques, room), best = multiple_of(c, mu, mu_t)
     length = np.linalg.norm(load)
-    torques, room = torques_of(c.motors, n, largest)
-    best = largest_multiple(x, n, mu, mu_t, load, (torques, room), largest)
     f, m = found.forces / largest, np.zeros(k)
     if mu_t.any():
         m = found.torques / largest
@@ -141,6 +138,14 @@ def wrench_limit(c):
         and (torques @ local_of(f, n) <= room + 1e-6 * weight * strong).all()
         and np.linalg.norm(left) <= 1e-6 * weight and scale_error <= 2e-6
     )  # fmt: skip
+
+
+def multiple_of(c, mu, mu_t):
+    """The load of a limit at unit size, rows of motors, and the multiple that is resisted."""
+    x, n, w, most = c.positions, c.normals, c.found.wrench, c.max_normal_force
+    moved = w[3:] - np.cross(x.mean(axis=0) - c.center, w[:3])
+    load, rows = np.append(w[:3], moved / unit_arms(x)[1]), torques_of(c.motors, n, most)
+    return load, rows, largest_multiple(x, n, mu, mu_t, load, rows, most)
 
 
 def largest_multiple(x, n, mu, mu_t, load, motors, largest):
