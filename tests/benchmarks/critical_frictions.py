@@ -9,7 +9,6 @@ metres. Ends with an error if one is not found, or farther off than half a per c
 
 import argparse
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice, product
@@ -43,19 +42,6 @@ class Case:
     body: gc.Polyhedron
     grasp: gc.Grasp
     friction: float
-
-
-@dataclass(frozen=True)
-class Found:
-    group: str
-    name: str
-    predicted: float
-    simulated: float
-    """NaN where it was not found."""
-
-    @property
-    def error(self):
-        return self.simulated / self.predicted - 1.0
 
 
 def boxes() -> Iterator[tuple[gc.Polyhedron, float]]:
@@ -106,20 +92,19 @@ def cases(group: str) -> Iterator[Case]:
     return islice(found, count)
 
 
-def measure(case: Case) -> Found:
+def measure(case: Case) -> tuple[Case, float, float]:
+    """Its predicted critical friction and the simulated one, NaN where it was not found."""
     setup, grasp = Setup(), case.grasp
     predicted = gc.critical_friction(grasp)
     bench = Bench(setup.scene(case.body, grasp, max(case.friction, predicted)))
     found = released_friction(bench, grasp.positions, grasp.normals, predicted, setup)
-    name = f"{case.body.name} {grasp.id} at {case.friction:g}"
-    simulated = np.nan if found.simulated is None else found.simulated
-    return Found(case.group, name, predicted, simulated)
+    return case, predicted, np.nan if found.simulated is None else found.simulated
 
 
-def report(found: list[Found]) -> bool:
+def report(found: list[tuple[Case, float, float]]) -> bool:
     """Print a line for each group, then the worst grasps; whether all are good."""
-    errors = np.array([one.error for one in found])
-    groups = np.array([one.group for one in found])
+    errors = np.array([simulated / predicted - 1.0 for _, predicted, simulated in found])
+    groups = np.array([case.group for case, _, _ in found])
     for group in dict.fromkeys(groups):
         own = errors[groups == group]
         missing = int(np.isnan(own).sum())
@@ -130,8 +115,9 @@ def report(found: list[Found]) -> bool:
         )
     off = np.where(np.isnan(errors), np.inf, np.abs(errors))
     for place in np.argsort(-off)[:5]:
-        one = found[place]
-        print(f"  {one.group} {one.name}: {one.simulated:.5f}, predicted {one.predicted:.5f}")
+        case, predicted, simulated = found[place]
+        name = f"{case.group} {case.body.name} {case.grasp.id} at {case.friction:g}"
+        print(f"  {name}: {simulated:.5f}, predicted {predicted:.5f}")
     return bool((off <= WORST).all())
 
 
@@ -140,16 +126,12 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=tuple(GROUPS))
     parser.add_argument("--jobs", type=int, default=available_cores())
     options = parser.parse_args()
-    begun = time.perf_counter()
     chosen = [case for group in options.only for case in cases(group)]
     short = [
         group for group in options.only
         if sum(case.group == group for case in chosen) < GROUPS[group][1]
     ]  # fmt: skip
-    planned = time.perf_counter()
-    found = list(each(measure, chosen, jobs=options.jobs))
-    print(f"planned in {planned - begun:.0f} s, simulated in {time.perf_counter() - planned:.0f} s")
-    good = report(found)
+    good = report(list(each(measure, chosen, jobs=options.jobs)))
     if short:
         sys.exit(f"too few grasps: {', '.join(short)}")
     if not good:

@@ -10,7 +10,6 @@ and tested for exact closure, so that a wrong proof of absence, or a grasp misse
 import sys
 import time
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,15 +31,6 @@ JUDGED = 40
 """Face quadruples of an object that are sampled beside the open ones."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """Face quadruples of one object at one friction."""
-
-    name: str
-    friction: float
-    counts: Counter
-
-
 def examine(case):
     """Count what became of the face quadruples, and sample."""
     name, friction = case
@@ -59,7 +49,7 @@ def examine(case):
         missed=sum(closed_somewhere(body, faces, friction, rng) for faces in found.undecided),
         wrongly_absent=sum(closed_somewhere(body, faces, friction, rng) for faces in chosen),
     )  # fmt: skip
-    return Found(name, friction, counts)
+    return friction, counts
 
 
 def closed_somewhere(body, faces, friction, rng):
@@ -87,9 +77,9 @@ def main():
     print("friction quadruples  held  absent  open  missed  recall  regions  paper")
     for friction in (*FRICTIONS, None):
         total = Counter()
-        for one in found:
-            if friction in (one.friction, None):
-                total += one.counts
+        for own, counts in found:
+            if friction in (own, None):
+                total += counts
         graspable = total["held"] + total["missed"]
         print(
             f"{'all' if friction is None else friction:>8} {total['quadruples']:10d} "

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -35,19 +34,14 @@ class Witness:
     """Runs commands and keeps what they touch."""
 
     def __init__(self, folder):
-        self.folder, self.events = folder, []
+        self.folder, self.log = folder, folder / "log"
         for name in ("home", "scratch"):
             (folder / name).mkdir()
         (folder / "part.obj").write_text(obj())
-        self.pipe = folder / "pipe"
-        os.mkfifo(self.pipe)
 
     def run(self, line):
-        handle = os.open(self.pipe, os.O_RDWR)
-        reader = threading.Thread(target=self._read, args=(handle,))
-        reader.start()
         environment = {
-            **os.environ, "AUDITED_BY": str(self.pipe), "HOME": str(self.folder / "home"),
+            **os.environ, "AUDITED_BY": str(self.log), "HOME": str(self.folder / "home"),
             "TMPDIR": str(self.folder / "scratch"), "PYTHONPATH": f"{AUDITING}:{ROOT}",
             "XDG_CACHE_HOME": str(KEPT.parent),
         }  # fmt: skip
@@ -55,18 +49,13 @@ class Witness:
             [*CLI, *line.split()], cwd=self.folder, env=environment, capture_output=True,
             timeout=HANGING_S, check=False,
         )  # fmt: skip
-        os.write(handle, b'["end"]\n')
-        reader.join()
-        os.close(handle)
         assert ended.returncode == 0, ended.stderr
 
-    def _read(self, handle):
-        with open(handle, "rb", closefd=False) as stream:
-            for said in stream:
-                event = json.loads(said) if said.endswith(b"]\n") else [said[:60].decode()]
-                if event == ["end"]:
-                    return
-                self.events.append(event)
+    @property
+    def events(self):
+        """Each with its arguments; of lines that were cut, the beginning."""
+        lines = self.log.read_text(errors="replace").splitlines()
+        return [json.loads(said) if said.endswith("]") else [said[:60]] for said in lines]
 
     def path(self, given):
         return (self.folder / given).resolve() if isinstance(given, str) else None

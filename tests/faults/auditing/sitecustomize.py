@@ -1,6 +1,6 @@
 """Tells of every file and socket that a Python process opens, from its start on, and its children.
 
-Python imports this module where it finds it on its path; what happens is written to the pipe that
+Python imports this module where it finds it on its path; what happens is added to the file that
 `AUDITED_BY` names, a line of JSON each.
 """
 
@@ -8,7 +8,7 @@ import json
 import os
 import sys
 
-pipe = os.open(os.environ["AUDITED_BY"], os.O_WRONLY)
+log = os.open(os.environ["AUDITED_BY"], os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 TOLD = ("socket.", "subprocess.", "os.", "shutil.", "urllib.", "http.", "ftplib.", "smtplib.")
 LONGEST = 4000
 """So that lines of several processes do not mix."""
@@ -21,7 +21,7 @@ def tell(event: str, given: tuple[object, ...]) -> None:
         return
     said = [os.fsdecode(each) if isinstance(each, os.PathLike | bytes) else each for each in given]
     line = json.dumps([event, *said], default=repr)[:LONGEST]
-    os.write(pipe, line.encode() + b"\n")
+    os.write(log, line.encode() + b"\n")
 
 
 sys.addaudithook(tell)
