@@ -30,57 +30,23 @@ def pyramid_wrenches(positions, normals, friction, sides, *, outer):
 def pyramid_margin(positions, normals, friction, sides, *, outer):
     """Closure margin with pyramids inside (or, with `outer`, around) the friction cones.
 
-    Positive means closure of the pyramids when their wrenches have rank 6.
+    The least weight, as large as can be, of the pyramids' edges in combinations that balance and
+    sum to one; positive means closure of the pyramids when their wrenches have rank 6. By the dual
+    program, which has seven variables only: the least z for twists y with w.y + z >= 0 for all
+    wrenches w, where these slacks sum to one.
     """
     W = pyramid_wrenches(positions, normals, friction, sides, outer=outer)
-    weights, _ = least_weight_program(W)
-    return weights.min() if weights.any() else -np.inf
-
-
-def pyramids_say(positions, normals, friction, sides):
-    """Whether the friction cones are in closure, where pyramids prove it; None between them.
-
-    Pyramids inside the cones that are closed prove closure, pyramids around them that are not
-    prove the opposite. Either proof is an inequality re-checked on the wrenches themselves.
-    """
-    inside = pyramid_wrenches(positions, normals, friction, sides, outer=False)
-    weights, _ = least_weight_program(inside)
-    weights = weights - np.linalg.lstsq(inside.T, inside.T @ weights, rcond=None)[0]
-    full = np.linalg.svd(inside, compute_uv=False)[-1] > PROVED
-    if full and weights.min() > PROVED:
-        return True
-    around = pyramid_wrenches(positions, normals, friction, sides, outer=True)
-    _, twist = least_weight_program(around)
-    return False if (around @ twist).min() > PROVED * np.abs(twist).max() else None
-
-
-PROVED = 1e-10
-"""What must be positive is this large at least: wrenches of unit size and weights that sum to one
-carry rounding errors of some 1e-15."""
-
-
-def least_weight_program(W):
-    """Weights of wrenches that balance and sum to one, whose least is as large as can be.
-
-    By the dual of that program, which has seven variables only: it minimises z over twists y with
-    w.y + z >= 0 for all wrenches w, where these slacks sum to one. The multipliers are what the
-    weights exceed their least by, which is z; where z is negative, y separates.
-
-    Returns:
-        Weights (n,), which are zero where no wrenches balance, and the twist (6,).
-    """
-    count = len(W)
-    leaving = np.linalg.lstsq(W, np.ones(count), rcond=None)[0]
-    if (W @ leaving).min() > PROVED:
-        return np.zeros(count), leaving
+    leaving = np.linalg.lstsq(W, np.ones(len(W)), rcond=None)[0]
+    if (W @ leaving).min() > 1e-10:
+        return -np.inf  # nothing balances
     answer = linprog(
         np.append(np.zeros(6), 1.0),
-        A_ub=-np.hstack([W, np.ones((count, 1))]), b_ub=np.zeros(count),
-        A_eq=[np.append(W.sum(axis=0), count)], b_eq=[1.0],
+        A_ub=-np.hstack([W, np.ones((len(W), 1))]), b_ub=np.zeros(len(W)),
+        A_eq=[np.append(W.sum(axis=0), len(W))], b_eq=[1.0],
         bounds=[(None, None)] * 7, method="highs",
     )  # fmt: skip
     assert answer.status == 0, answer.message
-    return answer.fun - answer.ineqlin.marginals, answer.x[:6]
+    return answer.fun
 
 
 def picks_positively_span(axes, half_angle, sides):
