@@ -158,13 +158,8 @@ def held(seed):
     body, friction, grasps = table.planned(seed)
     pieces = table.pieces_of(table.PLANNED[seed % 4][0])
     x = (grasps[0].positions - body.center_of_mass) / body.radius
-    own = [
-        min((p for p in pieces if p.face == face), key=lambda p, at=at: -p.inset(at))
-        for face, at in zip(grasps[0].faces, x, strict=True)
-    ]
-    own = [replace(p, inradius=p.inradius) for p in own]
-    for p, at in zip(own, x, strict=True):
-        assert abs((at - p.origin) @ p.normal) < 1e-9
+    own = [max((p for p in pieces if p.face == face), key=lambda p, at=at: p.inset(at))
+           for face, at in zip(grasps[0].faces, x, strict=True)]  # fmt: skip
     assert closed(x, grasps[0].normals, np.full(4, friction)) is True
     return tuple(own), x, friction
 

@@ -1,18 +1,13 @@
 """Environments that lack things, or hold nonsense, change no result."""
 
 import os
-import signal
 import subprocess
-import time
-from pathlib import Path
 
 import pytest
 
 from sim_validate.kit import processes as engines
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.faults.conftest import CLI, KEPT, ROOT, contents
-from tests.patience import HANGING_S
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
 NOWHERE = "/proc/nowhere"
@@ -84,22 +79,3 @@ def test_cores_are_those_that_the_process_may_use(tmp_path, monkeypatch):
         if text:
             (tmp_path / "cpu.max").write_text(text)
         assert engines.available_cores() == cores
-
-
-@pytest.mark.slow
-def test_a_request_to_end_while_planning_leaves_nothing_half(tmp_path):
-    words = ["run", "icosahedron", "--limit", "400", "--optimize", "--jobs", "1", "--out", "out"]
-    process = subprocess.Popen(
-        [*CLI, *words], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
-    )  # fmt: skip
-    deadline = time.monotonic() + 60.0
-    while not Path(tmp_path / "out").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(1.0)
-    process.send_signal(signal.SIGTERM)
-    _, said = process.communicate(timeout=HANGING_S)
-    assert process.returncode == Exit.INTERRUPTED
-    assert said.splitlines()[-1] == "graspproof: interrupted"
-    assert "Traceback" not in said
-    assert all("proofs" in name or "regions.json" in name for name in contents(tmp_path))
