@@ -73,10 +73,9 @@ def signature(error: BaseException) -> str:
     """What kind of find it is: the error, and the last place in our code or the first words."""
     if isinstance(error, FoundError):
         return "-".join(re.findall("[a-z]+", str(error))[:5])
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if "/tests/" not in f.filename]
+    frames = traceback.extract_tb(error.__traceback__)
     ours = [frame for frame in frames if any(f"/{name}/" in frame.filename for name in OURS)]
-    place = (ours or frames or [None])[-1]
-    where = "reading" if place is None else f"{Path(place.filename).stem}-{place.name}"
+    where = f"{Path(ours[-1].filename).stem}-{ours[-1].name}" if ours else "reading"
     return f"{type(error).__name__}-{where}".replace("<", "").replace(">", "")
 
 
