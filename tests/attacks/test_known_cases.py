@@ -39,15 +39,11 @@ def test_a_border_around_zero_is_proved_in_any_order_of_its_corners():
     corners = np.array([rng.permutation(np.delete(np.arange(7), j)) for j in range(7)])
     normals = np.linalg.solve(points[corners], np.ones((7, 6, 1)))[:, :, 0]
     distance = 1.0 / np.linalg.norm(normals, axis=1)
-    found = InnerPolytope(points, corners, normals * distance[:, None])
-    thrice = replace(
-        found, corners=np.tile(corners, (3, 1)), normals=np.tile(found.normals, (3, 1))
-    )
-    for polytope in (found, thrice):
-        radius = polytope.proved_radius(SimpleNamespace(G=np.eye(6)))
-        assert radius == pytest.approx(distance.min(), rel=1e-12)
-    twice = replace(found, corners=np.tile(corners, (2, 1)), normals=np.tile(found.normals, (2, 1)))
-    assert twice.proved_radius(SimpleNamespace(G=np.eye(6))) == -np.inf
+    normals *= distance[:, None]
+    for times, radius in ((1, distance.min()), (2, -np.inf), (3, distance.min())):
+        found = InnerPolytope(points, np.tile(corners, (times, 1)), np.tile(normals, (times, 1)))
+        proved = found.proved_radius(SimpleNamespace(G=np.eye(6)))
+        assert proved == pytest.approx(radius, rel=1e-12)
 
 
 @pytest.mark.parametrize("length", [0.0, 1e13, 1e30])
@@ -107,9 +103,8 @@ def test_no_short_twist_opens_closed_contacts():
     y = contacts.about_origin(found.twist, found.positions[0])
     for size in range(-323, -100):
         short = y / np.abs(y).max() * 10.0**size
-        assert not gc.ClosureCertificate(
-            False, 0.0, found.positions, found.normals, mu, None, short
-        ).verify()
+        false = gc.ClosureCertificate(False, 0.0, found.positions, found.normals, mu, None, short)
+        assert not false.verify()
 
 
 @pytest.mark.parametrize(
@@ -156,10 +151,9 @@ def test_a_polygon_that_goes_around_many_times_holds_no_larger_disc():
     arms = [p.polygon - c for p, c in zip(r.regions, r.centers, strict=True)]
     wide = replace(r, radius=max(float(np.linalg.norm(each, axis=1).max()) for each in arms))
     for copies in (1, 20, 150):
-        parts = (replace(p, polygon=np.tile(p.polygon, (copies, 1))) for p in r.regions)
-        assert replace(r, regions=tuple(parts)).verify() == (copies == 1)
-        parts = (replace(p, polygon=np.tile(p.polygon, (copies, 1))) for p in r.regions)
-        assert not replace(wide, regions=tuple(parts)).verify()
+        parts = tuple(replace(p, polygon=np.tile(p.polygon, (copies, 1))) for p in r.regions)
+        assert replace(r, regions=parts).verify() == (copies == 1)
+        assert not replace(wide, regions=parts).verify()
 
 
 def test_fields_of_a_piece_agree_to_its_own_size():

@@ -17,7 +17,6 @@ import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from sim_validate.engine.rig import Analysis, closed_on, ramped_limits
-from tests.benchmarks.objects import scaled
 
 FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03
 LOOSE, HOPEFUL = 0.98, 1.01
@@ -38,7 +37,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--grasps", type=int, default=8)
     hand, setup = gc.load_hand("leap").with_torque_limits(0.35, "this benchmark"), sv.hand_setup()
-    body, most = scaled("dodecahedron", RADIUS_M), setup.fingers.max_normal_force_n
+    solid, most = scenes.example_object("dodecahedron"), setup.fingers.max_normal_force_n
+    vertices = (solid.vertices - solid.center_of_mass) * RADIUS_M / solid.radius
+    body = gc.Polyhedron.from_mesh(vertices, solid.triangles, name=solid.name)
     ratios, least = [], []
     for found in reached(hand, body, parser.parse_args().grasps):
         promised = gc.hand_payload(hand, body, found, FRICTION, max_push_n=most)

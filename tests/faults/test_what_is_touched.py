@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import cached_property
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,7 @@ class Witness:
         )  # fmt: skip
         assert ended.returncode == 0, ended.stderr
 
-    @property
+    @cached_property
     def events(self):
         """Each with its arguments; of lines that were cut, the beginning."""
         lines = self.log.read_text(errors="replace").splitlines()
