@@ -1,6 +1,6 @@
 """Compares plans, regions and verdicts under other arithmetic: BLAS, NumPy features, threads.
 
-    python -m tests.benchmarks.machines [--quick] [OBJECT ..]
+    python -m tests.benchmarks.machines [--quick] [--meshes FOLDER]
 
 Each arithmetic stands for another machine: the environment of a process tells OpenBLAS, NumPy
 and Numba which processor to work for. Every object is planned at every friction in each of them,
@@ -66,17 +66,23 @@ def dispatched():
     return [name for name in module.__cpu_dispatch__ if module.__cpu_features__.get(name)]
 
 
-def objects(quick):
-    """Names of built-in objects."""
+def objects(quick, meshes):
+    """Names of built-in objects and paths of meshes."""
     built_in = [name for name in scenes.example_names() if name != "random-FACES-SEED"]
-    return QUICK if quick else (*built_in, *HULLS)
+    names = QUICK if quick else (*built_in, *HULLS)
+    kinds = {".ply", ".obj", ".stl", ".off"} if meshes else ()
+    return [*names, *sorted(str(path) for kind in kinds for path in meshes.rglob(f"*{kind}"))]
+
+
+def loaded(name):
+    return gc.load_polyhedron(name) if Path(name).suffix else scenes.example_object(name)
 
 
 def answers(names):
     """What is planned and simulated, by case, for JSON."""
     found = {}
     for name in names:
-        body = scenes.example_object(name)
+        body = loaded(name)
         for friction in FRICTIONS:
             plan = gc.plan(body, friction, limit=LIMIT)
             found[f"{name} at {friction:.4f}"] = [as_json(body, grasp) for grasp in plan.grasps]
@@ -197,13 +203,14 @@ def asked(environment, names):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="five objects, two arithmetics")
+    parser.add_argument("--meshes", type=Path, metavar="FOLDER", help="mesh files beside them")
     parser.add_argument("--answer", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("names", nargs="*", help="objects, instead of all")
     options = parser.parse_args()
     if options.answer:
         options.answer.write_text(json.dumps(answers(options.names)))
         return
-    names = options.names or objects(options.quick)
+    names = options.names or objects(options.quick, options.meshes)
     every = arithmetics()
     kept = ("least of all",) if options.quick else list(every)[1:]
     own, differing = asked({}, names), 0
