@@ -12,7 +12,7 @@ from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import clearest_point, clearing, flat_patches
 from grasp_core.objects.surface import Mesh
-from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body, inside, met
+from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body
 
 ROUNDING = 1e-9
 """Relative to the object, of heights and of lines through the edges between triangles."""
@@ -56,26 +56,6 @@ def test_a_patch_of_one_large_triangle_keeps_the_limits_too():
     found = flat_patches(solid, limits)
     assert len(found) == 12
     assert max(face.depth for face in found) <= limits.depth * 0.1
-
-
-@pytest.mark.slow
-def test_no_patch_spans_a_hole_in_the_surface():
-    vertices, triangles = bumpy_ellipsoid()
-    middles = vertices[triangles].mean(axis=1)
-    whole = gc.Polyhedron.from_mesh(vertices, triangles)
-    hole = whole.faces[0].centroid
-    open_ = triangles[np.linalg.norm(middles - hole, axis=1) > 0.004]
-    body = gc.Polyhedron.from_mesh(vertices, open_)
-    assert "no finger is placed there" in " ".join(body.notes)
-    assert not any(np.isin(face.facets, body.surface.caps).any() for face in body.faces)
-    rng, lines = np.random.default_rng(0), 0
-    for face in body.faces:
-        for point in inside(face.polygon, rng, 40):
-            assert len(met(body, face, point)[0]) >= 1
-            lines += 1
-    assert lines >= 400
-    away = np.linalg.norm(body.center_of_mass - whole.center_of_mass)
-    assert away < 0.001 * whole.radius
 
 
 def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherwise():

@@ -1,5 +1,3 @@
-import itertools
-
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
@@ -59,17 +57,6 @@ def test_qhull_on_inner_and_outer_pyramids_lies_on_either_side():
         assert inner <= found.upper + 1e-9
         assert outer >= found.lower - 1e-9
         closed += 1
-
-
-def test_qhull_on_sums_of_pyramids_lies_below_the_bounded_forces():
-    """Minkowski sums of three-sided pyramids: 4^4 points."""
-    wrenches = pyramid_wrenches(*TETRA, 3, outer=False).reshape(4, 3, 6)
-    _, size = middle_and_size(TETRA_CENTERS)
-    choices = [np.vstack([np.zeros(6), each]) for each in wrenches]
-    sums = np.array([np.sum(chosen, axis=0) for chosen in itertools.product(*choices)])
-    found = gc.ferrari_canny(*TETRA, torque_scale=size, norm="linf")
-    assert qhull_distance(sums) < found.lower
-    assert found.verify()
 
 
 def test_without_friction_the_hull_of_the_normals_is_exact():
