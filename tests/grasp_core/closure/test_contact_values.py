@@ -34,20 +34,6 @@ def test_contacts_are_judged_as_the_grasp_that_has_them(judged):
     assert judged(CONTACTS[::-1]) is not None
 
 
-def test_flipping_all_normals_changes_nothing_about_closure():
-    """Balanced forces stay balanced when all of them are turned about."""
-    for points, normals in (
-        (GRASP.positions, GRASP.normals),
-        (GRASP.positions[:3], GRASP.normals[:3]),
-    ):
-        for friction in (0.02, 0.3, 0.9):
-            inward = gc.force_closure(points, normals, friction).closed
-            assert gc.force_closure(points, -normals, friction).closed == inward
-        assert gc.critical_friction(points, -normals) == pytest.approx(
-            gc.critical_friction(points, normals), abs=1e-7
-        )
-
-
 @pytest.mark.parametrize(
     ("given", "normals"),
     [(CONTACTS, GRASP.normals), (GRASP, GRASP.normals), ([*CONTACTS, 3], None), ([], None)],

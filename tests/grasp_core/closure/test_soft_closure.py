@@ -32,22 +32,6 @@ def test_two_opposite_soft_fingers_close_and_hard_ones_never_do():
         assert soft.margin == pytest.approx(0.25, rel=1e-6)
 
 
-def test_torsion_adds_what_a_missing_turn_about_one_axis_needs():
-    """Three hard fingers in a plane at 120 degrees lack nothing; two hard and one soft lack none.
-
-    Two opposite hard fingers leave the turn about their line. A third, soft one, whose normal is
-    across that line, holds the turn by sliding; one whose line of force meets the line at a right
-    angle and has no lever does not, but its torsion has no part along the line either.
-    """
-    x = np.array([[-0.05, 0, 0], [0.05, 0, 0], [0.05, 0, 0]])
-    n = np.array([[1.0, 0, 0], [-1, 0, 0], [-1, 0, 0]])
-    assert gc.force_closure(x, n, 0.5).closed is False
-    for third, closed in ((0.01, True), (0.0, False)):
-        found = gc.force_closure(x, n, 0.5, torsion_m=[0.0, 0.0, third])
-        assert found.closed is closed
-        assert found.verify()
-
-
 @pytest.mark.parametrize("count", [2, 3])
 def test_verdicts_and_margins_are_those_of_the_definition(count):
     rng = np.random.default_rng(count)

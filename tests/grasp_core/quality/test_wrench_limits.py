@@ -76,17 +76,6 @@ def test_the_weakest_wrench_is_weaker_than_axes_and_random_wrenches():
     assert tested == 6
 
 
-def test_friction_may_differ_between_contacts():
-    """A force across the line of two fingers, at the second one: only that finger resists it."""
-    positions = np.array([[-1.0, 0, 0], [1, 0, 0]])
-    at_the_second = [[0.0, 0, 1, 0, -1, 0]]
-    for friction, expected in (([0.5, 0.0], 0.0), ([0.0, 0.5], 0.5 * 2.0)):
-        found = gc.wrench_limits(
-            positions, -positions, friction, at_the_second, max_normal_force=2.0
-        )[0]
-        assert found.limit == pytest.approx(expected, abs=1e-6)
-
-
 @pytest.mark.parametrize("far", [1e2, 1e4, 1e6])
 def test_the_centre_of_torques_may_be_far_away(far):
     """The same force and turn, with its torque about another point."""

@@ -173,28 +173,6 @@ def test_where_friction_is_less_than_what_the_surface_leans_nothing_is_proved():
     assert certify_regions(body, grasp, 0.5) is None
 
 
-@pytest.mark.slow
-def test_contacts_on_edges_and_corners_have_regions_beside_them():
-    """Also where convex pieces of one face meet."""
-    body = scenes.example_object("l-bracket")
-    (grasp,) = gc.plan(body, 0.8, families=("concurrent",), limit=1).grasps
-    tested = 0
-    for finger, index in enumerate(grasp.faces):
-        for piece in body.faces[index].pieces:
-            for spot in (piece[0], 0.5 * (piece[0] + piece[1])):
-                contacts = list(grasp.contacts)
-                contacts[finger] = gc.Contact(spot, contacts[finger].normal)
-                moved = dataclasses.replace(grasp, contacts=tuple(contacts))
-                if not gc.force_closure(moved.positions, moved.normals, 0.8).closed:
-                    continue
-                proved = certify_regions(body, moved, 0.8, max_cones=300)
-                if proved is not None:
-                    assert proved.verify()
-                    assert within(spot, proved.regions[finger].polygon, moved.normals[finger], 1e-9)
-                    tested += 1
-    assert tested >= 4
-
-
 def test_the_largest_friction_and_one_next_to_the_critical():
     body, grasp, _ = found("wedge", "concurrent", cones=64)
     assert certify_regions(body, grasp, 1e3, max_cones=300).verify()
