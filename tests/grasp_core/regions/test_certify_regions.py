@@ -9,9 +9,11 @@ import pytest
 
 import grasp_core as gc
 import scenes
+from grasp_core.closure.contacts import contact_frames
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.objects.on_faces import within
 from grasp_core.regions.certify_regions import certify_regions
+from grasp_core.regions.growth import Sites, search_cover
 from sim_validate.planning.regions import area_of
 from tests.grasp_core.curved import curved_body, inside, met
 
@@ -162,6 +164,20 @@ def test_grasps_that_are_not_closed_are_refused():
     (grasp,) = gc.plan(body, 0.5, limit=1).grasps
     with pytest.raises(gc.InputError, match=r"not in force closure at friction 0\.01"):
         certify_regions(body, grasp, 0.01)
+
+
+def test_open_contacts_are_never_covered():
+    rng, nothing, tried = np.random.default_rng(1), np.zeros(4), 0
+    for _ in range(60):
+        points, normals = rng.normal(size=(4, 3)), rng.normal(size=(4, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        if gc.force_closure(points, normals, 0.5).closed:
+            continue
+        frames = np.ascontiguousarray(contact_frames(normals))
+        sites = Sites(points, frames, np.full(4, 0.5), np.zeros((4, 1, 2)), nothing, nothing)
+        assert search_cover(sites, np.eye(6), 500)[0] is None
+        tried += 1
+    assert tried > 40
 
 
 def test_where_friction_is_less_than_what_the_surface_leans_nothing_is_proved():
