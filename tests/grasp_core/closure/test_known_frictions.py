@@ -39,8 +39,9 @@ def test_critical_frictions_at_the_face_centres_of_a_regular_solid(name, expecte
     1e-5 it is seventy times the slack of the proofs. What is reported is then zero to four digits.
     """
     seen = Counter()
-    for normals in quadruples(SOLIDS[name]):
-        critical, cap = gc.critical_friction(-normals, normals), cotangent_of_cap(normals)
+    every = np.array(quadruples(SOLIDS[name]))
+    for normals, critical in zip(every, gc.critical_frictions(-every, every), strict=True):
+        cap = cotangent_of_cap(normals)
         if cap < 1e-9:
             assert gc.force_closure(-normals, normals, 1e-5).closed
             assert critical < 5e-5
