@@ -85,6 +85,8 @@ def test_a_grasp_or_the_proof_that_there_is_none():
     body = example_object("tetrahedron")
     points = np.array([face.centroid for face in body.faces])
     seated = seat(body, points, body.normals)
+    with pytest.raises(gc.InputError, match="seat and grasp_of"):
+        gc.certify_regions(body, seated.contacts, 0.5)
     grasp = grasp_of(seated, 0.5, "mine")
     assert isinstance(grasp, gc.Grasp)
     assert grasp.critical_friction < 0.5

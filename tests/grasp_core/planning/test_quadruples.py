@@ -33,7 +33,7 @@ def test_blocks_hold_every_quadruple_with_room_once(name):
 
 
 def test_no_tilted_cones_are_wider_than_what_bounds_them():
-    rng, tested = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
     normals = rng.normal(size=(3000, 4, 3))
     normals[:1000, :, 2] *= 0.1  # nearly in a plane
     normals[1000:1100, 1] = -normals[1000:1100, 0]
@@ -45,8 +45,7 @@ def test_no_tilted_cones_are_wider_than_what_bounds_them():
     found = tilted_cones(normals, thetas).half_angles
     usable = found > tables.LEAST_SPAN_ANGLE
     assert (found[usable] <= quick[usable]).all()
-    tested = usable.sum(), (quick < tables.LEAST_SPAN_ANGLE).sum()
-    assert min(tested) >= 500
+    assert min(usable.sum(), (quick < tables.LEAST_SPAN_ANGLE).sum()) >= 500
 
 
 def test_the_widest_half_angle_is_that_of_the_definition():

@@ -1,4 +1,4 @@
-"""Searches of regions, contacts and ceilings do not depend on last digits where much is equal.
+"""Searches of regions and contacts do not depend on last digits where much is equal.
 
 Places are shaken by what another processor makes of them. Regular objects have equal candidates
 everywhere, so that a search that sees last digits takes another way each time.

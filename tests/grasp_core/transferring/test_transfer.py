@@ -142,6 +142,9 @@ def test_carried_contacts_are_nearest_on_the_new_surface_and_judged_as_by_hand(n
     body, grasps = planned(name, limit=8)
     new = changed(body, grasps[0], kind, size)
     found = gc.transfer(body, new, grasps, FRICTION)
+    if kind == "moved":
+        way = "outward" if size > 0.0 else "inward"
+        assert f"moved {1e3 * abs(size):.2f} mm {way}" in found.faces_in_words
     placed = 0
     for each in found.grasps:
         for contact, before in zip(each.contacts, each.old.contacts, strict=True):
