@@ -20,13 +20,13 @@ def strong(hand):
 
 
 def stance():
-    """LEAP where it stands, and with two joints that follow others and stand so, too."""
+    """LEAP where it stands, with two joints that follow others and stand so, too."""
     reach, hand = next(each for each in reaches(*CASE) if each.reached), strong("leap")
     names, couplings = [joint.name for joint in hand.joints], []
     for driver, ratio in ((1, 0.7), (6, -0.4)):
         offset = reach.joints[driver + 1] - ratio * reach.joints[driver]
         couplings.append(Coupling(names[driver + 1], names[driver], ratio, offset))
-    return reach, (hand, replace(hand, couplings=tuple(couplings)))
+    return reach, replace(hand, couplings=tuple(couplings))
 
 
 def steps(hand):
@@ -41,31 +41,29 @@ def steps(hand):
 
 
 def test_levers_are_how_far_contact_points_go_with_the_joints_and_their_followers():
-    reach, hands = stance()
-    for hand in hands:
-        levers = gc.hand_motors(hand, reach).levers.reshape(len(hand.free_joints), -1, 3)
-        for step, lever in zip(steps(hand), levers, strict=True):
-            for contact in range(len(reach.fingers)):
-                behind, ahead = (
-                    material_point(hand, reach, contact, reach.joints + way * step)
-                    for way in (-1.0, 1.0)
-                )
-                rate = (ahead - behind) / (2.0 * STEP)
-                assert lever[contact] == pytest.approx(rate, abs=1e-8)
+    reach, hand = stance()
+    levers = gc.hand_motors(hand, reach).levers.reshape(14, -1, 3)
+    for step, lever in zip(steps(hand), levers, strict=True):
+        for contact in range(len(reach.fingers)):
+            behind, ahead = (
+                material_point(hand, reach, contact, reach.joints + way * step)
+                for way in (-1.0, 1.0)
+            )
+            rate = (ahead - behind) / (2.0 * STEP)
+            assert lever[contact] == pytest.approx(rate, abs=1e-8)
 
 
 def test_gravity_is_the_rate_at_which_links_rise():
-    reach, hands = stance()
-    for hand in hands:
-        motors = gc.hand_motors(hand, reach, down=DOWN)
-        for step, gravity in zip(steps(hand), motors.gravity, strict=True):
-            low, high = (
-                lifting_work(hand, reach, reach.joints + way * step, DOWN) for way in (-1.0, 1.0)
-            )
-            assert gravity == pytest.approx((high - low) / (2.0 * STEP), abs=1e-8)
-        every = gc.hand_motors(hand, reach, any_orientation=True)
-        assert (0.35 - every.limits >= np.abs(motors.gravity) - 1e-12).all()
-        assert not every.gravity.any()
+    reach, hand = stance()
+    motors = gc.hand_motors(hand, reach, down=DOWN)
+    for step, gravity in zip(steps(hand), motors.gravity, strict=True):
+        low, high = (
+            lifting_work(hand, reach, reach.joints + way * step, DOWN) for way in (-1.0, 1.0)
+        )
+        assert gravity == pytest.approx((high - low) / (2.0 * STEP), abs=1e-8)
+    every = gc.hand_motors(hand, reach, any_orientation=True)
+    assert (0.35 - every.limits >= np.abs(motors.gravity) - 1e-12).all()
+    assert not every.gravity.any()
 
 
 def test_without_limits_masses_or_a_pose_there_are_no_motors():
