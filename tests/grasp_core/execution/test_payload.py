@@ -52,7 +52,10 @@ def test_false_claims_are_no_certificate():
     """Those of the free mass are tried with that of a hand."""
     found = gc.payload(box(), opposed(), 0.4, max_push_n=10.0)
     free = found.free
-    for change in ({"lower": free.lower * 1.001}, {"upper": free.lower * 0.999}, {"hand": None}):
+    for change in (
+        {"lower": free.lower * 1.001}, {"upper": free.lower * 0.999}, {"facet": np.zeros(6)},
+        {"hand": None},
+    ):  # fmt: skip
         assert forged(found, free=forged(free, **change)).verify() is False, change
     assert forged(found, free=None).verify() is False
     assert forged(found, fixed=None).verify() is False
