@@ -145,6 +145,7 @@ def test_the_upper_faces_of_the_octahedron_need_a_friction_of_one_over_root_two(
         found = place(pieces, friction)
         assert isinstance(found, Placement)
         assert gc.force_closure(found.positions, normals_of(pieces), friction).closed
+        assert gc.classify_lines(found.positions, found.forces) == "regulus", "they all meet"
 
 
 def test_placements_balance_strictly_inside_their_faces_and_cones():
