@@ -14,13 +14,14 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 57_116,
     "modules of packages": 239,
-    "lines of tests": 41_717,
-    "lines of docs": 3_784,
+    "lines of tests": 40_163,
+    "lines of docs": 3_900,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
 RISES = (
     "lines of packages, 57,054 to 57,106: linear programs whose rows nearly coincide",
+    "lines of docs, 3,784 to 3,900: sentences that are understood without their neighbours",
     "lines of packages, 57,106 to 57,116: a folder that is gone, and how far contacts may move",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""

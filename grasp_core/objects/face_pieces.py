@@ -200,7 +200,7 @@ def inscribed_radius(E: Array, b: Array) -> float:
     """Compute the radius of the largest disc in {y : E y <= b}."""
     rows = np.column_stack([E, np.ones(len(E))])
     best = maximize(LinearProgram(np.array([0.0, 0.0, 1.0]), rows, b))
-    return best.value if isinstance(best, Optimum) else 0.0
+    return max(best.value, 0.0) if isinstance(best, Optimum) else 0.0  # thin pieces round to -1e-13
 
 
 SAME_LENGTH = 1.0 - 1e-6

@@ -106,7 +106,7 @@ class Slides(ByValue):
     """Stiffness of each fingertip's servos, (k, 3) [N/m]; (k, 0) for rigid ones, which have no
     slides."""
     damping: Array
-    """Coefficients of the dampers, likewise [N s/m]."""
+    """Coefficients of the dampers, of the same shape [N s/m]."""
     names: tuple[str, ...] = ("normal", "tangent1", "tangent2")
     """Endings of the names of a fingertip's slides."""
     most_push_n: float | None = None

@@ -15,7 +15,7 @@ from sim_validate.protocols.published import PublishedProtocol
 
 @dataclass(frozen=True, slots=True)
 class RunVerdict(Declared):
-    """How one run of a published test ended."""
+    """One run of a published test: whether the grasp passed, and what the test saw."""
 
     number: Number
     passed: bool
@@ -23,9 +23,9 @@ class RunVerdict(Declared):
     displacement_m: Measured
     """Largest displacement at a look, up to the first that did not pass [m]."""
     turn_deg: Measured
-    """Largest turn at a look, likewise [deg]."""
+    """Largest turn at a look, up to the first that did not pass [deg]."""
     fingers: Number
-    """Least number of fingers that touched the object at a look, likewise."""
+    """Least number of fingers on the object at a look, up to the first that did not pass."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,5 @@
 """Contacts may be given as values, too: every function takes them where it takes positions."""
 
-import numpy as np
 import pytest
 
 import grasp_core as gc
@@ -35,20 +34,6 @@ def test_contacts_are_judged_as_the_grasp_that_has_them(judged):
     assert judged(CONTACTS[::-1]) is not None
 
 
-def test_flipping_all_normals_changes_nothing_about_closure():
-    """Balanced forces stay balanced when all of them are turned about."""
-    for points, normals in (
-        (GRASP.positions, GRASP.normals),
-        (GRASP.positions[:3], GRASP.normals[:3]),
-    ):
-        for friction in (0.02, 0.3, 0.9):
-            inward = gc.force_closure(points, normals, friction).closed
-            assert gc.force_closure(points, -normals, friction).closed == inward
-        assert gc.critical_friction(points, -normals) == pytest.approx(
-            gc.critical_friction(points, normals), abs=1e-7
-        )
-
-
 @pytest.mark.parametrize(
     ("given", "normals"),
     [(CONTACTS, GRASP.normals), (GRASP, GRASP.normals), ([*CONTACTS, 3], None), ([], None)],
@@ -56,15 +41,3 @@ def test_flipping_all_normals_changes_nothing_about_closure():
 def test_what_is_given_twice_or_is_no_contact_is_refused(given, normals):
     with pytest.raises(gc.InputError, match=r"normals (must|are)|positions must"):
         gc.force_closure(given, normals, friction=0.5)
-
-
-def test_contacts_of_ones_own_become_a_grasp_that_can_be_validated():
-    import sim_validate as sv
-    from grasp_core.planning.given_contacts import grasp_of, seat
-
-    with pytest.raises(gc.InputError, match="seat and grasp_of"):
-        sv.validate(BODY, CONTACTS)
-    points = np.array([contact.position for contact in CONTACTS])
-    made = grasp_of(seat(BODY, points, GRASP.normals), 0.5, "mine")
-    assert isinstance(made, gc.Grasp)
-    assert made.faces == GRASP.faces

@@ -10,24 +10,6 @@ from scenes.example_objects import example_object
 from tests.grasp_core.bodies import BODIES
 from tests.judges import random_contacts
 
-BOX_SIDES = (
-    np.array(
-        [[-0.05, 0.01, 0.0], [0.025, -0.035, 0.0], [0.025, 0.01, -0.025], [0.025, 0.01, 0.025]]
-    ),
-    np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]),
-)
-"""Closed at any positive friction, with a margin that grows with its square."""
-
-
-def test_a_margin_that_grows_with_the_square_shows_no_friction():
-    assert gc.force_closure(*BOX_SIDES, 1e-5).closed
-    assert gc.critical_friction(*BOX_SIDES) == 0.0
-
-
-def test_pushes_that_balance_without_friction_need_none():
-    plan = gc.plan(example_object("wedge"), 0.5, families="pencil", cones="normal", limit=1)
-    assert gc.critical_friction(plan.grasps[0]) == 0.0
-
 
 @cache
 def contact_sets(count=4):

@@ -1,4 +1,6 @@
-"""Force closure of contacts with torsion, beside hand-worked cases and the definition."""
+"""Contacts with torsion: force closure and critical friction by hand and by the definition."""
+
+import math
 
 import numpy as np
 import pytest
@@ -9,6 +11,9 @@ from tests.judges import random_contacts, random_rotation
 from tests.tampering import exact_closure
 
 CASES = 40
+CLOSE = 1e-6
+"""Distance from the critical friction, relative to it, at which certificates are asked for: twenty
+times the width of the interval."""
 
 
 def drawn(rng, count):
@@ -30,22 +35,6 @@ def test_two_opposite_soft_fingers_close_and_hard_ones_never_do():
         assert soft.closed
         assert soft.verify()
         assert soft.margin == pytest.approx(0.25, rel=1e-6)
-
-
-def test_torsion_adds_what_a_missing_turn_about_one_axis_needs():
-    """Three hard fingers in a plane at 120 degrees lack nothing; two hard and one soft lack none.
-
-    Two opposite hard fingers leave the turn about their line. A third, soft one, whose normal is
-    across that line, holds the turn by sliding; one whose line of force meets the line at a right
-    angle and has no lever does not, but its torsion has no part along the line either.
-    """
-    x = np.array([[-0.05, 0, 0], [0.05, 0, 0], [0.05, 0, 0]])
-    n = np.array([[1.0, 0, 0], [-1, 0, 0], [-1, 0, 0]])
-    assert gc.force_closure(x, n, 0.5).closed is False
-    for third, closed in ((0.01, True), (0.0, False)):
-        found = gc.force_closure(x, n, 0.5, torsion_m=[0.0, 0.0, third])
-        assert found.closed is closed
-        assert found.verify()
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -81,3 +70,37 @@ def test_more_torsion_never_loses_closure_and_motions_change_nothing():
 def test_torsion_without_friction_is_refused():
     with pytest.raises(gc.InputError, match="torsion_m must be zero where friction is"):
         gc.force_closure(*OPPOSITE, 0.0, torsion_m=0.01)
+
+
+@pytest.mark.parametrize("offset", [0.01, 0.05, 0.2])
+def test_two_offset_fingers_need_the_slope_of_the_line_between_them(offset):
+    x = np.array([[-0.05, offset / 2, 0], [0.05, -offset / 2, 0]])
+    n = np.array([[1.0, 0, 0], [-1, 0, 0]])
+    assert gc.critical_friction(x, n) == math.inf
+    found = gc.critical_friction(x, n, torsion_m=0.005)
+    assert found == pytest.approx(offset / 0.1, rel=1e-7)
+
+
+def test_opposite_soft_fingers_close_at_any_friction():
+    assert gc.critical_friction(*OPPOSITE, torsion_m=0.005) == 0.0
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_certificates_on_both_sides_of_the_critical_friction_agree(count):
+    rng = np.random.default_rng(count)
+    finite = 0
+    for _ in range(20):
+        x, n = random_contacts(rng, count, 0.5)
+        mu_t = rng.choice([0.0, 0.1, 0.4], size=count)
+        mu_t[-1] = 0.2
+        critical = gc.critical_friction(x, n, torsion_m=mu_t)
+        if not 1e-3 < critical < math.inf:
+            continue
+        finite += 1
+        above = gc.force_closure(x, n, critical * (1 + CLOSE), torsion_m=mu_t)
+        below = gc.force_closure(x, n, critical * (1 - CLOSE), torsion_m=mu_t)
+        assert above.closed
+        assert above.verify()
+        assert not below.closed
+        assert below.verify()
+    assert finite >= 5

@@ -1,16 +1,11 @@
 import math
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-import grasp_core as gc
 from grasp_core.cones.spanning import cones_positively_span
-from grasp_core.cones.tilting import tilted_cones, toward, widened
-from grasp_core.families.placing import BEFORE, BEHIND, CONSTRUCTIONS, regions_of
-from grasp_core.objects.face_pieces import unit_pieces
-from grasp_core.values import ForceCone
+from grasp_core.cones.tilting import tilted_cones, toward
 from scenes.example_objects import example_object
 from tests.judges import random_rotation
 
@@ -57,33 +52,6 @@ def test_turned_normals_get_turned_cones():
         here, there = tilted_cones(normals, thetas), tilted_cones(normals @ R.T, thetas)
         np.testing.assert_allclose(there.half_angles, here.half_angles, atol=1e-6)
         np.testing.assert_allclose(there.axes, here.axes @ R.T, atol=1e-6)
-
-
-def test_a_bore_is_held_from_inside_with_the_focus_behind_the_fingers():
-    """Four faces of a nut's bore: any contacts in the footprints are in force closure."""
-    pieces = [p for p in unit_pieces(example_object("hex-nut"))
-              if p.normal @ p.origin > 0.0 and abs(p.normal[2]) < 0.5]  # fmt: skip
-    assert len(pieces) == 16
-    chosen, friction = pieces[::4], 0.5
-    normals = np.array([piece.normal for piece in chosen])
-    sides = normals[np.argsort(np.arctan2(normals[:, 1], normals[:, 0]))][[0, 2, 1, 3]]
-    chosen = [next(p for p in chosen if np.array_equal(p.normal, n)) for n in sides]
-    tilt = math.radians(14.036)
-    up = np.array([0.0, 0, 1.0])
-    axes = [math.cos(tilt) * n + s * math.sin(tilt) * up
-            for n, s in zip(sides, (1, 1, -1, -1), strict=True)]  # fmt: skip
-    found = widened(np.array([axes]), sides[None], np.full((1, 4), math.atan(friction)))
-    cones = [ForceCone(axis, 0.99 * float(found.half_angles[0])) for axis in found.axes[0]]
-    before, behind = (
-        replace(CONSTRUCTIONS["concurrent"], patterns=sides[None]).place(chosen, cones, 1e-3)
-        for sides in (BEFORE, BEHIND)
-    )
-    assert before is None
-    (regions,) = regions_of("cone", [(chosen, cones, behind)])
-    rng = np.random.default_rng(0)
-    for _ in range(60):
-        points = [rng.dirichlet(np.full(len(r.polygon), 0.3)) @ r.polygon for r in regions]
-        assert gc.force_closure(points, sides, friction).closed
 
 
 def test_axes_lean_the_same_way_where_the_point_is_in_a_face_but_for_rounding():

@@ -1,4 +1,5 @@
 import dataclasses
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -36,21 +37,15 @@ def test_four_opposed_fingers_carry_the_mass_of_the_closed_form(friction, stiffn
     assert found.verify()
 
 
-def test_a_mass_across_the_pushes_is_twice_friction_times_push_for_each_pair():
-    """Under loads along z alone, pushes stay as they are."""
-    across = gc.LoadSet(np.zeros(6), np.array([[0, 0, G, 0, 0, 0]]).T)
-    found = gc.best_squeeze(box(), opposed(), 0.4, across, max_push_n=10.0)
-    assert found.scale == pytest.approx(2 * 2 * 0.4 * 10.0 / G, rel=1e-4)
-    shaken = gc.LoadSet(np.zeros(6), np.array([[0, 0, G + 3.0, 0, 0, 0]]).T)
-    faster = gc.best_squeeze(box(), opposed(), 0.4, shaken, max_push_n=10.0)
-    assert faster.scale == pytest.approx(2 * 2 * 0.4 * 10.0 / (G + 3.0), rel=1e-4)
-
-
-def best_squeezes(loads=(ANY, SHAKEN)):
+@cache
+def best_squeezes():
+    """Squeezes of planned grasps, and what limits their pushes."""
+    found = []
     for stiffness, (body, grasp) in zip((500.0, 1000.0, 3000.0), bodies_and_grasps(), strict=True):
-        for each, most in product(loads, (10.0, None)):
+        for each, most in product((ANY, SHAKEN), (10.0, None)):
             given = {"max_push_n": most, "stiffness": stiffness}
-            yield gc.best_squeeze(body, grasp, 0.5, each, **given), most
+            found.append((gc.best_squeeze(body, grasp, 0.5, each, **given), most))
+    return found
 
 
 def test_squeezes_are_proved_and_true_by_definition():
@@ -64,7 +59,7 @@ def test_squeezes_are_proved_and_true_by_definition():
 
 
 def test_the_worst_load_is_a_first_slip():
-    for found, _ in best_squeezes(loads=(ANY,)):
+    for found, _ in best_squeezes()[::4]:  # under loads without an offset
         slip = gc.first_slip(
             found.grip, found.load, model="linear", max_push_n=found.max_push_n * (1.0 + 1e-9)
         )

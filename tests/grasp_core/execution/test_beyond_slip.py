@@ -135,14 +135,6 @@ def test_losses_are_after_the_slip_and_before_the_limit_without_slip():
     assert count >= 10
 
 
-def test_each_load_is_followed_by_itself():
-    (grip, *_) = planned_grips(limit=1, push=5.0, tip_radius_m=0.01)
-    loads = loads_of(grip, 12, np.random.default_rng(9))
-    together = loss_multiples(grip, loads, 1e-3, 0.05)
-    alone = [loss_multiples(grip, load[None], 1e-3, 0.05)[0] for load in loads]
-    assert together == pytest.approx(alone, rel=1e-6)
-
-
 def test_unstable_grips_hold_nothing_and_no_load_is_never_lost():
     unstable = opposed_grip(push=500.0, stiffness=1000.0, tip_radius_m=0.0)
     assert loss_multiples(unstable, SINK, FAR, FAR).tolist() == [0.0]

@@ -13,6 +13,7 @@ from grasp_core.execution.carried_mass import (
     HandPayload,
     ball_in,
     carried_mass,
+    nearest_facet,
 )
 from tests.grasp_core.execution.held import bodies_and_grasps, box, directions, opposed
 from tests.grasp_core.execution.jointed import LEVER_M, hand_of, jaws, pushing
@@ -230,3 +231,32 @@ def test_a_search_out_of_rays_ends_after_a_few_steps_with_a_smaller_mass(monkeyp
     found = carried_mass(hand, 1e-4)
     assert found.verify()
     assert 0.1 * fine.lower < found.lower < 0.99 * fine.lower
+
+
+OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
+
+
+def test_triangles_that_are_not_closed_around_the_origin_show_no_ball():
+    _, distance, good = nearest_facet(OCTAHEDRON)
+    assert distance == pytest.approx(3.0**-0.5, rel=1e-12)
+    assert ball_in(OCTAHEDRON, good) == pytest.approx(distance, rel=1e-12)
+    far = OCTAHEDRON + np.array([2.0, 0.0, 0.0])
+    twice = np.vstack([good, good])
+    flat = OCTAHEDRON * np.array([1.0, 1.0, 0.0])
+    for points, triangles in (
+        (OCTAHEDRON, good[1:]), (OCTAHEDRON, twice), (OCTAHEDRON, good + 1),
+        (OCTAHEDRON, good - 1), (OCTAHEDRON, good[:0]), (far, good), (flat, good),
+        (OCTAHEDRON, np.vstack([good[:1], good[1:, ::-1], good[:1, ::-1]])),
+    ):  # fmt: skip
+        assert not ball_in(points, triangles) > 0.0
+
+
+def test_corners_nearly_in_line_show_no_ball():
+    """Their normals are rounding, whatever side the origin seems to be on."""
+    rng = np.random.default_rng(0)
+    four = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    for _ in range(200):
+        way = rng.normal(size=3)
+        points = rng.uniform(1.0, 3.0, (4, 1)) * way + 1e-16 * rng.normal(size=(4, 3))
+        assert not ball_in(points, four) > 0.0
+        assert not ball_in(points, four[:, ::-1]) > 0.0

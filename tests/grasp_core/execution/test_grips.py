@@ -47,14 +47,6 @@ def test_the_response_is_that_of_finite_differences():
             assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
 
 
-def test_four_fingers_share_a_force_and_yield_by_load_over_stiffness():
-    grip = opposed_grip(stiffness=1000.0)
-    load = np.array([1.0, 2.0, -3.0, 0.0, 0.0, 0.0])
-    assert grip.compliance @ load == pytest.approx(load / 4000.0, abs=1e-15)
-    changes = np.einsum("kij,kjm,m->ki", grip.frames, grip.response, load)
-    assert changes == pytest.approx(np.tile(-load[:3] / 4.0, (4, 1)), abs=1e-12)
-
-
 def test_a_squeeze_makes_turns_less_stiff_and_large_tips_help():
     """About z: 4 K times the squared arm, less the pushes times the arms along them."""
     stiff = {}

@@ -24,14 +24,14 @@ def placements(name, theta, limit):
     for faces in found[:limit]:
         quad = [pieces[face] for face in faces]
         cones = [ForceCone(piece.normal, theta) for piece in quad]
-        yield quad, cones, CONSTRUCTIONS["concurrent"].place(quad, cones, 1e-4)
+        yield quad, CONSTRUCTIONS["concurrent"].place(quad, cones, 1e-4)
 
 
 @pytest.mark.parametrize("theta_deg", [5.0, 10.0, 15.0])
 def test_the_tetrahedron_has_four_equal_discs_about_its_centres(theta_deg):
     """r = rho0 tan(theta) cos(pi / 16), with rho0 = 1/3 of the radius."""
     theta = math.radians(theta_deg)
-    (quad, _, placed), = placements("tetrahedron", theta, 1)  # fmt: skip
+    (quad, placed), = placements("tetrahedron", theta, 1)  # fmt: skip
     expected = math.tan(theta) * math.cos(math.pi / 16) / 3.0
     assert placed is not None
     np.testing.assert_allclose(placed.radii, expected, atol=TOLERANCE)
@@ -40,37 +40,19 @@ def test_the_tetrahedron_has_four_equal_discs_about_its_centres(theta_deg):
     np.testing.assert_allclose(placed.positions, centers, atol=TOLERANCE)
 
 
-def test_discs_lie_in_their_faces_and_see_the_focus_within_the_cone():
-    tested = 0
-    for name in ("random-20-7", "icosahedron", "random-12-1"):
-        for quad, cones, placed in placements(name, math.radians(8.0), 150):
-            if placed is None:
-                continue
-            for piece, cone, center, radius in zip(
-                quad, cones, placed.positions, placed.radii, strict=True
-            ):
-                turns = np.linspace(0, 2 * np.pi, 40)
-                ring = np.column_stack([np.cos(turns), np.sin(turns)]) @ piece.frame.T
-                points = center + radius * ring
-                flat = (points - piece.origin) @ piece.frame
-                assert (flat @ piece.E.T <= piece.b + TOLERANCE).all()
-                lines = placed.foci[0] - points
-                angles = np.arccos(lines @ cone.axis / np.linalg.norm(lines, axis=1))
-                assert angles.max() <= cone.half_angle + 1e-6
-            tested += 1
-    assert tested >= 100
-
-
-def test_contacts_anywhere_in_the_discs_are_in_force_closure():
+def test_discs_lie_in_their_faces_and_contacts_anywhere_in_them_are_in_force_closure():
     """The independent regions of section 3.1, by the exact circular cones at a slightly larger
     friction, since contacts on the borders may use the very edge of the force cones.
     """
     rng = np.random.default_rng(0)
     theta, tested = math.radians(9.0), 0
     for name in ("random-20-7", "icosahedron", "random-30-2"):
-        for quad, _, placed in placements(name, theta, 60):
+        for quad, placed in placements(name, theta, 60):
             if placed is None:
                 continue
+            for piece, center, radius in zip(quad, placed.positions, placed.radii, strict=True):
+                flat = piece.frame.T @ (center - piece.origin)
+                assert (piece.E @ flat + radius <= piece.b + TOLERANCE).all()
             for _ in range(4):
                 turns = rng.uniform(0, 2 * np.pi, 4)
                 reach = placed.radii * np.array(rng.choice([1.0, 1.0, 0.5], 4))

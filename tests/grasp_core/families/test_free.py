@@ -145,20 +145,13 @@ def test_the_upper_faces_of_the_octahedron_need_a_friction_of_one_over_root_two(
         found = place(pieces, friction)
         assert isinstance(found, Placement)
         assert gc.force_closure(found.positions, normals_of(pieces), friction).closed
-
-
-def test_the_sides_of_a_box_are_grasped_where_no_directions_positively_span():
-    pieces = [piece for piece in faces_of("box") if abs(piece.normal[2]) < 0.5]
-    assert gc.span_angle(normals_of(pieces)) == 0.0
-    found = place(pieces, 0.5)
-    assert isinstance(found, Placement)
-    assert gc.force_closure(found.positions, normals_of(pieces), 0.5).closed
-    assert gc.classify_lines(found.positions, found.forces) == "regulus"
+        assert gc.classify_lines(found.positions, found.forces) == "regulus", "they all meet"
 
 
 def test_placements_balance_strictly_inside_their_faces_and_cones():
+    """A linear program with pyramids inside the cones accepts them, too."""
     found = of_kind(Placement)
-    for pieces, friction, placed in found:
+    for number, (pieces, friction, placed) in enumerate(found):
         normals = normals_of(pieces)
         pushes = np.einsum("ki,ki->k", placed.forces, normals)
         slides = np.linalg.norm(placed.forces - pushes[:, None] * normals, axis=1)
@@ -168,34 +161,9 @@ def test_placements_balance_strictly_inside_their_faces_and_cones():
         assert insets(pieces, placed.positions).min() > free.LEAST_INSET - TOLERANCE
         assert insets(pieces, placed.positions).min() == pytest.approx(placed.merit, abs=TOLERANCE)
         assert gc.classify_lines(placed.positions, placed.forces) == "regulus"
+        if number % 8 == 0:
+            assert pyramid_margin(placed.positions, normals, friction, 128, outer=False) > 0.0
     assert len(found) >= 75
-
-
-def test_a_linear_program_with_inner_pyramids_accepts_the_placements():
-    found = of_kind(Placement)[::8]
-    for pieces, friction, placed in found:
-        normals = normals_of(pieces)
-        assert pyramid_margin(placed.positions, normals, friction, 128, outer=False) > 0.0
-        spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
-        assert spread[1] > free.LEAST_INSET
-    assert len(found) >= 9
-
-
-def test_symmetric_faces_too_are_held_by_a_regulus():
-    """The forces of their patches all meet, before internal forces are added."""
-    tested = 0
-    for name in ("tetrahedron", "octahedron", "dodecahedron", "icosahedron", "box", "prism"):
-        rng = np.random.default_rng(2)
-        for friction in FRICTIONS:
-            for _ in range(3):
-                pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
-                placed = place(pieces, friction)
-                if not isinstance(placed, Placement):
-                    continue
-                assert gc.classify_lines(placed.positions, placed.forces) == "regulus"
-                assert gc.force_closure(placed.positions, normals_of(pieces), friction).closed
-                tested += 1
-    assert tested >= 36
 
 
 def test_nearly_every_quadruple_with_a_closed_patch_gets_a_grasp():
@@ -213,31 +181,6 @@ def test_no_contacts_in_closure_are_found_where_absence_is_proved():
         best = climb(rng, pieces, friction, samples=40, steps=20)
         assert pyramid_margin(best, normals_of(pieces), friction, 16, outer=False) <= 0.0
     assert len(absent) >= 6
-
-
-def test_absence_holds_up_to_the_friction_at_which_the_patch_closes():
-    """Just above it a grasp is found at once, or nearly always."""
-    rng = np.random.default_rng(4)
-    tested = found = 0
-    for name in OBJECTS:
-        pieces = quadruple(name, rng.choice(len(faces_of(name)), 4, replace=False))
-        lower, upper = 0.0, 4.0
-        for _ in range(16):
-            middle = 0.5 * (lower + upper)
-            held = isinstance(place(pieces, middle), Absence)
-            lower, upper = (middle, upper) if held else (lower, middle)
-        if lower == 0.0 or upper == 4.0:
-            continue
-        absence = place(pieces, lower)
-        assert isinstance(absence, Absence)
-        assert absence.verify()
-        climb(rng, pieces, lower, samples=40, steps=40)
-        above = place(pieces, 1.02 * upper + 1e-3)
-        assert not isinstance(above, Absence)
-        found += isinstance(above, Placement)
-        tested += 1
-    assert tested >= 3
-    assert found >= 0.9 * tested
 
 
 def test_splitting_proves_absence_where_the_patch_of_the_whole_faces_is_closed():

@@ -7,61 +7,14 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.lines import plucker_vectors
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import CELL_A, CONSTRUCTIONS
-from grasp_core.geometry.polygons import edge_rows, plane_frame
 from grasp_core.objects.booleans import hull
-from grasp_core.objects.face_pieces import FacePiece, unit_pieces
+from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from tests.grasp_core.families.disc_borders import on_borders
 from tests.grasp_core.quadruples import tilted_side_cones
 from tests.grasp_core.regular_solids import TOLERANCE, all_signs
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS
-
-V4 = [np.diag(signs) for signs in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1])]
-"""The rotations of a tetrahedron that move every face."""
-
-
-def small_piece(center, normal):
-    """A triangle of a ten-thousandth around a contact."""
-    turns = 2.0 * np.pi * np.arange(3) / 3.0
-    corners = 1e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
-    E, b = edge_rows(corners)
-    return FacePiece(0, normal, center, plane_frame(normal), corners, E, b, b.min())
-
-
-T1, T2 = np.array([1.0, -1, 0]) / math.sqrt(2.0), np.array([1.0, 1, -2]) / math.sqrt(6.0)
-
-
-@pytest.mark.parametrize(
-    ("shift", "family"),
-    [
-        (0.1 * T1, "regulus"),
-        (0.08 * T1 - 0.12 * T2, "regulus"),
-        (0.05 * T1 + 0.15 * T2, "regulus"),
-        (0.15 * T2, "pencil"),
-        (-0.18 * T2, "pencil"),
-    ],
-)
-def test_equal_displacements_leave_no_focus_unless_there_is_enough_friction(shift, family):
-    """The lines along the normals are dependent, and skew unless the shift is towards an edge: then
-    two of them are in either of two planes.
-
-    By symmetry the best focus is the centre of the tetrahedron, which each contact sees at |shift|
-    over the inradius. Pyramids of sixteen sides may ask for 1.9 % more, the triangles for 0.1 %
-    less.
-    """
-    positions = np.array([R @ (TETRA_CENTERS[0] + shift) for R in V4])
-    normals = np.array([R @ TETRA_NORMALS[0] for R in V4])
-    assert np.linalg.svd(plucker_vectors(positions, normals), compute_uv=False)[3] < 1e-12
-    assert gc.classify_lines(positions, normals) == family
-    assert gc.force_closure(positions, normals, 1e-3).closed
-    pieces = [small_piece(*contact) for contact in zip(positions, normals, strict=True)]
-    needed = math.sqrt(3.0) * np.linalg.norm(shift)
-    for share, held in ((0.5, False), (0.99, False), (1.025, True)):
-        cones = [ForceCone(normal, math.atan(share * needed)) for normal in normals]
-        assert bool(CONSTRUCTIONS["concurrent"].place(pieces, cones, 0.0)) is held
 
 
 def bar(length):

@@ -7,8 +7,6 @@ import numpy as np
 import grasp_core as gc
 from grasp_core.closure.contacts import contact_frames, grasp_map
 from grasp_core.cones.pyramids import PYRAMID_SIDES
-from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
-from scenes.example_objects import example_object
 from tests.judges import random_contacts
 
 LIMITS = (0.05, 10.0)
@@ -16,23 +14,6 @@ SLACK = 1e-5
 """Ten times the residual at which forces are accepted, for forces of ten newtons."""
 INSCRIBED = math.cos(math.pi / PYRAMID_SIDES)
 ALL_LIMITS = [(0.0, math.inf), (0.0, 10.0), LIMITS, (1.0, 10.0), (0.5, math.inf)]
-
-
-def cases(per_object=4):
-    """Grasps with wrenches at 0.8 of what they resist at friction 0.5."""
-    for name in ("wedge", "dodecahedron", "random-20-7", "screwdriver"):
-        body = example_object(name)
-        for grasp in gc.plan(body, 0.5, limit=per_object, cones="normal").grasps:
-            resisted = WrenchBody(
-                grasp.positions - body.center_of_mass, grasp.normals, np.full(4, 0.5), LIMITS[1]
-            )
-            for wrench in axis_wrenches(body.radius):
-                yield body, grasp, 0.8 * limit_of(resisted, wrench).limit * wrench
-
-
-def imbalance(grasp, forces, wrench, center):
-    """The wrench that is left over about a center, (6,)."""
-    return grasp_map(grasp.positions, center) @ forces.ravel() + wrench
 
 
 def balanced_wrenches(rng, positions, normals, friction, limits, count):

@@ -1,11 +1,10 @@
 """Forces that need the least friction, beside bisection on exact cones."""
 
 import numpy as np
+import pytest
 
 from grasp_core.closure.contacts import normal_and_tangential
-from grasp_core.forces.contact_forces import (
-    contact_forces,
-)
+from grasp_core.forces.contact_forces import contact_forces, least_friction_forces
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from tests.grasp_core.forces.loads import LIMITS, SLACK, balanced_wrenches
 from tests.judges import random_contacts
@@ -37,3 +36,15 @@ def test_least_friction_uses_the_least_share_of_frictions_that_differ():
         pressed = across > SLACK
         share = (across[pressed] / (friction * along)[pressed]).max(initial=0.0)
         assert lower * (1 - 1e-3) <= share <= upper * (1 + 5e-3) + 1e-5
+
+
+def test_the_least_friction_is_said_where_forces_balance():
+    rng = np.random.default_rng(9)
+    options = {"normal_force": LIMITS, "center": np.zeros(3)}
+    for _ in range(4):
+        positions, normals = random_contacts(rng)
+        load = balanced_wrenches(rng, positions, normals, np.full(4, 0.8), LIMITS, 1)[0]
+        forces, needed = least_friction_forces(positions, normals, 0.8, load, **options)
+        along, across = normal_and_tangential(forces, normals)
+        assert needed == pytest.approx((across / along).max(), rel=1e-9)
+        assert needed <= 0.8 + SLACK

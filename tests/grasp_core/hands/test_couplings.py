@@ -13,8 +13,6 @@ from grasp_core.hands.hand import Coupling
 from tests.grasp_core.hands.gripping import (
     FRICTION,
     grasps,
-    lifting_work,
-    material_point,
     plain_hand,
     scaled,
 )
@@ -77,41 +75,6 @@ def test_couplings_that_cannot_be_are_refused(case):
     coupling, said = FALSE[case]
     with pytest.raises(InputError, match=said):
         replace(plain_hand(), couplings=(Coupling("f01", "f00", 1.0), coupling))
-
-
-def stepped(hand, joints, joint, step):
-    """Angles with one joint and those that follow it turned on."""
-    names, turned = [each.name for each in hand.joints], np.array(joints)
-    turned[names.index(joint)] += step
-    for c in hand.couplings:
-        if c.driver == joint:
-            turned[names.index(c.joint)] += c.ratio * step
-    return turned
-
-
-def test_a_motor_carries_what_its_followers_do(coupled, reached):
-    """Virtual work: the torque of a motor is the work of the contact force per turn of it."""
-    for each in reached:
-        motors = gc.hand_motors(coupled, each)
-        names = [joint.name for joint in coupled.free_joints]
-        assert names == [j.name for j in coupled.joints if not j.name.endswith("curl")]
-        assert motors.limits == pytest.approx([0.5] * len(names))
-        levers = motors.levers.reshape(len(names), -1, 3)
-        for row, name in zip(levers, names, strict=True):
-            turned = stepped(coupled, each.joints, name, 1e-6)
-            for k, contact in enumerate(each.contacts):
-                moved = material_point(coupled, each, k, turned) - contact.position
-                assert row[k] == pytest.approx(moved / 1e-6, abs=1e-6)
-
-
-def test_gravity_of_links_loads_the_motor_of_the_joint_that_is_followed(coupled, reached):
-    each, down = reached[0], np.array([0.0, 0.0, -1.0])
-    motors = gc.hand_motors(coupled, each, down=down)
-    before = lifting_work(coupled, each, each.joints, down)
-    for row, joint in enumerate(coupled.free_joints):
-        turned = stepped(coupled, each.joints, joint.name, 1e-6)
-        work = (lifting_work(coupled, each, turned, down) - before) / 1e-6
-        assert motors.gravity[row] == pytest.approx(work, rel=1e-4, abs=1e-7)
 
 
 def test_followers_need_no_torque_limit_and_simulations_name_them(coupled, reached):

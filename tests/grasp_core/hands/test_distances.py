@@ -10,9 +10,9 @@ import trimesh
 import grasp_core as gc
 import scenes
 from grasp_core.compiled import compiled
-from grasp_core.hands.collisions import FAR, surface_tree
 from grasp_core.hands.collisions import KERNEL as HANDS
-from grasp_core.hands.hand_arrays import hand_arrays, places
+from grasp_core.hands.collisions import surface_tree
+from grasp_core.hands.hand_arrays import hand_arrays
 from tests.judges import random_rotation
 
 KERNEL = "grasp_core.hands.distances_kernel"
@@ -157,36 +157,3 @@ def test_nearest_points_are_those_of_trimesh(name):
             wound = kernel.windings(place, tree.corners)
             assert wound == pytest.approx(1.0 if is_inside(place, body) else 0.0, abs=1e-9)
     assert kernel.nearest(np.full(3, 9.0), 1.0, tree, near) == -1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["allegro", "leap"])
-def test_a_hand_is_as_far_from_a_surface_as_its_nearest_hull_or_overlaps_it(name):
-    """Boxes without rounding too: those of LEAP's links."""
-    hand, body, rng = gc.load_hand(name), scenes.example_object("cross"), np.random.default_rng(7)
-    arrays, kernel, overlaps, apart = hand_arrays(hand), compiled(HANDS), 0, 0
-    tree, low, high = surface_tree(body), *hand.ranges.T
-    needs = np.full(len(arrays.shape_links), FAR)
-    for _ in range(12):
-        angles, pose = rng.uniform(low, high), np.eye(4)
-        pose[:3, :3], pose[:3, 3] = random_rotation(rng), rng.normal(scale=0.12, size=3)
-        found = places(hand, angles, pose)
-        turned, middles = np.empty((len(needs), 3, 3)), np.empty((len(needs), 3))
-        frame = pose[:3, :3].copy(), pose[:3, 3].copy()
-        links = found.link_rotations[0], found.link_positions[0]
-        kernel.place_shapes(arrays, *frame, *links, turned, middles)
-        said = kernel.of_object(arrays, turned, middles, tree, needs)
-        cores = [kernel.core_in(arrays, turned[s], middles[s], s) for s in range(len(needs))]
-        hulls = [
-            (min(hulls_apart(core, T) for T in body.vertices[body.triangles]), rounding)
-            for core, rounding in cores
-        ]
-        inside = any(is_inside(core[0], body) for core, _ in cores)
-        if inside or min(away for away, _ in hulls) < EXACT:
-            overlaps += 1
-            assert said == -tree.radii[0]
-        else:
-            apart += 1
-            true = min(away - rounding for away, rounding in hulls) - FAR
-            assert min(said, 0.0) == pytest.approx(min(true, 0.0), abs=EXACT)
-    assert min(overlaps, apart) >= 2

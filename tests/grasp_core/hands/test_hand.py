@@ -64,21 +64,20 @@ def test_a_hand_with_blocks_is_kept_in_files():
     assert from_record(Hand, record_of(hand)) == hand
 
 
-def test_values_refuse_what_makes_no_hand():
-    with pytest.raises(InputError, match="rotation matrix"):
-        LinkShape(np.zeros(3), np.diag([1.0, 1.0, -1.0]), np.ones(3), 0.0)
-    with pytest.raises(InputError, match="half_sizes"):
-        LinkShape(np.zeros(3), np.eye(3), np.zeros(3), 0.0)
-    with pytest.raises(InputError, match="highest"):
-        Joint("j", np.zeros(3), np.eye(3), [0.0, 0.0, 1.0], 1.0, 0.5)
-    with pytest.raises(InputError, match="length 1"):
-        Joint("j", np.zeros(3), np.eye(3), [0.0, 0.0, 2.0], 0.0, 0.5)
-    with pytest.raises(InputError, match="radius"):
-        Fingertip(np.zeros(3), 0.0)
-    hand = plain_hand()
-    with pytest.raises(InputError, match="3 to 5"):
-        Hand("two", hand.palm, hand.fingers[:2])
-    with pytest.raises(InputError, match="must differ"):
-        Hand("same", hand.palm, (hand.fingers[0], *hand.fingers[:2]))
-    with pytest.raises(InputError, match="names of links"):
-        replace(hand, ignored_pairs=(("palm", "tail"),))
+ZERO, UNIT, PLAIN = np.zeros(3), np.eye(3), plain_hand()
+NO_HANDS = [
+    (lambda: LinkShape(ZERO, np.diag([1.0, 1.0, -1.0]), np.ones(3), 0.0), "rotation matrix"),
+    (lambda: LinkShape(ZERO, UNIT, ZERO, 0.0), "half_sizes"),
+    (lambda: Joint("j", ZERO, UNIT, [0.0, 0.0, 1.0], 1.0, 0.5), "highest"),
+    (lambda: Joint("j", ZERO, UNIT, [0.0, 0.0, 2.0], 0.0, 0.5), "length 1"),
+    (lambda: Fingertip(ZERO, 0.0), "radius"),
+    (lambda: Hand("two", PLAIN.palm, PLAIN.fingers[:2]), "3 to 5"),
+    (lambda: Hand("same", PLAIN.palm, PLAIN.fingers[:1] * 3), "must differ"),
+    (lambda: replace(PLAIN, ignored_pairs=(("palm", "tail"),)), "names of links"),
+]
+
+
+@pytest.mark.parametrize(("made", "said"), NO_HANDS)
+def test_values_refuse_what_makes_no_hand(made, said):
+    with pytest.raises(InputError, match=said):
+        made()

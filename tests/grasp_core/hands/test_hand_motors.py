@@ -1,14 +1,18 @@
 """Motors of a hand: joint torques are those that a step of the joints pays for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.errors import InputError
+from grasp_core.hands.hand import Coupling
 from tests.grasp_core.hands.gripping import lifting_work, material_point, reaches
 
 STEP = 1e-6
 CASE = ("leap", "dodecahedron", 0.035)
+DOWN = np.array([0.48, -0.6, 0.64])
 
 
 def strong(hand):
@@ -16,34 +20,49 @@ def strong(hand):
 
 
 def stance():
-    return next(each for each in reaches(*CASE) if each.reached)
+    """LEAP where it stands, with two joints that follow others and stand so, too."""
+    reach, hand = next(each for each in reaches(*CASE) if each.reached), strong("leap")
+    names, couplings = [joint.name for joint in hand.joints], []
+    for driver, ratio in ((1, 0.7), (6, -0.4)):
+        offset = reach.joints[driver + 1] - ratio * reach.joints[driver]
+        couplings.append(Coupling(names[driver + 1], names[driver], ratio, offset))
+    return reach, replace(hand, couplings=tuple(couplings))
 
 
-def test_levers_are_how_far_contact_points_go_with_the_joints():
-    hand, reach = strong("leap"), stance()
-    levers = gc.hand_motors(hand, reach).levers.reshape(len(hand.joints), -1, 3)
-    for joint, step in enumerate(STEP * np.eye(len(hand.joints))):
+def steps(hand):
+    """The free joints with a step of all angles when each of them is turned on by a little."""
+    names = [joint.name for joint in hand.joints]
+    for joint in hand.free_joints:
+        step = np.array([STEP if name == joint.name else 0.0 for name in names])
+        for follower in hand.couplings:
+            if follower.driver == joint.name:
+                step[names.index(follower.joint)] = follower.ratio * STEP
+        yield step
+
+
+def test_levers_are_how_far_contact_points_go_with_the_joints_and_their_followers():
+    reach, hand = stance()
+    levers = gc.hand_motors(hand, reach).levers.reshape(14, -1, 3)
+    for step, lever in zip(steps(hand), levers, strict=True):
         for contact in range(len(reach.fingers)):
             behind, ahead = (
                 material_point(hand, reach, contact, reach.joints + way * step)
                 for way in (-1.0, 1.0)
             )
             rate = (ahead - behind) / (2.0 * STEP)
-            assert levers[joint, contact] == pytest.approx(rate, abs=1e-8)
+            assert lever[contact] == pytest.approx(rate, abs=1e-8)
 
 
 def test_gravity_is_the_rate_at_which_links_rise():
-    hand, reach = strong("leap"), stance()
-    down = np.array([0.48, -0.6, 0.64])
-    motors = gc.hand_motors(hand, reach, down=down)
-    every = gc.hand_motors(hand, reach, any_orientation=True)
-    for joint, step in enumerate(STEP * np.eye(len(hand.joints))):
+    reach, hand = stance()
+    motors = gc.hand_motors(hand, reach, down=DOWN)
+    for step, gravity in zip(steps(hand), motors.gravity, strict=True):
         low, high = (
-            lifting_work(hand, reach, reach.joints + way * step, down) for way in (-1.0, 1.0)
+            lifting_work(hand, reach, reach.joints + way * step, DOWN) for way in (-1.0, 1.0)
         )
-        assert motors.gravity[joint] == pytest.approx((high - low) / (2.0 * STEP), abs=1e-8)
-    lost = 0.35 - every.limits
-    assert (lost >= np.abs(motors.gravity) - 1e-12).all()
+        assert gravity == pytest.approx((high - low) / (2.0 * STEP), abs=1e-8)
+    every = gc.hand_motors(hand, reach, any_orientation=True)
+    assert (0.35 - every.limits >= np.abs(motors.gravity) - 1e-12).all()
     assert not every.gravity.any()
 
 

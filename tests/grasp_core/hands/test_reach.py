@@ -165,17 +165,6 @@ def test_above_a_table_every_part_stays_above_it():
     assert seen >= 2
 
 
-def test_an_object_that_is_too_large_is_not_reached_and_nothing_says_impossible():
-    body = scaled("dodecahedron", 0.2)
-    found = gc.reach_with(gc.load_hand("allegro"), body, grasps("dodecahedron", 0.2, 1)[0],
-                          FRICTION, starts=20)  # fmt: skip
-    assert not found.reached
-    assert found.reason in {"limit", "collision", "not found"}
-    assert "no pose was found" in found.explanation
-    assert "impossible" not in found.explanation
-    assert found.contacts is None
-
-
 def test_a_hand_with_five_fingers_uses_four():
     body, grasp = scaled("dodecahedron", 0.035), grasps("dodecahedron", 0.035)[0]
     hand = gc.load_hand("allegro")

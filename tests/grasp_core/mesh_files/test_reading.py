@@ -1,6 +1,5 @@
 """What is written is what is read, in every format and style; what is damaged is refused."""
 
-import signal
 import struct
 
 import numpy as np
@@ -14,7 +13,6 @@ from grasp_core.mesh_files import glb as glb_files
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.polygons import TextPoints
 from grasp_core.mesh_files.reading import read_triangles
-from sim_validate.main import main
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
 from tests.bad_input.mesh_texts import obj as obj_text
 from tests.bad_input.of_binary_meshes import glb, tree
@@ -303,25 +301,6 @@ def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
         with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*limit") as caught:
             read_triangles(path, limits)
         assert caught.value.reason is MeshRefusal.TOO_MANY
-
-
-def test_a_command_ends_at_once_where_it_is_interrupted_amid_a_file(tmp_path, monkeypatch, capsys):
-    path, read = tmp_path / "part.obj", []
-    add = TextPoints.add
-
-    def interrupted(points, words):
-        read.append(words)
-        if len(read) == 3:
-            signal.raise_signal(signal.SIGINT)
-        add(points, words)
-
-    path.write_text(obj_text())
-    with monkeypatch.context() as patched:
-        patched.setattr(TextPoints, "add", interrupted)
-        assert main(["inspect", str(path)]) == 130
-    assert len(read) == 3
-    assert "interrupted" in capsys.readouterr().err
-    assert main(["inspect", str(path)]) == 0
 
 
 def test_too_little_memory_is_a_refusal(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import clearest_point, clearing, flat_patches
 from grasp_core.objects.surface import Mesh
-from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body, inside, met
+from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body
 
 ROUNDING = 1e-9
 """Relative to the object, of heights and of lines through the edges between triangles."""
@@ -27,7 +27,7 @@ def test_over_each_point_of_a_patch_is_one_point_of_the_surface_as_near_as_it_sa
 
 
 def test_patches_keep_the_limits_and_come_largest_first():
-    vertices, triangles = bumpy_ellipsoid(noise=0.001)
+    vertices, triangles = bumpy_ellipsoid(noise=0.001, subdivisions=3)
     extent = np.ptp(vertices, axis=0).max()
     for limits in (gc.PatchLimits(8.0, 0.02, 12), gc.PatchLimits(25.0, 0.004, 8)):
         found = flat_patches(Mesh(vertices, triangles), limits)
@@ -58,26 +58,6 @@ def test_a_patch_of_one_large_triangle_keeps_the_limits_too():
     assert max(face.depth for face in found) <= limits.depth * 0.1
 
 
-@pytest.mark.slow
-def test_no_patch_spans_a_hole_in_the_surface():
-    vertices, triangles = bumpy_ellipsoid()
-    middles = vertices[triangles].mean(axis=1)
-    whole = gc.Polyhedron.from_mesh(vertices, triangles)
-    hole = whole.faces[0].centroid
-    open_ = triangles[np.linalg.norm(middles - hole, axis=1) > 0.004]
-    body = gc.Polyhedron.from_mesh(vertices, open_)
-    assert "no finger is placed there" in " ".join(body.notes)
-    assert not any(np.isin(face.facets, body.surface.caps).any() for face in body.faces)
-    rng, lines = np.random.default_rng(0), 0
-    for face in body.faces:
-        for point in inside(face.polygon, rng, 40):
-            assert len(met(body, face, point)[0]) >= 1
-            lines += 1
-    assert lines >= 400
-    away = np.linalg.norm(body.center_of_mass - whole.center_of_mass)
-    assert away < 0.001 * whole.radius
-
-
 def test_fine_meshes_get_patches_and_coarse_ones_planar_faces_unless_told_otherwise():
     vertices, triangles = bumpy_ellipsoid(subdivisions=2)
     coarse = gc.Polyhedron.from_mesh(*bumpy_ellipsoid(subdivisions=1))
@@ -102,7 +82,7 @@ def test_a_coarse_torus_whose_triangles_meet_regions_in_their_corners_is_planned
 
 
 def test_a_surface_without_flat_parts_is_refused_with_advice():
-    ball = trimesh.creation.icosphere(subdivisions=3)
+    ball = trimesh.creation.icosphere(subdivisions=2)
     rough = gc.PatchLimits(spread_deg=0.5, depth=1e-5)
     body = gc.Polyhedron.from_mesh(0.05 * ball.vertices, ball.faces, patches=rough)
     assert len(body.faces) >= 4  # single triangles

@@ -46,7 +46,7 @@ def on_edge(start, end, point):
     return dot(rest, rest)
 
 
-@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 1e3])
 @pytest.mark.parametrize("height", [1.0, 1e-3, 1e-7, 0.0])
 def test_distances_are_those_of_rational_arithmetic(size, height):
     """Points are on, above, beside and far from triangles whose height is a share of their length.
@@ -55,7 +55,7 @@ def test_distances_are_those_of_rational_arithmetic(size, height):
     rounding of the corners' own coordinates.
     """
     rng, inside = np.random.default_rng(7), 0
-    for _ in range(60):
+    for _ in range(20):
         a, b, c = rng.normal(size=(3, 3))
         c = a + rng.random() * (b - a) + height * (c - a)
         triangle = size * np.array([a, b, c])
@@ -75,4 +75,4 @@ def test_distances_are_those_of_rational_arithmetic(size, height):
             assert np.linalg.norm(found - point) == pytest.approx(truth, abs=slack)
             assert float(squared_distance(triangle, found)) ** 0.5 <= slack
             inside += truth <= 4.0 * ROUNDING * size
-    assert inside >= 30
+    assert inside >= 10

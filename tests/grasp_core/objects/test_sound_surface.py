@@ -147,16 +147,6 @@ def test_a_solid_wound_at_random_has_the_faces_of_the_clean_one(seed):
     assert any("wound against their neighbours were turned" in note for note in body.notes)
 
 
-def test_a_missing_triangle_and_a_wrong_winding_are_mended_together():
-    mesh = box().subdivide().subdivide()
-    faces = np.array(mesh.faces)
-    faces[20:60] = faces[20:60, ::-1]
-    body = gc.Polyhedron.from_mesh(mesh.vertices, faces[1:, ::-1])
-    assert body.volume == pytest.approx(mesh.volume, rel=1e-12)
-    assert body.surface.holes == 1
-    assert len(body.notes) == 3
-
-
 SIZE = (0.1, 0.2, 0.3)
 FRICTION = 0.5
 

@@ -17,23 +17,26 @@ SAME = 1e-7
 
 
 def moved(body, kind, rng):
-    """The object as another file might have it, and the isometry that took it there."""
-    vertices, triangles, A = body.vertices, body.triangles, np.eye(3)
+    """The object as another file might have it, and the isometry that took it there.
+
+    Turned ones are elsewhere and larger, too.
+    """
+    vertices, triangles, A, size = body.vertices, body.triangles, np.eye(3), 1.0
     if kind == "mirrored":
         A, triangles = np.diag([1.0, -1.0, 1.0]), triangles[:, ::-1]
     if kind == "turned":
-        A = random_rotation(rng)
+        A, size = random_rotation(rng), 2.3
     if kind == "renumbered":
         order = rng.permutation(len(vertices))
         vertices, triangles = vertices[order], np.argsort(order)[triangles]
         triangles = triangles[rng.permutation(len(triangles))]
         triangles = np.array([np.roll(corners, rng.integers(3)) for corners in triangles])
-    return gc.Polyhedron.from_mesh(vertices @ A.T, triangles), A
+    return gc.Polyhedron.from_mesh(size * vertices @ A.T + size - 1.0, triangles), A
 
 
 def isometries(one, two):
     """All rotations and reflections that take the corners of one object to those of another."""
-    a, b = ((body.vertices - body.center_of_mass) / one.radius for body in (one, two))
+    a, b = ((body.vertices - body.center_of_mass) / body.radius for body in (one, two))
     basis = next(i for i in permutations(range(len(a)), 3) if abs(np.linalg.det(a[list(i)])) > 0.1)
     lengths = np.linalg.norm(b, axis=1)
     like = [np.flatnonzero(np.abs(lengths - np.linalg.norm(a[i])) < SAME) for i in basis]

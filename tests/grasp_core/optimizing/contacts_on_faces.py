@@ -27,21 +27,6 @@ def best(name, measure, gap, **settings):
     )
 
 
-def random_contacts(found, rng, count):
-    """Pieces (count, 4) and plane coordinates (count, 4, 2), many of them on few faces."""
-    polygons = found.proof.grounds.polygons()
-    on = rng.integers(len(polygons), size=(count, 4))
-    # sharp weights put many contacts at corners and edges
-    at = [
-        [
-            rng.dirichlet(np.full(len(polygons[p]), rng.choice([0.1, 1.0]))) @ polygons[p]
-            for p in row
-        ]
-        for row in on
-    ]
-    return on, np.array(at)
-
-
 def grid_of_contacts(found):
     """Pieces (n,) and plane coordinates (n, 2) of a grid of points on all faces."""
     rows, points = [], []

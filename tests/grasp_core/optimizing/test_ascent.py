@@ -56,17 +56,25 @@ def test_slopes_of_the_nearest_planes_predict_small_moves(wedge, length):
     assert tested >= 30
 
 
-def test_a_climb_stays_within_the_limits_and_never_goes_down(wedge):
+def test_a_climb_stays_within_the_limits_and_ends_where_no_small_move_is_much_better(wedge):
+    """It never goes down. Random feasible moves of up to a hundredth gain no hundredth."""
     body, grasps = wedge
-    raised = 0
-    for grasp in grasps[:5]:
+    rng, raised, tested = np.random.default_rng(2), 0, 0
+    for grasp in grasps[:4]:
         faces, y = contacts_of(body, grasp)
         end, found = faces.climb(y)
         assert found.lower >= faces.quality(y).lower
         for piece, at in zip(faces.pieces, end, strict=True):
             assert (piece.E @ at <= piece.b + 1e-9).all()
         raised += found.lower > 1.01 * faces.quality(y).lower
-    assert raised >= 4
+        for _ in range(40):
+            moved = end + rng.uniform(-0.01, 0.01, size=end.shape)
+            room = zip(faces.pieces, moved, strict=True)
+            if all((piece.E @ at <= piece.b).all() for piece, at in room):
+                assert faces.quality(moved).lower <= 1.01 * found.lower
+                tested += 1
+    assert raised >= 3
+    assert tested >= 10
 
 
 def test_contacts_out_of_closure_stay_where_they_are(wedge):
@@ -76,19 +84,3 @@ def test_contacts_out_of_closure_stay_where_they_are(wedge):
     end, found = weak.climb(y)
     np.testing.assert_array_equal(end, y)
     assert found.lower <= 0.0
-
-
-def test_no_small_move_from_the_end_of_a_climb_is_much_better(wedge):
-    """Random feasible moves of up to a hundredth: none gains a hundredth."""
-    body, grasps = wedge
-    rng, tested = np.random.default_rng(2), 0
-    for grasp in grasps[:3]:
-        faces, y = contacts_of(body, grasp)
-        end, found = faces.climb(y)
-        for _ in range(60):
-            moved = end + rng.uniform(-0.01, 0.01, size=end.shape)
-            room = zip(faces.pieces, moved, strict=True)
-            if all((piece.E @ at <= piece.b).all() for piece, at in room):
-                assert faces.quality(moved).lower <= 1.01 * found.lower
-                tested += 1
-    assert tested >= 10

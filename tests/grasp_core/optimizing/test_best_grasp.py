@@ -11,9 +11,8 @@ import grasp_core as gc
 from grasp_core.compiled import compiled
 from grasp_core.optimizing import best_grasp as searching
 from grasp_core.optimizing import search
-from grasp_core.optimizing.ascent import CLIMBED, climbed
+from grasp_core.optimizing.ascent import CLIMBED
 from grasp_core.optimizing.grounds import ROOM, exact_maps, grounds_of
-from grasp_core.optimizing.search import Searching, Stop
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object
@@ -23,7 +22,6 @@ from tests.grasp_core.optimizing.contacts_on_faces import (
     demands,
     grid_of_contacts,
     measured,
-    random_contacts,
     some_twists,
     supports,
     upper_bounds,
@@ -79,28 +77,6 @@ def inner_radius(polygon):
     along = np.roll(polygon, -1, axis=0) - polygon
     apart = np.linalg.norm(np.cross(middle - polygon, along), axis=1)
     return float((apart / np.linalg.norm(along, axis=1)).min())
-
-
-@pytest.mark.slow
-def test_no_random_contacts_and_no_climb_exceed_the_bound(searched):
-    """Hundreds of twists bound the measure of most from above; the rest is measured."""
-    body, found = searched
-    rng, held, climbs = np.random.default_rng(1), 0, 0
-    twists = some_twists(found, rng, 300)
-    on, at = random_contacts(found, rng, 6000)
-    answers = supports(found, on, at, twists).max(axis=1)
-    best_first = np.argsort(-upper_bounds(answers, demands(found, twists, body.radius)))
-    for row in best_first[:60]:
-        here = measured(found, on[row], at[row])
-        assert here.lower <= found.bound
-        held += here.lower > 0.0
-    assert held >= 15
-    hunt = Searching(found.proof.grounds, FRICTION, 1, Stop(), found.proof.measure)
-    for row in best_first[:400:40]:
-        end = climbed(hunt, on[row], at[row])
-        assert end.quality.lower <= found.bound
-        climbs += end.quality.lower > 0.0
-    assert climbs >= 2
 
 
 def test_the_best_on_a_tetrahedron_meets_the_ceiling_of_its_only_four_faces():
@@ -284,26 +260,12 @@ def test_symmetries_are_used_only_where_they_form_a_group():
     assert counts == {"tetrahedron": 24, "box": 8, "octahedron": 48, "random-4-1": 1}
 
 
-@pytest.mark.slow
-def test_a_proof_with_symmetries_and_one_without_bound_the_same_object(monkeypatch):
-    body = example_object("tetrahedron")
-    with_maps = easy()
-    monkeypatch.setattr(searching, "exact_maps", lambda *_: np.eye(3)[None])
-    alone = gc.best_grasp(body, FRICTION, gap=0.3)
-    assert len(with_maps.proof.maps) == 24
-    assert len(alone.proof.maps) == 1
-    assert alone.verify()
-    assert with_maps.quality.lower <= alone.bound
-    assert alone.quality.lower <= with_maps.bound
-
-
 def test_false_maps_are_noticed():
-    box = gc.best_grasp(example_object("box"), FRICTION, gap=0.4).proof
-    across = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the sides differ
-    assert box.verify()
-    assert len(box.maps) > 1
-    for maps in (np.array([np.eye(3), across]), box.maps[1:], box.maps[::-1]):
-        assert not replace(box, maps=maps).verify()
+    proof = easy().proof
+    turn = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # of a box, not of these
+    assert len(proof.maps) == 24
+    for maps in (np.array([np.eye(3), turn]), proof.maps[1:], proof.maps[::-1]):
+        assert not replace(proof, maps=maps).verify()
 
 
 def test_a_cut_keeps_all_that_answers_and_next_to_nothing_else():

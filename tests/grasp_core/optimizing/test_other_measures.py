@@ -56,7 +56,7 @@ def test_a_task_keeps_only_the_symmetries_that_it_has():
     assert len(exact_maps(body, grounds, Measure("weight"))) == 8
     assert len(exact_maps(body, grounds, Measure("task", down))) == 4
     assert len(exact_maps(body, grounds, Measure("task", np.vstack([down, turning])))) == 2
-    found = best("box", "task", 0.4)
+    found = best("box", "task", 0.8)
     every = exact_maps(body, grounds)
     assert len(every) > len(found.proof.maps)
     assert not replace(found.proof, maps=every).verify()

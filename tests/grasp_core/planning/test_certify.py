@@ -3,6 +3,7 @@
 import copy
 import pickle
 from dataclasses import fields, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,18 +19,18 @@ from scenes.example_objects import example_object
 FRICTION = 0.4
 
 
+@cache
 def planned():
-    body = example_object("random-10-1")
-    return body, gc.plan(body, FRICTION).grasps
+    return gc.plan(example_object("random-10-1"), FRICTION).grasps
 
 
 def test_critical_frictions_found_together_are_those_found_one_by_one(monkeypatch):
-    _, grasps = planned()
+    grasps = planned()
     alone = [grasp.critical_friction for grasp in grasps]
     assert len(set(alone)) > 20
     for grasp, friction in zip(grasps[::9], alone[::9], strict=True):
         assert friction == pytest.approx(min(gc.critical_friction(grasp), FRICTION), abs=2e-7)
-    _, together = planned()
+    together = planned.__wrapped__()
     monkeypatch.delattr(module, "critical_friction")
     module.find_critical_frictions(together)
     assert [grasp.critical_friction for grasp in together] == alone
@@ -41,7 +42,7 @@ def _pickled(grasp):
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, replace, _pickled])
 def test_copies_have_the_figures_of_the_original(copied):
-    _, grasps = planned()
+    grasps = planned()
     for grasp in grasps[:2]:
         other = copied(grasp)
         for name in PUT_OFF:
@@ -52,7 +53,7 @@ def test_copies_have_the_figures_of_the_original(copied):
 
 def test_planned_values_pass_the_checks_of_values_that_users_make():
     """They are made without checks, so here they are made once more with them."""
-    _, grasps = planned()
+    grasps = planned()
     for grasp in grasps[::9]:
         for value in (grasp, grasp.witness, *grasp.contacts, *grasp.regions, *grasp.force_cones):
             checked = replace(value)

@@ -14,7 +14,6 @@ from grasp_core.planning.quadruples import PlannedCones, all_blocks
 from scenes.example_objects import example_object
 from tests.benchmarks.invariance import chosen, examine, found_on
 from tests.benchmarks.objects import sphere_hull
-from tests.judges import pyramid_margin, random_rotation
 
 TEN_DEGREES = math.tan(math.radians(10.0))
 RADIUS_ACCURACY = 1e-6
@@ -22,10 +21,6 @@ RADIUS_ACCURACY = 1e-6
 DISCS = ("concurrent", "pencil")
 """The families with independent discs."""
 FAMILIES = (*DISCS, "regulus")
-
-
-def remade(body, move, name="moved"):
-    return gc.Polyhedron.from_mesh(move(body.vertices), body.triangles, name=name)
 
 
 @pytest.mark.parametrize(
@@ -42,23 +37,6 @@ def test_platonic_solids_have_the_known_number_of_quadruples_at_ten_degrees(name
 
 TILTED = [(name, "tilted") for name in ("wedge", "random-10-1", "chamfered-box", "random-12-1")]
 NORMAL = [(name, "normal") for name in ("icosahedron", "random-20-7", "random-30-2", "screwdriver")]
-
-
-@pytest.mark.slow
-def test_no_returned_grasp_fails_an_independent_pyramid_of_64_sides():
-    """Inner pyramids accept each grasp, so outer ones must as well; critical friction agrees."""
-    tested = 0
-    for name, cones in TILTED + NORMAL:
-        families = ("concurrent",) if name == "screwdriver" else FAMILIES
-        body = example_object(name)
-        for grasp in gc.plan(body, 0.5, limit=8, families=families, cones=cones).grasps:
-            for outer in (False, True):
-                assert pyramid_margin(grasp.positions, grasp.normals, 0.5, 64, outer=outer) > 1e-9
-            below = 0.99 * grasp.critical_friction
-            if below > 1e-3:
-                assert pyramid_margin(grasp.positions, grasp.normals, below, 64, outer=False) < 1e-9
-            tested += 1
-    assert tested >= 40
 
 
 def test_every_grasp_lies_on_its_faces_inside_its_regions_whose_corners_are_closed():
@@ -81,23 +59,6 @@ def test_every_grasp_lies_on_its_faces_inside_its_regions_whose_corners_are_clos
                 assert gc.force_closure(points, grasp.normals, 0.4).closed
             tested += 1
     assert tested >= 90
-
-
-@pytest.mark.parametrize("name", ["wedge"])
-def test_moving_turning_and_scaling_the_object_moves_its_grasps(name):
-    rng = np.random.default_rng(1)
-    body = example_object(name)
-    here = gc.plan(body, 0.3, families=DISCS, cones="tilted")
-    R, scale = random_rotation(rng), float(rng.uniform(0.1, 3.0))
-    there = gc.plan(
-        remade(body, lambda v: scale * v @ R.T + 0.4), 0.3, families=DISCS, cones="tilted"
-    )
-    assert {g.id for g in here.grasps} == {g.id for g in there.grasps}
-    radii = {g.id: g.radius for g in there.grasps}
-    for grasp in here.grasps:
-        expected = pytest.approx(radii[grasp.id] / scale, rel=RADIUS_ACCURACY)
-        assert grasp.radius == expected
-    assert len(here.grasps) >= 50
 
 
 @pytest.mark.slow
@@ -144,21 +105,6 @@ def test_grasps_are_streamed_as_they_are_found():
     assert everything == {grasp.id for grasp in gc.plan(body, 0.4).grasps}
 
 
-@pytest.mark.parametrize(("name", "absent"), [("box", 0), ("random-8-1", 1)])
-def test_the_free_method_decides_every_four_faces(name, absent):
-    """With a grasp in force closure, or a proof of absence that checks."""
-    body = example_object(name)
-    found = gc.plan(body, 0.3, families=("free",))
-    counts = found.counts.families["free"]
-    assert counts.tried == found.counts.quadruples == counts.found + counts.infeasible
-    assert counts.infeasible == len(found.absences) >= absent
-    assert all(proof.verify() for proofs in found.absences.values() for proof in proofs)
-    for grasp in found.grasps:
-        assert gc.force_closure(grasp, friction=0.3).verify()
-        assert grasp.critical_friction < 0.3
-    assert found.grasps
-
-
 def test_a_smaller_theta_binds_the_free_method_too():
     found = gc.plan(example_object("wedge"), 0.5, theta_deg=8.0, families="free")
     assert found.grasps
@@ -169,11 +115,15 @@ def test_a_smaller_theta_binds_the_free_method_too():
         assert grasp.critical_friction < math.tan(math.radians(8.0))
 
 
-@pytest.mark.parametrize("name", ["box", pytest.param("wedge", marks=pytest.mark.slow)])
-def test_every_four_faces_are_held_or_proved_to_hold_nothing(name):
+@pytest.mark.parametrize(("name", "absent"), [("box", 0), ("random-8-1", 1)])
+def test_every_four_faces_are_held_or_proved_to_hold_nothing(name, absent):
     """Also where no normals span: with tilted cones most grasps have regions."""
     for friction in (0.3, 0.8):
         found = gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
+        proofs = [proof for each in found.absences.values() for proof in each]
+        assert all(proof.verify() for proof in proofs)
+        assert len(proofs) >= absent * (friction < 0.5)
+        assert all(gc.force_closure(grasp, friction=friction).verify() for grasp in found)
         known, held = found.outcomes, {tuple(sorted(g.faces)) for g in found.grasps}
         assert (known.held, known.absent, known.open) == (len(held), len(found.absences), 0)
         assert known.held + known.absent == found.counts.quadruples

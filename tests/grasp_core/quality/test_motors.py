@@ -4,13 +4,6 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.quality.wrench_limits import (
-    SETTLED,
-    WrenchBody,
-    axis_wrenches,
-    limit_of,
-    weakest_from,
-)
 from tests.grasp_core.execution.jointed import hand_of
 from tests.judges import random_contacts
 from tests.tampering.table import Limited
@@ -81,32 +74,3 @@ def test_forces_within_lowered_limits_are_within_all_torques_in_every_orientatio
         assert np.abs(torques).max() <= 1.0 + 1e-12
         reached = max(reached, np.abs(torques).max())
     assert reached >= 0.999
-
-
-def test_the_search_for_the_weakest_wrench_knows_motors():
-    """Its end is proved and settled: the wrench that the last facet faces is hardly weaker.
-
-    None of 60 other wrenches is resisted less.
-    """
-    rng, tested, lowered = np.random.default_rng(7), 0, 0
-    while tested < 2:
-        positions, normals = random_contacts(rng)
-        if not gc.force_closure(positions, normals, 0.6).closed:
-            continue
-        motors = hand_of(rng, 4, 1.0, joints=4, lever_m=1.0)
-        body = WrenchBody(positions, normals, np.full(4, 0.6), 3.0, motors)
-        free = WrenchBody(positions, normals, np.full(4, 0.6), 3.0)
-        limits = [limit_of(body, wrench) for wrench in axis_wrenches(1.0)]
-        found = weakest_from(body, limits, 1.0)
-        given = {"max_normal_force": 3.0, "motors": motors}
-        assert found.verify(positions, normals, 0.6, **given)
-        assert np.linalg.norm(found.wrench) == pytest.approx(1.0)
-        assert found.limit <= min(each.limit for each in limits)
-        facing = limit_of(body, -found.facet / np.linalg.norm(found.facet))
-        assert found.limit * (1.0 - SETTLED) <= facing.limit <= found.limit * (1.0 + 1e-6)
-        wrenches = rng.normal(size=(60, 6))
-        wrenches /= np.linalg.norm(wrenches, axis=1, keepdims=True)
-        assert found.limit <= min(limit_of(body, wrench).limit for wrench in wrenches)
-        lowered += found.limit < 0.9 * limit_of(free, found.wrench).limit
-        tested += 1
-    assert lowered >= 1

@@ -1,6 +1,5 @@
 import json
 from dataclasses import replace
-from itertools import islice
 
 import pytest
 
@@ -30,17 +29,6 @@ def test_a_plan_on_a_curved_surface_and_its_moves_are_loaded_as_they_were(tmp_pa
     moves = (Moved("a", "b", (0.1, 0.2), (0.2, 0.25), None), Moved("c", "c", (0, 1), (0, 1), 2.0))
     moved = replace(planned, moves=moves)
     assert gc.load_grasps(gc.save_grasps(tmp_path / "grasps.json", moved)) == moved
-
-
-def test_the_command_line_reads_what_python_saves_and_the_other_way_round(plan, tmp_path):
-    chosen = replace(plan, grasps=tuple(islice(gc.iter_grasps(plan.body, 0.5), 2)))
-    gc.save_grasps(tmp_path / "grasps.json", chosen)
-    assert gc.load_grasps(tmp_path / "grasps.json").grasps == chosen.grasps
-    assert main(["validate", str(tmp_path / "grasps.json"), "--out", str(tmp_path / "v")]) == 0
-    planned = ["plan", "wedge", "--limit", "8", "--out", str(tmp_path / "p")]
-    assert main(planned) == 0
-    found = gc.load_grasps(tmp_path / "p" / "grasps.json")
-    assert [grasp.id for grasp in found] == [grasp.id for grasp in plan]
 
 
 @pytest.mark.parametrize(

@@ -58,22 +58,6 @@ def test_every_twist_is_in_a_cone_and_inside_of_one_only(seed):
     assert 290 <= inside <= 300
 
 
-def test_where_a_cover_says_so_its_forces_have_power(proved):
-    """On twists between the rays, for points between the corners, by the definition."""
-    rng = np.random.default_rng(1)
-    regions = corners_of(proved)
-    tried = 0
-    for where, rays in proved.cover.leaves():
-        for place in rng.integers(len(rays), size=min(len(rays), 40)):
-            forces = proved.cover.forces[where][place]
-            twist = rng.dirichlet(np.ones(6)) @ rays[place] @ proved.cover.axes
-            points = [rng.dirichlet(np.full(len(region), 0.2)) @ region for region in regions]
-            powers = np.einsum("ki,ki->k", forces, twist[:3] + np.cross(twist[3:], points))
-            assert powers.sum() > 0.0
-            tried += 1
-    assert tried > 300
-
-
 def test_a_cover_holds_in_rational_arithmetic():
     """Every number as the fraction that it is: nothing is rounded, nothing allowed for."""
     body = scenes.example_object("wedge")

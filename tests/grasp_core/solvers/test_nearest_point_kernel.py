@@ -49,13 +49,6 @@ def test_points_are_nearest():
     assert moved >= 2000
 
 
-def test_a_corner_and_an_edge_by_hand():
-    C = np.array([[-1.0, 0.0], [0.0, -1.0], [1.0, 1.0]])
-    D = np.array([[-3.0, -4.0, 8.0], [-3.0, 1.0, 8.0], [1.0, 1.0, -2.0], [1.0, 1.0, 0.0]])
-    for d, expected in zip(D, [[3, 4], [3, 0], [-1, -1], [0, 0]], strict=True):
-        np.testing.assert_allclose(least_distance(C, d), expected, rtol=0.0, atol=1e-14)
-
-
 def test_where_nothing_is_feasible_no_point_is_found():
     """Two rows that contradict each other among others, and a row of zeros that cannot hold."""
     rng = np.random.default_rng(6)

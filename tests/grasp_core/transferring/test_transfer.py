@@ -49,30 +49,6 @@ def test_on_the_same_part_every_grasp_is_the_same(box):
         np.testing.assert_array_equal(each.grasp.normals, each.old.normals)
 
 
-@pytest.mark.parametrize("by_mm", [1.0, -0.7])
-def test_contacts_of_a_moved_face_move_with_it_and_the_others_stay(box, by_mm):
-    body, grasps = box
-    face = 3
-    found = gc.transfer(body, with_face_moved(body, face, 1e-3 * by_mm), grasps, FRICTION)
-    moved = [change for change in found.faces if change.moved]
-    assert [change.old for change in moved] == [face]
-    assert moved[0].distance == pytest.approx(1e-3 * by_mm, abs=1e-12)
-    way = "outward" if by_mm > 0.0 else "inward"
-    assert str(moved[0]) == f"face 3 moved {abs(by_mm):.2f} mm {way}"
-    seen = 0
-    for each in found.grasps:
-        shift = each.grasp.positions - each.old.positions
-        on_it = np.array(each.old.faces) == face
-        inside = np.array(each.old.faces) != face
-        outward = -body.normals[face]
-        np.testing.assert_allclose(shift[on_it], 1e-3 * by_mm * np.tile(outward, (on_it.sum(), 1)),
-                                   atol=1e-12)  # fmt: skip
-        # a face beside it may have become shorter than where the contact was
-        assert np.linalg.norm(shift[inside], axis=1).max() <= max(0.0, -1e-3 * by_mm) + 1e-12
-        seen += on_it.sum()
-    assert seen >= 5
-
-
 def test_a_face_that_moved_too_far_is_named_with_finger_face_and_distance(box):
     body, grasps = box
     found = gc.transfer(body, with_face_moved(body, 3, 2e-3), grasps, FRICTION, distance=1.5e-3)
@@ -166,6 +142,9 @@ def test_carried_contacts_are_nearest_on_the_new_surface_and_judged_as_by_hand(n
     body, grasps = planned(name, limit=8)
     new = changed(body, grasps[0], kind, size)
     found = gc.transfer(body, new, grasps, FRICTION)
+    if kind == "moved":
+        way = "outward" if size > 0.0 else "inward"
+        assert f"moved {1e3 * abs(size):.2f} mm {way}" in found.faces_in_words
     placed = 0
     for each in found.grasps:
         for contact, before in zip(each.contacts, each.old.contacts, strict=True):
@@ -255,7 +234,7 @@ def test_new_ids_name_the_new_faces_and_are_unique():
 def test_fingers_that_cannot_reach_a_carried_contact_are_named():
     """A finger as thick as the bracket's notch is wide cannot come to the faces of the notch."""
     body, finger = example_object("l-bracket"), gc.Finger(0.003, 0.03)
-    grasps = gc.plan(body, FRICTION, finger=finger).grasps[::4]
+    grasps = gc.plan(body, FRICTION, finger=finger, families="concurrent").grasps
     found = gc.transfer(body, body, grasps, FRICTION, finger=finger)
     assert found.count("same") == len(grasps) > 5
     for each in found.grasps:
