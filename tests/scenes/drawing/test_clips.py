@@ -1,6 +1,5 @@
 """Clips: motions made larger as they are, and drawn where graphics are available."""
 
-import math
 import sys
 
 import numpy as np
@@ -19,7 +18,6 @@ from scenes.drawing.clips import (
     write_clip,
     write_held_clip,
 )
-from tests.scenes.drawing.whole import frames_of
 from tests.sim_validate.rigs import grasps
 
 
@@ -57,32 +55,6 @@ def test_motions_become_visible_and_no_larger(scene, share):
         return
     assert VISIBLE / 2.0 < factor * share <= VISIBLE * (1.0 + 1e-9) or factor == MOST
     assert factor == float(f"{factor:.0e}")
-
-
-@pytest.mark.slow
-def test_a_clip_shows_the_object_moving(scene, tmp_path):
-    still = np.zeros((6, 19))
-    still[:, 3] = 1.0
-    moving = still.copy()
-    moving[:, 3:7] = [[math.cos(a), 0.0, math.sin(a), 0.0] for a in np.linspace(0.0, 0.5, 6)]
-    try:
-        path = write_clip(scene, moving, tmp_path / "new" / "clip.gif", "turning")
-    except GraphicsError as error:
-        pytest.skip(str(error))
-    count, first, last = frames_of(path, 0, 5)
-    assert count == 6
-    assert np.unique(first.reshape(-1, 3), axis=0).shape[0] > 20
-    changed = (np.abs(first - last).max(axis=2) > 30).mean()
-    assert 0.01 < changed < 0.5
-
-
-def test_without_graphics_the_message_says_so(scene, tmp_path, monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", "no-such-library")
-    with pytest.raises(
-        GraphicsError, match=r"MuJoCo cannot draw on this machine: no-such-library: .+"
-    ):
-        write_clip(scene, np.eye(1, 19, 3), tmp_path / "clip.gif", "")
-    assert not list(tmp_path.iterdir())
 
 
 def test_without_pillow_the_extra_is_named(scene, tmp_path, monkeypatch):

@@ -5,17 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from scenes.drawing.painting import Shape
 from scenes.drawing.pictures import (
     BALL_RADIUS,
     BAR_LENGTH,
     Drawing,
-    cone_sides,
     finger_size,
     glass,
-    ring,
     rulings,
-    tube,
 )
 from tests.sim_validate.rigs import grasps
 
@@ -107,18 +103,6 @@ def apart(segment, point, way):
     along = segment[1] - segment[0]
     normal = np.cross(along, way)
     return abs(float((point - segment[0]) @ normal)) / np.linalg.norm(normal)
-
-
-def test_what_is_round_is_round():
-    axis = np.array([0.0, 0.6, 0.8])
-    circle = ring(np.ones(3), axis, 2.0)
-    np.testing.assert_allclose(np.linalg.norm(circle - 1.0, axis=1), 2.0)
-    np.testing.assert_allclose((circle - 1.0) @ axis, 0.0, atol=1e-12)
-    sides = Shape("finger", polygons=tube(np.zeros(3), 5.0 * axis, 0.5)).vertices()
-    np.testing.assert_allclose(np.linalg.norm(np.cross(sides, axis), axis=1), 0.5)
-    rim = np.array(cone_sides(np.zeros(3), axis, 0.3, 2.0))[:, 1]
-    np.testing.assert_allclose(np.linalg.norm(rim, axis=1), 2.0)
-    np.testing.assert_allclose(rim @ axis, 2.0 * math.cos(0.3))
 
 
 def test_the_glass_covers_the_surface(case):

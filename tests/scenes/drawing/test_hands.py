@@ -8,10 +8,8 @@ import pytest
 
 import scenes
 from grasp_core.errors import InputError
-from scenes.drawing.hands import (
-    STEPS,
-    hand_shapes,
-)
+from grasp_core.hands.hand_arrays import places
+from scenes.drawing.hands import STEPS, hand_shapes
 from scenes.drawing.pictures import write_picture
 from tests.scenes.drawing.standing import ROUNDING, held, standing
 
@@ -35,39 +33,25 @@ def test_fingertips_touch_their_contacts():
 
 
 def test_every_part_of_the_hand_is_drawn_in_its_place():
-    """Corners are on the surfaces of the boxes, placed by plain kinematics along each chain."""
+    """Corners are on the surfaces of the boxes, placed by the kinematics of the hand."""
     one = held()
-    frames = [one.palm_pose]
-    places = [(one.palm_pose, shape) for shape in one.hand.palm]
-    angles = iter(one.joints.tolist())
-    for finger in one.hand.fingers:
-        frame = frames[0]
-        for link in finger.links:
-            frame = frame @ turned(link.joint, next(angles))
-            places += [(frame, shape) for shape in link.shapes]
-    gaps = np.array([surface_gaps(frame, shape, corners_of(hand_shapes(one)))
-                     for frame, shape in places])  # fmt: skip
-    assert len(places) == 21
+    at = places(one.hand, one.joints, one.palm_pose)
+    palm = one.palm_pose[:3, 3], one.palm_pose[:3, :3]
+    parts = [(*palm, shape) for shape in one.hand.palm]
+    for link, *frame in zip(
+        one.hand.links, at.link_positions[0], at.link_rotations[0], strict=True
+    ):
+        parts += [(*frame, shape) for shape in link.shapes]
+    corners = np.vstack([shape.vertices() for shape in hand_shapes(one)])
+    gaps = np.array([surface_gaps(*part, corners) for part in parts])
+    assert len(parts) == 21
     assert np.abs(gaps).min(axis=0).max() < 1e-9  # each corner is on a part
     assert (gaps.min(axis=1) < 1e-9).all()
 
 
-def turned(joint, angle):
-    x, y, z = joint.axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    pose = np.eye(4)
-    turn = np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K
-    pose[:3, :3], pose[:3, 3] = joint.rotation @ turn, joint.position
-    return pose
-
-
-def corners_of(shapes):
-    return np.vstack([shape.vertices() for shape in shapes])
-
-
-def surface_gaps(frame, shape, points):
+def surface_gaps(place, turn, shape, points):
     """Distances of points from the surface of a rounded box; within it as far as to its sides."""
-    local = (points - frame[:3, 3]) @ frame[:3, :3]
+    local = (points - place) @ turn
     local = np.abs((local - shape.position) @ shape.rotation) - shape.half_sizes
     outside = np.linalg.norm(np.maximum(local, 0.0), axis=1)
     return outside + np.minimum(local.max(axis=1), 0.0) - shape.radius

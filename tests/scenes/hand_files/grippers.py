@@ -1,5 +1,6 @@
 """Files of grippers to load: one of MJCF with fingers around a palm, and where they are written."""
 
+import mujoco
 import numpy as np
 
 import scenes
@@ -38,6 +39,33 @@ def written(folder, text, name="gripper.xml"):
     path = folder / name
     path.write_text(text)
     return path
+
+
+class Beside:
+    """A hand's own file in MuJoCo, with an object beside it that can be put where a pose has it."""
+
+    def __init__(self, path, body):
+        spec = mujoco.MjSpec.from_file(str(path))
+        mesh = spec.add_mesh(name="object")
+        mesh.uservert = (body.vertices - body.center_of_mass).ravel()
+        held = spec.worldbody.add_body(name="object", mocap=True)
+        held.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="object")
+        self.body, self.model = body, spec.compile()
+        self.data = mujoco.MjData(self.model)
+
+    def stand(self, hand, found, palm="base"):
+        """Bend the joints, and put the object where it is seen from the palm."""
+        for joint, angle in zip(hand.joints, found.joints, strict=True):
+            self.data.joint(joint.name).qpos = angle
+        pose, at = found.palm_pose, self.model.body(palm).pos
+        mujoco.mju_mat2Quat(self.data.mocap_quat[0], pose[:3, :3].T.ravel())
+        self.data.mocap_pos[0] = pose[:3, :3].T @ (self.body.center_of_mass - pose[:3, 3]) + at
+        mujoco.mj_forward(self.model, self.data)
+
+    def apart(self, one, other="object"):
+        """The distance of two geoms of these names or numbers [m]."""
+        ids = (self.model.geom(each).id for each in (one, other))
+        return mujoco.mj_geomDistance(self.model, self.data, *ids, 1.0, None)
 
 
 def loaded(folder, text, tips, name="hand.urdf"):

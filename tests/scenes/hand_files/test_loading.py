@@ -10,7 +10,7 @@ from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places, tip_jacobians
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
 from tests.hand_models import hand_mjcf
-from tests.scenes.hand_files.grippers import gripper, written
+from tests.scenes.hand_files.grippers import Beside, gripper, written
 from tests.scenes.meshes import box_obj
 
 TABLES = ["allegro", "leap"]
@@ -89,28 +89,14 @@ def test_a_fingertip_that_is_no_ball_is_free_where_it_is_said_to_be(kind, tmp_pa
     meshes touch it."""
     path = written(tmp_path, gripper(BLOCKS[kind], extra=WEDGE))
     hand, body, seen = scenes.load_hand(path, [f"p{n}" for n in range(4)]), scaled("box", 0.02), 0
-    spec = mujoco.MjSpec.from_file(str(path))
-    mesh = spec.add_mesh(name="object")
-    mesh.uservert = (body.vertices - body.center_of_mass).ravel()
-    held = spec.worldbody.add_body(name="object", mocap=True)
-    held.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="object")
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    object_geom = model.geom("object").id
+    simulated = Beside(path, body)
     for grasp in grasps("box", 0.02, 12):
         found = gc.reach_with(hand, body, grasp, FRICTION)
         if not found.reached:
             continue
         seen += 1
-        for joint, angle in zip(hand.joints, found.joints, strict=True):
-            data.joint(joint.name).qpos = angle
-        pose = found.palm_pose
-        mujoco.mju_mat2Quat(data.mocap_quat[0], np.ascontiguousarray(pose[:3, :3].T).ravel())
-        center = pose[:3, :3].T @ (body.center_of_mass - pose[:3, 3])
-        data.mocap_pos[0] = center + np.array([0.0, 0.0, 0.3])
-        mujoco.mj_forward(model, data)
-        gaps = [mujoco.mj_geomDistance(model, data, model.geom(f"p{n}").id, object_geom, 1.0, None)
-                for n in range(4)]  # fmt: skip
+        simulated.stand(hand, found)
+        gaps = [simulated.apart(f"p{n}") for n in range(4)]
         assert min(gaps) > -1e-4
         assert kind == "cylinder" or max(gaps) < 3e-4
     assert seen >= 2

@@ -4,6 +4,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places
@@ -51,12 +52,6 @@ def robot(tip=f"<collision>{SPHERE}</collision>", middle=None, follows="", odd=F
     return f'<robot name="r">{"".join(parts)}</robot>'
 
 
-def turned(axis, angle):
-    x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-
-
 def numbers(element, key):
     return np.array([float(each) for each in element.get(key, "0 0 0").split()])
 
@@ -68,10 +63,10 @@ def in_robot(text, name, angles):
     R, p = np.eye(3), np.zeros(3)
     while name in above:
         each = above[name]
-        roll, pitch, yaw = numbers(each.find("origin"), "rpy")
-        frame = turned((0, 0, 1), yaw) @ turned((0, 1, 0), pitch) @ turned((1, 0, 0), roll)
+        frame = Rotation.from_euler("xyz", numbers(each.find("origin"), "rpy")).as_matrix()
         if each.get("type") == "revolute":
-            frame = frame @ turned(numbers(each.find("axis"), "xyz"), angles[each.get("name")])
+            turn = angles[each.get("name")] * numbers(each.find("axis"), "xyz")
+            frame = frame @ Rotation.from_rotvec(turn).as_matrix()
         R, p = frame @ R, frame @ p + numbers(each.find("origin"), "xyz")
         name = each.find("parent").get("link")
     return R, p

@@ -3,7 +3,6 @@
 from itertools import combinations
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -12,8 +11,8 @@ import scenes
 from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.pose_search import TOUCHING
 from tests.grasp_core.hands.gripping import FRICTION, grasps, scaled
-from tests.hand_models import numbers
-from tests.three_fingers import THREE_TIPS, three_fingers_file, three_fingers_mjcf
+from tests.scenes.hand_files.grippers import Beside
+from tests.three_fingers import THREE_TIPS, three_fingers_file
 
 OBJECTS = ("box", "dodecahedron")
 RADIUS = 0.035
@@ -23,8 +22,13 @@ MUJOCO_SLACK = 2e-6
 
 
 @pytest.fixture(scope="module")
-def hand(tmp_path_factory):
-    return scenes.load_hand(three_fingers_file(tmp_path_factory.mktemp("hand")), THREE_TIPS)
+def file(tmp_path_factory):
+    return three_fingers_file(tmp_path_factory.mktemp("hand"))
+
+
+@pytest.fixture(scope="module")
+def hand(file):
+    return scenes.load_hand(file, THREE_TIPS)
 
 
 @pytest.fixture(scope="module")
@@ -34,23 +38,6 @@ def reached(hand):
     found = [(name, grasp, gc.reach_with(hand, scaled(name, RADIUS), grasp, FRICTION))
              for name, grasp in tried]  # fmt: skip
     return [(scaled(name, RADIUS), grasp, each) for name, grasp, each in found if each.reached]
-
-
-def simulated(hand, body, found):
-    """The gripper's own file with the object beside it, in the palm's frame, in MuJoCo."""
-    assets = f'<asset><mesh name="object" vertex="{numbers(body.vertices)}"/></asset>'
-    geom = '<body name="object" mocap="true"><geom name="object" type="mesh" mesh="object"/></body>'
-    text = three_fingers_mjcf().replace("</worldbody>", f"{geom}</worldbody>{assets}")
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    for joint, angle in zip(hand.joints, found.joints, strict=True):
-        data.joint(joint.name).qpos = angle
-    # MuJoCo moves a mesh's frame to its centre of mass, and the body's stays where it is put
-    R, p = found.palm_pose[:3, :3].T, -found.palm_pose[:3, :3].T @ found.palm_pose[:3, 3]
-    data.mocap_pos[0] = p
-    mujoco.mju_mat2Quat(data.mocap_quat[0], np.ascontiguousarray(R).ravel())
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def test_most_grasps_are_reached_at_three_contacts_that_close(hand, reached):
@@ -73,25 +60,22 @@ def test_most_grasps_are_reached_at_three_contacts_that_close(hand, reached):
         assert normals == pytest.approx(planned[1], abs=1e-6)  # flat faces, and the same ones
 
 
-def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(hand, reached):
+def test_mujoco_has_fingertips_on_the_object_and_all_else_apart(file, hand, reached):
     seen = 0
     for body, _, found in reached:
-        model, data = simulated(hand, body, found)
-
-        def apart(i, j, model=model, data=data):
-            return mujoco.mj_geomDistance(model, data, i, j, 0.05, None)
-
-        solid = model.geom("object").id
+        simulated = Beside(file, body)
+        simulated.stand(hand, found, "palm")
+        model, solid = simulated.model, simulated.model.geom("object").id
         tips = {model.geom(name).id for name in THREE_TIPS}
         for geom in set(range(model.ngeom)) - {solid}:
             if geom in tips:
-                assert apart(geom, solid) == pytest.approx(0.0, abs=TOUCHING + MUJOCO_SLACK)
+                assert simulated.apart(geom) == pytest.approx(0.0, abs=TOUCHING + MUJOCO_SLACK)
             else:
-                assert apart(geom, solid) >= CLEARANCE - MUJOCO_SLACK
+                assert simulated.apart(geom) >= CLEARANCE - MUJOCO_SLACK
         for i, j in combinations(sorted(set(range(model.ngeom)) - {solid}), 2):
             one, other = int(model.geom_bodyid[i]), int(model.geom_bodyid[j])
             if other not in {one, model.body_parentid[one]} and model.body_parentid[other] != one:
-                assert apart(i, j) >= CLEARANCE - MUJOCO_SLACK
+                assert simulated.apart(i, j) >= CLEARANCE - MUJOCO_SLACK
                 seen += 1
     assert seen >= 5 * len(reached) > 0
 

@@ -105,15 +105,6 @@ def test_springs_are_those_of_the_grip(built):
         assert measured == pytest.approx(grip.stiffness[finger], abs=1e-5 * 4000.0)
 
 
-def test_the_keyframe_commands_the_squeeze(built):
-    _, grip, _, model = built
-    data = rest_of(model)
-    for finger in range(4):
-        turn = data.body(f"finger{finger}").xmat.reshape(3, 3)
-        force = turn @ data.qfrc_actuator[12 + 3 * finger : 15 + 3 * finger]
-        assert force == pytest.approx(grip.squeeze[finger], abs=1e-6 * 8.0)
-
-
 def test_gravity_pulls_the_object_alone(built):
     """Fingers and palm are carried: their joints feel no weight at rest."""
     _, _, scene, model = built
