@@ -1,16 +1,44 @@
-"""What rooms share: plans that are made once, and datasets that are built in this process."""
+"""What rooms share: plans that are made once, and commands that are run here or only read."""
+
+import json
 
 import pytest
 
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from tests.sim_validate.datasets.engines import here
+from tests.sim_validate.datasets import engines
 
 
 @pytest.fixture
 def built_here(monkeypatch):
     """Let `dataset build` and `dataset import` compute their units in this process."""
-    monkeypatch.setattr("sim_validate.datasets.command.local_processes", here)
+    monkeypatch.setattr("sim_validate.datasets.command.local_processes", engines.here)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """The working folder, in which nothing is."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def answer(capsys):
+    """The document that a command prints with --json."""
+
+    def answered(*words, code=Exit.GOOD):
+        assert main([*map(str, words), "--json"]) == code
+        return json.loads(capsys.readouterr().out)
+
+    return answered
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The commands that were read from command lines, of which none is run."""
+    found = []
+    monkeypatch.setattr("sim_validate.main._dispatch", lambda each: found.append(each) or Exit.GOOD)
+    return found
 
 
 def planned(folder, *words):

@@ -15,7 +15,6 @@ from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.records.grasps_json import load_grasps
 from scenes.settings import PhysicsSettings
-from sim_validate import main as commands
 from sim_validate.execution.command import execution_settings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
@@ -252,9 +251,7 @@ def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
         ),
     ],
 )  # fmt: skip
-def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, monkeypatch):
-    asked = []
-    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
+def test_the_command_executes_a_grasp_with_the_same_settings(run, settings, asked):
     executions = Executions(AboutObject("", "", ""), 0.35, settings, (), complete=True)
     line = execute_command(executions, str(run / "grasps.json"), "c-0-1-2-7")
     assert main(shlex.split(line)[1:]) == Exit.GOOD

@@ -9,7 +9,6 @@ import pytest
 from grasp_core.errors import InputError
 from scenes.drawing.pages import UNITS
 from scenes.drawing.sheets import FINGERS, HAND
-from sim_validate import main as commands
 from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -102,9 +101,7 @@ def test_a_grasp_that_is_not_reached_says_why(report):
     assert not (report / "pictures" / f"{OTHER}-hand.svg").exists()
 
 
-def test_the_command_of_the_page_seeks_the_pose_again(report, monkeypatch):
-    asked = []
-    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or 0)
+def test_the_command_of_the_page_seeks_the_pose_again(report, asked):
     page = (report / "grasps" / f"{GRASP}.html").read_text()
     line = next(line for line in page.splitlines() if "graspproof reach" in line)
     words = shlex.split(line.partition("graspproof ")[2])

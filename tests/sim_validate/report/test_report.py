@@ -13,7 +13,6 @@ import pytest
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import load_grasps
 from scenes.drawing.pages import UNITS
-from sim_validate import main as commands
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit.exit_codes import Exit
@@ -124,10 +123,8 @@ def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
     assert [shape["role"] for shape in drawn] == ["object", "edge"]
 
 
-def test_its_commands_are_commands(small_run, small_report, monkeypatch):
+def test_its_commands_are_commands(small_run, small_report, asked, monkeypatch):
     monkeypatch.chdir(small_run)
-    asked = []
-    monkeypatch.setattr(commands, "_dispatch", lambda command: asked.append(command) or Exit.GOOD)
     text = next((small_report / "grasps").iterdir()).read_text()
     (block,) = re.findall(r"<pre>(.*?)</pre>", text, re.DOTALL)
     lines = [line for line in block.splitlines() if line]
