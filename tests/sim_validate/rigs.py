@@ -22,6 +22,13 @@ def grasps(name, friction, limit, families=("concurrent",), cones="normal"):
     return body, gc.plan(body, friction, limit=limit, families=families, cones=cones).grasps
 
 
+def saved_plan(folder, limit=1, friction=0.5):
+    """The path of a grasps.json of the wedge."""
+    body = scenes.example_object("wedge")
+    plan = gc.plan(body, friction, families=("concurrent",), limit=limit)
+    return gc.save_grasps(folder / "grasps.json", plan)
+
+
 def rig_of(body, grasp, friction, setup=None, surface="pads"):
     """The object in the gentle grasp of its scene."""
     setup = setup or Setup()

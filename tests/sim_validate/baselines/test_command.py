@@ -5,25 +5,17 @@ import shutil
 
 import pytest
 
-import grasp_core as gc
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import plan_to_json
-from scenes.example_objects import example_object
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.changing import changed, first_grasp
-
-
-def planned(folder, body=None, friction=0.5, limit=2):
-    body = body or example_object("wedge")
-    plan = gc.plan(body, friction, families=("concurrent",), limit=limit)
-    return write_text(folder / "grasps.json", plan_to_json(body, plan))
+from tests.sim_validate.rigs import saved_plan
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded")
-    grasps = planned(folder)
+    grasps = saved_plan(folder, limit=2)
     line = ["baseline", "record", str(grasps), "-o", str(folder / "base.json"), "--jobs", "1"]
     assert main([*line, "-q"]) == Exit.GOOD
     return folder
@@ -38,9 +30,15 @@ def check(folder, *more):
     return main(["baseline", "check", str(folder / "base.json"), "--jobs", "1", *more])
 
 
-def statuses(capsys):
-    record = json.loads(capsys.readouterr().out)
-    return {each["id"]: (each["status"], " ".join(each["reasons"])) for each in record["grasps"]}
+@pytest.fixture
+def statuses(answer, copy):
+    """The status and the reasons of each grasp of the copy, checked again."""
+
+    def checked(code):
+        record = answer("baseline", "check", copy / "base.json", "--jobs", "1", code=code)
+        return {one["id"]: (one["status"], " ".join(one["reasons"])) for one in record["grasps"]}
+
+    return checked
 
 
 def altered(folder, **values):
@@ -48,27 +46,22 @@ def altered(folder, **values):
     return changed(folder / "base.json", first_grasp(**values))["grasps"][0]["id"]
 
 
-def test_a_regression_fails_and_says_why_and_an_improvement_only_if_asked(copy, capsys):
+def test_a_regression_fails_and_says_why_and_an_improvement_only_if_asked(copy, statuses):
     name = altered(copy, limit_n=1e3)
-    assert check(copy, "--json") == Exit.NEGATIVE
-    status, why = statuses(capsys)[name]
+    status, why = statuses(Exit.NEGATIVE)[name]
     assert status == "regressed"
     assert "limit_n: 1000 -> " in why
     name = altered(copy, limit_n=0.0, displacement_m=1.0)
-    assert check(copy, "--json") == Exit.GOOD
-    found = statuses(capsys)
+    found = statuses(Exit.GOOD)
     assert found.pop(name)[0] == "improved"
     assert {status for status, _ in found.values()} == {"same"}
     assert check(copy, "--strict", "-q") == Exit.NEGATIVE
 
 
-def test_grasps_without_entry_and_entries_without_grasp_fail(copy, capsys):
-    planned(copy, limit=1)
-    assert check(copy, "--json") == Exit.NEGATIVE
-    assert "missing" in {status for status, _ in statuses(capsys).values()}
-    planned(copy, limit=3)
-    assert check(copy, "--json") == Exit.NEGATIVE
-    assert "new" in {status for status, _ in statuses(capsys).values()}
+def test_grasps_without_entry_and_entries_without_grasp_fail(copy, statuses):
+    for limit, wanted in ((1, "missing"), (3, "new")):
+        saved_plan(copy, limit)
+        assert wanted in {status for status, _ in statuses(Exit.NEGATIVE).values()}
 
 
 def test_blessing_makes_what_was_measured_the_baseline(copy, recorded):
@@ -87,15 +80,14 @@ def test_what_is_not_there_is_said(tmp_path, capsys):
     assert not (tmp_path / "b.json").exists()
 
 
-def test_other_fingertips_planned_for_are_not_comparable_until_blessed(copy, capsys):
+def test_other_fingertips_planned_for_are_not_comparable_until_blessed(copy, statuses):
     path = copy / "grasps.json"
     record = json.loads(path.read_text())
     record["finger"] = {"radius_m": 0.003, "approach_m": 0.05}
     for grasp in record["grasps"]:
         grasp["approach_directions"] = [each["normal"] for each in grasp["contacts"]]
     path.write_text(json.dumps(record))
-    assert check(copy, "--json") == Exit.INPUT
-    for status, why in statuses(capsys).values():
+    for status, why in statuses(Exit.INPUT).values():
         assert status == "not comparable"
         assert "planned for: radius_m None -> 0.003" in why
         assert "setup.fingers.fingertip_radius_m: None -> 0.003" in why
@@ -106,7 +98,7 @@ def test_other_fingertips_planned_for_are_not_comparable_until_blessed(copy, cap
 
 
 def test_the_first_grasps_of_a_file_are_a_baseline_too(tmp_path):
-    grasps, base = planned(tmp_path), tmp_path / "base.json"
+    grasps, base = saved_plan(tmp_path, limit=2), tmp_path / "base.json"
     line = ["baseline", "record", str(grasps), "-o", str(base), "--limit", "1", "-q"]
     assert main(line) == Exit.GOOD
     assert check(tmp_path, "-q") == Exit.GOOD
@@ -116,7 +108,7 @@ def test_the_first_grasps_of_a_file_are_a_baseline_too(tmp_path):
 def test_grasps_elsewhere_are_found_again_after_blessing(copy, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
-    planned(other, limit=1)
+    saved_plan(other)
     asked = ("--grasps", str(other / "grasps.json"), "--bless", "-q")
     assert check(copy, *asked) == Exit.GOOD
     assert json.loads((copy / "base.json").read_text())["grasps_file"] == "../other/grasps.json"

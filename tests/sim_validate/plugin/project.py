@@ -11,25 +11,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-CODE = """
-import grasp_core as gc
-import pytest
-import scenes
-
-def test_it_holds(assert_stable):
-    body = scenes.example_object("wedge")
-    grasp = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
-    assert assert_stable(body, grasp, 0.5).held
-
-def test_it_does_not(assert_stable):
-    import dataclasses
-    from sim_validate.engine.setup import NamedWrench
-    body = scenes.example_object("wedge")
-    grasp = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
-    push = NamedWrench("push", [0.0, 0.0, 900.0, 0.0, 0.0, 0.0])
-    assert_stable(body, grasp, 0.5, wrenches=[push])
-"""
-
 
 def run_pytest(folder, *arguments):
     """Run pytest inside this process, which spares its start; its exit code and what it printed."""

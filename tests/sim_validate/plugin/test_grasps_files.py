@@ -9,13 +9,17 @@ from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import suite_from_toml
 from sim_validate.pytest_plugin import MOST_TOLD, sections
 from tests.sim_validate.changing import changed
-from tests.sim_validate.plugin.project import (
-    CODE,
-    copied,
-    properties_in,
-    run_pytest,
-    run_pytest_alone,
-)  # fmt: skip
+from tests.sim_validate.plugin.project import copied, properties_in, run_pytest, run_pytest_alone
+
+CODE = """
+import pytest
+from sim_validate import NamedWrench
+
+@pytest.mark.parametrize("push", [0.1, 900.0])
+@pytest.mark.grasp(object="wedge", limit=1, families=("concurrent",))
+def test_it_is_pushed(grasp_case, assert_stable, push):
+    assert_stable(grasp_case, wrenches=[NamedWrench("push", [0.0, 0.0, push, 0.0, 0.0, 0.0])])
+"""
 
 
 def test_grasps_that_stay_as_they_were_pass(blessed, tmp_path):

@@ -148,16 +148,13 @@ def test_what_fails_before_a_test_begins_is_in_the_report_once(tmp_path):
         tmp_path / "test_it.py",
         """
 import pytest
-import grasp_core as gc
-import scenes
 from sim_validate import NamedWrench
 
 @pytest.fixture
-def held(assert_stable):
-    body = scenes.example_object("wedge")
-    grasp = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps[0]
-    assert_stable(body, grasp, wrenches=[NamedWrench("push", [0, 0, 900, 0, 0, 0])])
+def held(grasp_case, assert_stable):
+    assert_stable(grasp_case, wrenches=[NamedWrench("push", [0, 0, 900, 0, 0, 0])])
 
+@pytest.mark.grasp(object="wedge", limit=1)
 def test_it(held):
     pass
 """,

@@ -5,12 +5,11 @@ import re
 
 import pytest
 
-import grasp_core as gc
 import sim_validate as sv
 from grasp_core.files.text_files import write_text
-from grasp_core.records.grasps_json import load_grasps, plan_to_json
-from scenes.example_objects import example_object
+from grasp_core.records.grasps_json import load_grasps
 from tests.sim_validate.plugin.project import properties_in, run_pytest
+from tests.sim_validate.rigs import saved_plan
 
 CODE = """
 import pytest
@@ -39,9 +38,7 @@ trials = ["weight"]
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("survival")
-    body = example_object("wedge")
-    plan = gc.plan(body, 0.5, families=("concurrent",), limit=1)
-    write_text(folder / "grasps.json", plan_to_json(body, plan))
+    saved_plan(folder)
     return folder
 
 
