@@ -10,7 +10,7 @@ from tests.bad_input.mesh_texts import obj
 
 def dented_ball():
     """A ball of 50 mm with a dent on its top, all of it curved."""
-    ball = trimesh.creation.icosphere(subdivisions=2)
+    ball = trimesh.creation.icosphere(subdivisions=3)
     points = 0.05 * ball.vertices * (1.0 - 0.6 * np.clip(ball.vertices[:, 2:] - 0.3, 0.0, None))
     return gc.Polyhedron.from_mesh(points, ball.faces, name="dented ball", faces="patches")
 

@@ -4,7 +4,6 @@ import dataclasses
 import json
 import math
 
-import numpy as np
 import pytest
 
 import grasp_core as gc
@@ -14,20 +13,16 @@ from sim_validate.baselines.compare import Status, compare
 from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
-    Execution,
     ExecutionControl,
-    ExecutionTrial,
 )
 from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
+from tests.sim_validate.execution.executed import execution, trial
 
-TRIAL = ExecutionTrial(
-    "weight", "weight", True, "stuck", 1e-7, 1e-3, 1e-4, 2.5, 2.75, 2.49, 0.00125
-)
-EXECUTION = Execution(
-    mass_kg=0.3, squeeze=np.zeros((4, 3)), load_multiple=2.7,
-    trials=(TRIAL, dataclasses.replace(TRIAL, kind="lift", name="lift", slip_m=2e-7)),
-    controls=(ExecutionControl("friction 0.9", True, 0.95),), skipped=(),
+MOVED = {"displacement_m": 1e-3, "turn_rad": 1e-4, "predicted_first_slip": 2.5}
+EXECUTION = execution(
+    trial("weight", slip_m=1e-7, **MOVED), trial("lift", slip_m=2e-7, **MOVED),
+    load_multiple=2.7, controls=(ExecutionControl("friction 0.9", True, 0.95),),
 )  # fmt: skip
 KEPT = ExecutedFigures.of(ExecutedGrasp("c", "concurrent", "1f", EXECUTION))
 UNHELD = ExecutedFigures.of(ExecutedGrasp("c", "", "1f", None, "no squeeze"))

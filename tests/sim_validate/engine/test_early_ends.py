@@ -4,7 +4,7 @@ Loads are from 0.5 to 1.2 times what each grasp resists and frictions from 0.9 t
 critical one, with many close to 1, where verdicts could differ.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,26 +23,16 @@ from tests.sim_validate.rigs import grasps, limiting_loads
 SAMPLE_S = 0.01
 LENGTH = 66
 LAST_OF_SETTLING = 25
-
-
+RESTING = np.zeros(18)
+"""Speeds of the object and of four fingers."""
 SHARES = (0.5, 0.8, 0.95, 0.99, 0.998, 1.002, 1.01, 1.05, 1.2)
 """Loads, relative to the largest that the analysis says is resisted."""
 NEAR = (0.9, 0.99, 0.997, 0.999, 1.0, 1.0006, 1.001, 1.002, 1.004, 1.01, 1.03, 1.1)
 """Frictions, relative to the critical one."""
 
 
-@dataclass(frozen=True)
-class Pair:
-    """A trial to its full length, and the same trial until its answer is known."""
-
-    whole: str
-    early: str
-    samples: tuple[int, int]
-    """Samples watched in the whole trial and in the other one."""
-
-
-def compared(case):
-    body, grasp, friction = case
+def compared(body, grasp, friction):
+    """How each trial ends at its full length and once its answer is known, and how long each is."""
     held = [*of_holds(body, grasp, friction), *of_controls(body, grasp, friction)]
     return [*held, *of_releases(body, grasp)]
 
@@ -71,7 +61,7 @@ def judged(rig, loads, settling=None):
     )
     for traces in pairs:
         whole, early = (judge(trace, layout, protocol) for trace in traces)
-        yield Pair(whole.outcome.value, early.outcome.value, lengths(traces))
+        yield whole.outcome, early.outcome, *(len(trace.times_s) for trace in traces)
 
 
 def of_releases(body, grasp):
@@ -90,13 +80,7 @@ def of_releases(body, grasp):
     frictions = [near * least for near in NEAR]
     whole, early = rig.release(high, frictions), rig.at_rest(high).release(high, frictions, limit)
     for traces in zip(whole, early, strict=True):
-        ends = ["held" if trace.stayed(limit) else "slipped" for trace in traces]
-        yield Pair(*ends, lengths(traces))
-
-
-def lengths(traces):
-    whole, early = (len(trace.times_s) for trace in traces)
-    return whole, early
+        yield *(trace.stayed(limit) for trace in traces), *(len(each.times_s) for each in traces)
 
 
 @pytest.fixture
@@ -108,24 +92,20 @@ def looking(held):
     return EarlyEnds(layout, rig.holds([rig.idle]), SAMPLE_S, Thresholds(limit, limit))
 
 
-def answers(ends, joints, speeds, count=6):
-    """What it says in each sample from the last one of settling on."""
-    said = []
-    for sample in range(LAST_OF_SETTLING, LAST_OF_SETTLING + count):
-        _, answered = ends.look(np.array([0]), np.array([sample]), joints[None], speeds[None])
-        said.append(bool(answered[0]))
-    return said
+def look(ends, sample, joints, speeds=RESTING):
+    """Whether the trial is settled in a sample, and whether its answer is known."""
+    looked = ends.look(np.array([0]), np.array([sample]), joints[None], speeds[None])
+    return tuple(bool(each[0]) for each in looked)
 
 
 def test_verdicts_are_those_of_the_full_length(held):
     """At loads and frictions around the limits, where a difference would show."""
     body, grasp, _ = held
-    pairs = compared((body, grasp, 0.5))
-    assert len(pairs) > 100
-    assert len({pair.whole for pair in pairs}) >= 2
-    assert all(pair.whole == pair.early for pair in pairs)
-    whole, early = np.sum([pair.samples for pair in pairs], axis=0)
-    assert early < 0.3 * whole
+    wholes, earlies, long, short = zip(*compared(body, grasp, 0.5), strict=True)
+    assert len(wholes) > 100
+    assert len(set(wholes)) >= 3
+    assert wholes == earlies
+    assert sum(short) < 0.3 * sum(long)
 
 
 @pytest.mark.parametrize("name", more("l-bracket", "random-20-7"))
@@ -133,9 +113,9 @@ def test_verdicts_of_thousands_of_trials_are_those_of_the_full_length(name):
     pairs = []
     for friction in (0.2, 0.5, 0.8):
         body, found = grasps(name, friction, 6, ("concurrent", "pencil", "regulus", "free"))
-        pairs += [pair for grasp in found for pair in compared((body, grasp, friction))]
+        pairs += [pair for grasp in found for pair in compared(body, grasp, friction)]
     assert len(pairs) > 1000
-    assert all(pair.whole == pair.early for pair in pairs)
+    assert all(whole == early for whole, early, *_ in pairs)
 
 
 def test_held_objects_move_no_farther_than_the_bound_to_the_end(held):
@@ -151,10 +131,6 @@ def test_held_objects_move_no_farther_than_the_bound_to_the_end(held):
             assert whole.start_m + whole.displacements_m.max() < USABLE * limit
             ended += 1
     assert ended >= 30
-
-
-def still(_joints, _speeds, _ends):
-    """Change nothing."""
 
 
 def moves(which, size):
@@ -187,69 +163,54 @@ def pushes(share):
     return change
 
 
-def no_number(joints, speeds, _):
-    joints[:] = speeds[:] = np.nan
-
-
 @pytest.mark.parametrize(
     ("change", "ended"),
-    [(still, True), (moves(0, 0.01), False), (moves(4, 0.01), False), (moves(8, 0.01), False),
+    [(lambda *_: None, True), (lambda joints, *_: joints.fill(np.nan), False),
+     (moves(0, 0.01), False), (moves(4, 0.01), False), (moves(8, 0.01), False),
      (leans(0.5), True), (leans(1.0 - 1e-7), False), (leans(1.0), False), (leans(1.5), False),
-     (pushes(1.0), False), (pushes(0.0), False), (pushes(-0.1), False), (no_number, False)],
+     (pushes(1.0), False), (pushes(0.0), False), (pushes(-0.1), False)],
 )  # fmt: skip
 def test_a_trial_ends_once_it_was_watched_where_nothing_can_change_the_answer(
     looking, change, ended
 ):
     joints, speeds = pose(), np.zeros(18)
     change(joints, speeds, looking)
-    wanted = [False] * WATCHED + [ended] * (6 - WATCHED)
-    assert answers(looking, joints, speeds) == wanted
+    samples = range(LAST_OF_SETTLING, LAST_OF_SETTLING + 6)
+    said = [look(looking, sample, joints, speeds)[1] for sample in samples]
+    assert said == [False] * WATCHED + [ended] * (6 - WATCHED)
 
 
 def test_a_change_of_speed_keeps_a_trial_going(looking):
     """A shaken object whose speed happens to be zero when it is looked at."""
-    joints, speeds = pose(), np.zeros(18)
-    moving = speeds.copy()
+    moving = RESTING.copy()
     moving[1] = 0.01 * looking.layout.grasp_size_m
     for sample in range(LAST_OF_SETTLING, LAST_OF_SETTLING + 8):
-        now = moving if sample % 2 else speeds
-        _, answered = looking.look(np.array([0]), np.array([sample]), joints[None], now[None])
-        assert not answered.any()
+        assert not look(looking, sample, pose(), moving if sample % 2 else RESTING)[1]
 
 
 def test_an_object_beyond_half_of_a_threshold_is_watched_to_the_end(looking):
     for share, ended in ((0.4, True), (0.6, False)):
-        joints, speeds = pose(), np.zeros(18)
-        looking.look(np.array([0]), np.array([LAST_OF_SETTLING]), joints[None], speeds[None])
+        joints = pose()
+        look(looking, LAST_OF_SETTLING, joints)
         joints[0] = share * looking.thresholds.watched_m
-        said = [
-            looking.look(np.array([0]), np.array([sample]), joints[None], speeds[None])[1][0]
-            for sample in range(LAST_OF_SETTLING + 1, LENGTH)
-        ]
-        assert any(said) is ended
+        samples = range(LAST_OF_SETTLING + 1, LENGTH)
+        assert any([look(looking, sample, joints)[1] for sample in samples]) is ended
 
 
 @pytest.mark.parametrize("before", [False, True])
 def test_an_object_that_is_or_was_moved_too_far_is_answered_at_once(looking, before):
     """What moved before friction was lowered counts as well."""
-    joints, speeds = pose(), np.zeros(18)
-    joints[2] = 1.01 * looking.thresholds.total_m if before else 0.0
-    looking.look(np.array([0]), np.array([LAST_OF_SETTLING]), joints[None], speeds[None])
-    joints[2] = 1.01 * looking.thresholds.total_m
-    second = np.array([LAST_OF_SETTLING + 1])
-    assert looking.look(np.array([0]), second, joints[None], speeds[None])[1] == [True]
+    far = pose((0.0, 0.0, 1.01 * looking.thresholds.total_m))
+    look(looking, LAST_OF_SETTLING, far if before else pose())
+    assert look(looking, LAST_OF_SETTLING + 1, far)[1]
 
 
 def test_settling_ends_when_the_object_is_calm_and_not_before(looking):
-    joints, speeds = pose(), np.zeros(18)
-    place = np.array([0])
-    said = [
-        looking.look(place, np.array([sample]), joints[None], speeds[None])[0][0]
-        for sample in range(15, 18)
-    ]
+    said = [look(looking, sample, pose())[0] for sample in range(15, 18)]
     assert said == [False, True, True]
-    speeds[0] = 1e-3 * looking.layout.grasp_size_m
-    assert not looking.look(place, np.array([18]), joints[None], speeds[None])[0][0]
+    creeping = RESTING.copy()
+    creeping[0] = 1e-3 * looking.layout.grasp_size_m
+    assert not look(looking, 18, pose(), creeping)[0]
 
 
 def test_rigid_fingertips_end_only_by_loss(held):
@@ -260,9 +221,5 @@ def test_rigid_fingertips_end_only_by_loss(held):
     still, lost = pose()[:7], pose((2e-6, 0.0, 0.0))[:7]
     for sample in range(40):
         joints = lost if sample >= 30 else still
-        settled, answered = ends.look(
-            np.array([0]), np.array([sample]), joints[None], np.zeros((1, 6))
-        )
-        assert not settled[0]
-        assert answered[0] == (sample >= 30)
+        assert look(ends, sample, joints, np.zeros(6)) == (False, sample >= 30)
     assert trial.watched == 10

@@ -10,7 +10,6 @@ from sim_validate.engine.setup import (
     Setup,
     setup_from_file,
     weights,
-    wrenches_from_file,
 )
 
 
@@ -31,20 +30,6 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, text, words):
     with pytest.raises(gc.InputError, match=words) as refusal:
         setup_from_file(path, Setup())
     assert str(refusal.value).count(str(path)) == 1
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [('{"wrenches": []}', "wrenches must "),
-     ('{"wrenches": [{"name": "a", "force_n": [0, 0]}]}', r"wrenches\[0\].force_n"),
-     ('{"wrenches": [{"name": "a", "force_n": [0, 0, 0]}]}', "component must be from 1e-09"),
-     ('{"wrenches": [{"name": "a", "force_n": [1, 0, 1e999]}]}', r"force_n\[2\]: expected")],
-)  # fmt: skip
-def test_what_is_wrong_with_wrenches_is_said(tmp_path, text, words):
-    path = tmp_path / "task.json"
-    path.write_text(text)
-    with pytest.raises(gc.InputError, match=words):
-        wrenches_from_file(path)
 
 
 def test_weight_acts_at_the_centre_of_mass_along_each_direction_of_gravity():

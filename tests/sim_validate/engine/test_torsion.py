@@ -22,17 +22,26 @@ RESISTED = 1e-3
 """Least critical friction that is compared: below it, objects are only tried at one friction."""
 
 
-def soft(body, share=SHARE):
-    return Setup(physics=PhysicsSettings(torsion_m=share * body.radius))
-
-
 def test_the_gate_twists_a_box_and_predictions_with_torsion_are_what_simulation_finds():
     body, found = grasps("wedge", FRICTION, 1, FREE, "tilted")
-    setup = soft(body)
+    setup = Setup(physics=PhysicsSettings(torsion_m=SHARE * body.radius))
     twists = [check for check in require_faithful(setup, FRICTION, body.radius).checks
               if "twist at which" in check.name]  # fmt: skip
     assert len(twists) == 2
-    assert agree_on(body, found) == 1
+    (grasp,) = found
+    verdict = sv.validate(body, grasp, FRICTION, agenda=Agenda(limits="bisection"), setup=setup)
+    assert verdict.held
+    assert verdict.controls
+    assert verdict.controls_let_go
+    critical = verdict.critical_friction
+    expected = gc.critical_friction(grasp, torsion_m=setup.physics.torsion_m)
+    assert RESISTED < expected <= grasp.critical_friction * (1.0 + ROUNDED)
+    assert critical.predicted == expected
+    assert critical.simulated == pytest.approx(expected, rel=AGREED)
+    for wrench in verdict.wrenches:
+        assert wrench.simulated_limit is not None
+        assert wrench.let_go_at.share == pytest.approx(1.0, abs=AGREED)
+        assert wrench.required_friction <= FRICTION * (1.0 + 1e-6)
 
 
 @pytest.mark.slow
@@ -40,28 +49,6 @@ def test_the_gate_refuses_settings_that_turn_too_early():
     physics = PhysicsSettings(torsion_m=7e-4, impratio=10.0)
     failed = [c.name for c in measured_gate(Setup(physics=physics)).checks if not c.passed]
     assert any("twist at which" in name for name in failed)
-
-
-def agree_on(body, found):
-    """Compare all figures of grasps; return how many critical frictions were compared."""
-    compared = 0
-    for grasp in found:
-        setup = soft(body)
-        verdict = sv.validate(body, grasp, FRICTION, agenda=Agenda(limits="bisection"), setup=setup)
-        assert verdict.held
-        assert verdict.controls
-        assert verdict.controls_let_go
-        critical = verdict.critical_friction
-        expected = gc.critical_friction(grasp, torsion_m=setup.physics.torsion_m)
-        assert critical.predicted == expected <= grasp.critical_friction * (1.0 + ROUNDED)
-        if expected > RESISTED:
-            assert critical.simulated == pytest.approx(expected, rel=AGREED)
-            compared += 1
-        for wrench in verdict.wrenches:
-            assert wrench.simulated_limit is not None
-            assert wrench.let_go_at.share == pytest.approx(1.0, abs=AGREED)
-            assert wrench.required_friction <= FRICTION * (1.0 + 1e-6)
-    return compared
 
 
 def test_executions_refuse_torsion():

@@ -46,6 +46,18 @@ GRASPS = (
     sv.ExecutedGrasp("r-0-1-2-3", "regulus", "2" * 64, None, "no squeeze carries the weight", NONE),
 )  # fmt: skip
 BODY = scenes.example_object("tetrahedron")
+PLAIN = ExecutionTrial("knock", "knock", True, "stuck", 0.0, 0.0, 0.0, 2.0, 3.0, 2.0, 1e-3)
+"""A trial that nothing happened in."""
+
+
+def trial(kind, name=None, **figures):
+    return replace(PLAIN, kind=kind, name=name or kind, **figures)
+
+
+def execution(*trials, **figures):
+    """One of 0.3 kg that was made by hand, without controls unless they are given."""
+    made = Execution(0.3, np.full((4, 3), 2.0), 2.0, trials, (), ())
+    return replace(made, **figures)
 
 
 def executions(complete=True):

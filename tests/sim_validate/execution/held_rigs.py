@@ -63,18 +63,3 @@ def box_dynamics(push=5.0, friction=0.5, stiffness=2000.0, mass=MASS):
 def planned(name, friction=0.5, **chosen):
     body = scenes.example_object(name)
     return body, gc.plan(body, friction, limit=1, **chosen).grasps[0]
-
-
-def icosphere():
-    """42 directions: the corners of an icosahedron and the middles of its edges."""
-    golden = 0.5 * (1.0 + np.sqrt(5.0))
-    corners = np.array(
-        [np.roll([0.0, a, b * golden], k) for k in range(3) for a in (-1, 1) for b in (-1, 1)]
-    )
-    apart = np.linalg.norm(corners[:, None] - corners, axis=2)
-    edges = [
-        corners[i] + corners[j] for i, j in zip(*np.nonzero(apart == 2.0), strict=True) if i < j
-    ]
-    found = np.vstack([corners, edges])
-    assert len(found) == 42
-    return found / np.linalg.norm(found, axis=1)[:, None]

@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +17,6 @@ from sim_validate.execution import execute as jobs
 from sim_validate.execution.execute import executed_grasp, execution_of
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from sim_validate.settings import ExecutionSettings
 
 QUICK = ["--trials", "knock"]
 IDS = ("c-0-1-2-7", "p-0-7-1-5")
@@ -137,27 +136,6 @@ def settings_of(here, *flags, code=Exit.GOOD):
 def test_an_object_without_a_mass_has_the_density_of_water(here):
     volume = scenes.example_object("wedge").volume
     assert settings_of(here, *QUICK).mass_kg == pytest.approx(1000.0 * volume, rel=1e-8)
-
-
-def test_every_flag_reaches_the_settings(here):
-    flags = {
-        "mass-kg": 0.2, "push-n": 12.0, "tip-stiffness-n-per-m": 3000.0, "tip-radius-m": 0.003,
-        "tip-mass-kg": 0.04, "damping-ratio": 0.6, "lift-m": 0.1, "lift-s": 0.5, "shake-g": 0.5,
-        "shake-hz": 6.0, "stop-m-per-s2": 9.0, "stop-from-m-per-s": 0.4, "knock-n-s": 0.01,
-        "off-mm": 1.0, "off-deg": 1.5, "misplacements": 2, "max-mm": 6.0, "max-deg": 7.0, "seed": 5,
-    }  # fmt: skip
-    words = [word for name, value in flags.items() for word in (f"--{name}", str(value))]
-    found = settings_of(here, *words, "--trials", "shake", "--down", "1", "0", "0")
-    assert found == ExecutionSettings(
-        mass_kg=0.2, push_n=12.0, tip_stiffness_n_per_m=3000.0, tip_radius_m=0.003,
-        tip_mass_kg=0.04, damping_ratio=0.6, down=(1.0, 0.0, 0.0),
-        trials=("shake",), lift_m=0.1, lift_s=0.5, shake_g=0.5, shake_hz=6.0, stop_m_per_s2=9.0,
-        stop_from_m_per_s=0.4, knock_n_s=0.01, off_mm=1.0, off_deg=1.5, misplacements=2, seed=5,
-        max_mm=6.0, max_deg=7.0,
-    )  # fmt: skip
-    plain = ExecutionSettings(mass_kg=0.3)
-    names = {each.name for each in fields(found)} - {"density_kg_m3"}
-    assert all(getattr(found, name) != getattr(plain, name) for name in names)
 
 
 def test_a_file_of_flags_and_a_file_of_physics(here):

@@ -1,12 +1,11 @@
 """Whole executions: what survives, what is lost, and what the prediction said of both."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
-import scenes
 import sim_validate as sv
 from sim_validate.execution.execute import Fingertips
 from sim_validate.execution.trials import Skipped
@@ -80,12 +79,9 @@ def test_the_weight_slips_where_friction_times_push_is_exceeded():
 def test_two_runs_are_equal_to_the_last_bit(light):
     body, grasp = planned("box")
     again = sv.execute(body, grasp, 0.5, LIGHT, threads=2)
-    assert [trial.name for trial in again.trials] == [trial.name for trial in light.trials]
-    for one, other in zip(light.trials, again.trials, strict=True):
-        for field in fields(one):
-            assert getattr(one, field.name) == getattr(other, field.name), one.name
+    assert light.trials == again.trials
+    assert light.controls == again.controls
     np.testing.assert_array_equal(light.squeeze, again.squeeze)
-    assert [c.first_slip for c in light.controls] == [c.first_slip for c in again.controls]
 
 
 def test_thresholds_decide_what_counts_as_held(light):
@@ -136,26 +132,6 @@ def test_objects_that_are_not_convex_are_held_on_their_own_surfaces(name):
         assert trial.survived
         ratio = trial.simulated_first_slip / trial.predicted_first_slip
         assert ratio == pytest.approx(1.0, abs=0.05), trial.name
-    assert found.controls_let_go
-
-
-@pytest.mark.slow
-def test_no_contact_is_lost_while_a_slender_object_is_turned():
-    """Contacts that are too hard lose a tip for single steps while the palm turns."""
-    body, grasp = planned("screwdriver")
-    for trial in sv.execute(body, grasp, 0.5, replace(LIGHT, trials=("shake",))).trials:
-        assert trial.fate == "stuck", trial.name
-        assert trial.simulated_first_slip == pytest.approx(trial.predicted_first_slip, rel=0.1)
-
-
-def test_a_grasp_that_is_not_concurrent_is_executed():
-    body = scenes.example_object("dodecahedron")
-    grasps = gc.plan(body, 0.6, limit=1, families=("regulus",)).grasps
-    assert grasps
-    found = sv.execute(body, grasps[0], 0.6, replace(LIGHT, trials=("weight",)))
-    (trial,) = found.trials
-    assert (trial.fate == "stuck") == (trial.simulated_first_slip > 1.0)
-    assert trial.simulated_first_slip == pytest.approx(trial.predicted_first_slip, rel=0.02)
     assert found.controls_let_go
 
 

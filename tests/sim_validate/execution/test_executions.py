@@ -12,14 +12,20 @@ import sim_validate as sv
 from sim_validate.execution.trials import Skipped
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
-    Execution,
     ExecutionControl,
-    ExecutionTrial,
     best_executed,
     ended,
 )
 from sim_validate.settings import ExecutionSettings
-from tests.sim_validate.execution.executed import BODY, ENOUGH, GRASPS, SETTINGS, executions
+from tests.sim_validate.execution.executed import (
+    BODY,
+    ENOUGH,
+    GRASPS,
+    SETTINGS,
+    execution,
+    executions,
+    trial,
+)
 
 
 @pytest.fixture
@@ -109,20 +115,12 @@ def test_a_file_that_contradicts_itself_is_refused_with_the_field(name, tmp_path
         sv.load_executions(path)
 
 
-def trial(kind, survived, fate="stuck"):
-    return ExecutionTrial(kind, kind, survived, fate, 0.0, 0.0, 0.0, 2.0, 3.0, 2.0, 1e-3)
-
-
-def execution(*trials, controls=()):
-    skipped = (Skipped("lift", "no room"),)
-    return Execution(0.3, np.zeros((4, 3)), 2.0, trials, controls, skipped)
-
-
 @pytest.mark.parametrize(
     ("survived", "expected"), [((), False), ((True,), True), ((True, True, False), False)]
 )
 def test_an_object_survives_if_it_survives_every_trial_of_at_least_one(survived, expected):
-    assert execution(*(trial("knock", each) for each in survived)).survived is expected
+    trials = (trial("knock", survived=each) for each in survived)
+    assert execution(*trials, skipped=(Skipped("lift", "no room"),)).survived is expected
 
 
 @pytest.mark.parametrize(
@@ -138,13 +136,13 @@ def test_an_object_survives_if_it_survives_every_trial_of_at_least_one(survived,
 def test_an_object_that_was_kept_and_failed_is_said_to_have_left_its_place(
     survived, fate, moved_mm, turned_deg, said
 ):
-    found = ExecutionTrial("knock", "knock -y", survived, fate, 0.0, 1e-3 * moved_mm,
-                           math.radians(turned_deg), 2.0, 3.0, 2.0, 1e-3)  # fmt: skip
+    moved = {"displacement_m": 1e-3 * moved_mm, "turn_rad": math.radians(turned_deg)}
+    found = trial("knock", survived=survived, fate=fate, **moved)
     assert ended(found, ExecutionSettings(0.3)) == said
 
 
 def executed(name, losses, *, survived=True, let_go=True):
-    trials = [replace(trial("knock", survived), predicted_loss=loss) for loss in losses]
+    trials = [trial("knock", survived=survived, predicted_loss=loss) for loss in losses]
     controls = (ExecutionControl("a", let_go, 0.9),)
     return ExecutedGrasp(name, "pencil", "", execution(*trials, controls=controls))
 

@@ -9,33 +9,28 @@ import grasp_core as gc
 from scenes.drawing.clips import GraphicsError
 from sim_validate.execution import execute as jobs
 from sim_validate.execution.execute import FRAMES, ExecutionJob, film, worth_seeing
-from sim_validate.execution.verdict import Execution, ExecutionTrial
 from sim_validate.settings import ExecutionSettings
 from tests.scenes.drawing.whole import frames_of
+from tests.sim_validate.execution.executed import execution, trial
 from tests.sim_validate.rigs import grasps
 
 SETTINGS = ExecutionSettings(0.2, trials=("lift", "shake"), shake_g=1.0)
 FRICTION = 0.5
 
 
-def trial(kind, name, simulated=2.0, *, survived=True, fate="stuck", slip_m=0.0):
-    kept = survived and fate != "dropped"
-    return ExecutionTrial(kind, name, kept, fate, slip_m, 0.0, 0.0, 2.0, 3.0, simulated, 1e-3)
-
-
 def chosen(*trials):
-    found = Execution(0.2, np.ones((4, 3)), 2.0, trials, (), ())
-    return [each.name for each in worth_seeing(found)]
+    return [each.name for each in worth_seeing(execution(*trials))]
 
 
-LIFT, EASY = trial("lift", "lift"), trial("shake", "shake along x", 1.8)
-HARD = trial("shake", "shake about z", 1.2)
+LIFT, EASY = trial("lift"), trial("shake", "shake along x", simulated_first_slip=1.8)
+HARD = trial("shake", "shake about z", simulated_first_slip=1.2)
 
 
 def test_the_lift_and_the_worst_shake_are_filmed():
-    assert chosen(LIFT, EASY, HARD, trial("stop", "stop +x", 1.1)) == ["lift", "shake about z"]
+    stop = trial("stop", "stop +x", simulated_first_slip=1.1)
+    assert chosen(LIFT, EASY, HARD, stop) == ["lift", "shake about z"]
     lost = replace(EASY, survived=False)
-    assert chosen(trial("weight", "weight"), HARD, lost) == ["shake along x"]
+    assert chosen(trial("weight"), HARD, lost) == ["shake along x"]
     alike = replace(EASY, predicted_first_slip=1.5), replace(EASY, name="y", predicted_first_slip=1)
     assert chosen(*alike) == ["y"]
     assert chosen() == []
@@ -44,7 +39,7 @@ def test_the_lift_and_the_worst_shake_are_filmed():
 def test_the_worst_slip_is_filmed_once():
     slid = trial("stop", "stop +x", fate="slipped", slip_m=2e-3)
     less = trial("stop", "stop -x", fate="slipped", slip_m=1e-3)
-    dropped = trial("knock", "knock +x", fate="dropped", slip_m=1e-4)
+    dropped = trial("knock", "knock +x", survived=False, fate="dropped", slip_m=1e-4)
     unseen = trial("stop", "stop -x", fate="slipped", slip_m=1e-6)
     assert chosen(EASY, unseen) == ["shake along x"]
     assert chosen(EASY, less, slid) == ["shake along x", "stop +x"]

@@ -6,7 +6,6 @@ import shlex
 import shutil
 from dataclasses import asdict, replace
 
-import numpy as np
 import pytest
 
 import sim_validate as sv
@@ -18,10 +17,8 @@ from scenes.settings import PhysicsSettings
 from sim_validate.execution.command import execution_settings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
-    Execution,
     ExecutionControl,
     Executions,
-    ExecutionTrial,
     Skipped,
     load_executions,
 )
@@ -34,30 +31,34 @@ from sim_validate.report.run_folder import runs_in, said_of_both
 from sim_validate.report.sections import execute_command
 from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.changing import changed, slipped
+from tests.sim_validate.execution.executed import execution, trial
 from tests.sim_validate.report.test_report import EVIL, Page
 
 SETTINGS = ExecutionSettings(0.3, shake_g=0.5, stop_m_per_s2=2.0 * GRAVITY_M_PER_S2,
                              stop_from_m_per_s=1.0, knock_n_s=0.02)  # fmt: skip
 
 
-def trial(kind, name, *, predicted=2.0, simulated=2.0, survived=True, fate="stuck"):
-    return ExecutionTrial(kind, name, survived, fate, 1.25e-3, 2.5e-3, math.radians(3.5),
-                          predicted, 1.25 * predicted, simulated, 0.00125)  # fmt: skip
+def seen(kind, name, predicted, simulated, **ended):
+    return trial(
+        kind, name, slip_m=1.25e-3, displacement_m=2.5e-3, turn_rad=math.radians(3.5),
+        predicted_first_slip=predicted, predicted_loss=1.25 * predicted,
+        simulated_first_slip=simulated, **ended,
+    )  # fmt: skip
 
 
 TRIALS = (
-    trial("weight", "weight", predicted=math.inf, simulated=math.inf),
-    trial("shake", "shake along x", predicted=1.31, simulated=1.32),
-    trial("shake", "shake about x", predicted=0.72, simulated=0.73, fate="slipped"),
-    trial("stop", "stop +x", predicted=0.91, simulated=0.92, survived=False, fate="dropped"),
+    seen("weight", "weight", math.inf, math.inf),
+    seen("shake", "shake along x", 1.31, 1.32),
+    seen("shake", "shake about x", 0.72, 0.73, fate="slipped"),
+    seen("stop", "stop +x", 0.91, 0.92, survived=False, fate="dropped"),
 )
 KEPT = tuple(replace(each, survived=True, fate="stuck") for each in TRIALS)
 SKIPPED = (Skipped("lift", "a fingertip is in the way"),)
+CONTROL = ExecutionControl("friction 0.9", True, 0.96)
 
 
-def execution(multiple, trials, *, let_go=True, skipped=()):
-    controls = (ExecutionControl("friction 0.9", let_go, 0.96 if let_go else math.inf),)
-    return Execution(0.3, np.full((4, 3), 2.0), multiple, trials, controls, skipped)
+def carrying(multiple, trials, control=CONTROL, skipped=()):
+    return execution(*trials, load_multiple=multiple, controls=(control,), skipped=skipped)
 
 
 def executed(saved, found):
@@ -78,7 +79,7 @@ def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("executed")
     assert main(["plan", "wedge", "--limit", "3", "--out", str(folder), "-q"]) == Exit.GOOD
     saved = load_grasps(folder / "grasps.json")
-    found = executed(saved, [execution(2.5, TRIALS, skipped=SKIPPED), execution(3.5, KEPT), None])
+    found = executed(saved, [carrying(2.5, TRIALS, skipped=SKIPPED), carrying(3.5, KEPT), None])
     (folder / "executions.json").write_text(results(saved, found).text())
     return folder
 
@@ -178,7 +179,8 @@ def test_grasps_that_were_lost_are_drawn_first(run):
 @pytest.mark.usefixtures("no_pictures")
 def test_a_control_that_held_is_bad_news(copy, tmp_path):
     saved = load_grasps(copy / "grasps.json")
-    found = executed(saved, [execution(2.5, KEPT, let_go=False), execution(3.5, KEPT), None])
+    held = replace(CONTROL, let_go=False, first_slip=math.inf)
+    found = executed(saved, [carrying(2.5, KEPT, held), carrying(3.5, KEPT), None])
     (copy / "executions.json").write_text(results(saved, found, complete=False).text())
     said = Page(write_report(copy, tmp_path / "out", jobs=1, limit=1).index.read_text()).said
     assert said.count("a negative control held") == 2

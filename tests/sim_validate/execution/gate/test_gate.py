@@ -54,14 +54,19 @@ MORE_BROKEN = (
     (USUAL, {"density": 1.2, "wind": (10.0, 0.0, 0.0)}),
     (USUAL, {"ccd_tolerance": 0.01}),
 )
-RIGHT = (
+CORNERS = ((0.05, 500.0, 0.2), (0.05, 10_000.0, 0.2), (2.0, 500.0, 0.02), (2.0, 10_000.0, 0.02))
+"""Masses, stiffnesses and sizes that differ most from those of every day."""
+MORE_RIGHT = (
+    *((where, {}) for where in CORNERS),
     (USUAL, {"integrator": "RK4"}),
     (USUAL, {"impratio": 1000.0}),
     (USUAL, {"autoreset": True}),
 )
-"""They change nothing that matters: a blow-up that is reset is still reported."""
-CORNERS = ((0.05, 500.0, 0.2), (0.05, 10_000.0, 0.2), (2.0, 500.0, 0.02), (2.0, 10_000.0, 0.02))
-"""Masses, stiffnesses and sizes that differ most from those of every day."""
+"""The last ones change nothing that matters: a blow-up that is reset is still reported."""
+
+
+def slow(cases):
+    return [pytest.param(*case, marks=pytest.mark.slow) for case in cases]
 
 
 def refused(where, numbers):
@@ -86,15 +91,9 @@ def test_the_usual_settings_give_the_known_answers_and_every_figure_is_measured(
             assert (check.least, check.largest) == (0.99, 1.01)
 
 
-@pytest.mark.parametrize("where", [STIFF, SOFT])
-def test_so_do_stiff_and_soft_springs(where):
-    assert not refused(where, {})
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("where", CORNERS)
-def test_each_closed_form_is_met_at_all_masses_stiffnesses_and_sizes(where):
-    assert not refused(where, {})
+@pytest.mark.parametrize(("where", "numbers"), [(STIFF, {}), (SOFT, {}), *slow(MORE_RIGHT)])
+def test_each_closed_form_is_met_at_all_masses_stiffnesses_and_sizes(where, numbers):
+    assert not refused(where, numbers)
 
 
 @pytest.mark.slow
@@ -111,21 +110,9 @@ def test_so_it_is_with_other_pushes_frictions_fingertips_and_dampers():
         assert [str(check) for check in measured(case).checks if not check.passed] == []
 
 
-@pytest.mark.parametrize(("where", "numbers"), BROKEN)
+@pytest.mark.parametrize(("where", "numbers"), [*BROKEN, *slow(MORE_BROKEN)])
 def test_broken_settings_are_refused(where, numbers):
     assert refused(where, numbers)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("where", "numbers"), MORE_BROKEN)
-def test_so_are_more_of_them(where, numbers):
-    assert refused(where, numbers)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("where", "numbers"), RIGHT)
-def test_settings_that_change_nothing_are_accepted(where, numbers):
-    assert not refused(where, numbers)
 
 
 def test_no_grasp_is_executed_with_broken_settings():
