@@ -7,6 +7,11 @@ from sim_validate.datasets.columns import parquet_bytes, read_table
 from sim_validate.datasets.open_dataset import listed, read_manifest, write_manifest
 
 
+def first(where=lambda _: True, **cells):
+    """A change of the first row that is as it is looked for."""
+    return lambda rows: next(row for row in rows if where(row)).update(cells)
+
+
 def forged(folder, name, change):
     """Change rows of one table of a dataset, and write the hashes that match.
 

@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 
 import sim_validate as sv
@@ -27,9 +28,8 @@ def dataset(tmp_path_factory):
     return folder
 
 
-def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, capsys):
-    assert main(["dataset", "verify", str(dataset), "--json"]) == Exit.GOOD
-    assert json.loads(capsys.readouterr().out) == {"dataset": str(dataset), "faults": []}
+def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, answer):
+    assert answer("dataset", "verify", dataset) == {"dataset": str(dataset), "faults": []}
 
 
 def test_a_build_says_how_many_objects_each_split_has(dataset, capsys):
@@ -46,6 +46,17 @@ def test_a_build_says_how_many_objects_each_split_has(dataset, capsys):
         assert len(set(grasps["object_id"])) == count
         assert grasps["held"].dtype == bool
     assert 0 in counts.values()
+
+
+def test_the_trials_of_its_rows_are_replayed(dataset, answer):
+    tables = sv.load_dataset(dataset)
+    grasps, trials = tables["grasps"], tables["trials"]
+    for name, outcome in list(zip(grasps["grasp_id"], grasps["outcome"], strict=True))[:3]:
+        found = answer("replay", dataset, "--grasp", name)
+        (row,) = np.flatnonzero((trials["grasp_id"] == name) & (trials["name"] == found["wrench"]))
+        assert found["outcome"] == trials["outcome"][row]
+        assert found["displacement_m"] == trials["displacement_m"][row]
+        assert found["recorded_outcome"] == outcome
 
 
 def test_a_changed_file_is_named(dataset, tmp_path, capsys):

@@ -22,7 +22,7 @@ from sim_validate.datasets.verify import loose_differences, verify
 from sim_validate.execution.verdict import CLEAR_OF_SLIP, ExecutedGrasp
 from tests.sim_validate.datasets.configs import rows_of
 from tests.sim_validate.datasets.engines import Here, silent
-from tests.sim_validate.datasets.forging import forged
+from tests.sim_validate.datasets.forging import first, forged
 
 pytest.importorskip("pyarrow")
 SETTINGS = sv.ExecutionSettings(mass_kg=1.2, trials=("weight",))
@@ -84,15 +84,6 @@ def test_the_rows_say_what_an_execution_says(executed):
         assert stored[name] == getattr(trial, name), name
 
 
-def first(row_of, **cells):
-    """A change of the first row that was executed."""
-
-    def change(rows):
-        next(row for row in rows if row_of(row)).update(cells)
-
-    return change
-
-
 def executed_row(row):
     return row.get("executed", True)
 
@@ -118,11 +109,9 @@ def test_forged_rows_are_named(copied, name, change, message):
 
 
 def test_trials_that_come_out_otherwise_are_named(copied):
-    def change(rows):
-        for row in rows:
-            row["slip_m"] += 1e-6
-
-    forged(copied, "executions", change)
+    forged(
+        copied, "executions", lambda rows: [row.update(slip_m=row["slip_m"] + 1e-6) for row in rows]
+    )
     assert verify(copied) == []
     faults = verify(copied, 0.01)
     assert len(faults) == 1

@@ -17,7 +17,7 @@ from sim_validate.datasets.verify import verify
 from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
 from tests.sim_validate.datasets.engines import Here, contents, silent
-from tests.sim_validate.datasets.forging import forged, relisted
+from tests.sim_validate.datasets.forging import first, forged, relisted
 
 pytest.importorskip("pyarrow")
 
@@ -57,32 +57,24 @@ def leaning(rows):
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [
-        ("grasps", lambda rows: rows[0].update(closure_margin=0.9), "closure_margin is"),
-        (
-            "grasps",
-            lambda rows: rows[0]["contact_normals"][0].__setitem__(0, 2.0),
-            "must be unit vectors",
-        ),
+        ("grasps", first(closure_margin=0.9), "closure_margin is"),
+        ("grasps", first(contact_normals=[[2.0, 0.0, 0.0]] * 4), "must be unit vectors"),
         ("grasps", lambda rows: rows[0].update(held=not rows[0]["held"]), "held is"),
-        ("grasps", lambda rows: rows[0].update(object_id="0" * 64), "in object_id, has no row"),
-        ("grasps", lambda rows: rows[0].update(force_closed=False), "force_closed is"),
-        (
-            "grasps",
-            lambda rows: rows[0]["contact_points_m"].__setitem__(0, [1.0, 0.0, 0.0]),
-            "not on the object",
-        ),
+        ("grasps", first(object_id="0" * 64), "in object_id, has no row"),
+        ("grasps", first(force_closed=False), "force_closed is"),
+        ("grasps", first(contact_points_m=[[1.0, 0.0, 0.0]] * 4), "not on the object"),
         ("grasps", untried, "claims results, although"),
-        ("grasps", lambda rows: rows[0].update(trials=0), "must have trials"),
-        ("grasps", lambda rows: rows[0].update(trials=1), "by the table of trials"),
-        ("grasps", lambda rows: rows[0].update(friction=0.9), "not among those of config"),
-        ("grasps", lambda rows: rows[0].update(friction=-1.0), "friction must be a number from"),
-        ("grasps", lambda rows: rows[0].update(closure_margin=None), "closure_margin must be"),
-        ("grasps", lambda rows: rows[0].update(outcome="slipped"), "is 'slipped'"),
+        ("grasps", first(trials=0), "must have trials"),
+        ("grasps", first(trials=1), "by the table of trials"),
+        ("grasps", first(friction=0.9), "not among those of config"),
+        ("grasps", first(friction=-1.0), "friction must be a number from"),
+        ("grasps", first(closure_margin=None), "closure_margin must be"),
+        ("grasps", first(outcome="slipped"), "is 'slipped'"),
         ("grasps", leaning, "not with its normals"),
-        ("grasps", lambda rows: rows[0].update(split="validation"), "rows of another split"),
+        ("grasps", first(split="validation"), "rows of another split"),
         ("trials", lambda rows: rows.pop(), "table of trials"),
-        ("trials", lambda rows: rows[0].update(grasp_id="nobody"), "nobody, named in grasp_id"),
-        ("trials", lambda rows: rows[0].update(outcome="slipped"), "table of trials"),
+        ("trials", first(grasp_id="nobody"), "nobody, named in grasp_id"),
+        ("trials", first(outcome="slipped"), "table of trials"),
     ],
 )
 def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
@@ -190,10 +182,7 @@ def test_settings_that_are_not_the_manifests_are_named(copy):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (
-            lambda r: r["files"][0].update(path="../x"),
-            r"files\[0\]: path: expected a relative",
-        ),
+        (lambda r: r["files"][0].update(path="../x"), r"files\[0\]: path: expected a relative"),
         (lambda r: r.update(schema=4), "schema: expected 3, got 4: a newer graspproof wrote"),
         (lambda r: r["files"].append(r["files"][0]), "must have every path only once"),
     ],
@@ -238,10 +227,6 @@ def test_a_line_of_the_quarantine_that_is_none_is_named(copy):
     assert "quarantine.jsonl: line 1: source_sha256: missing; add it" in fault
 
 
-def empty_cells(rows):
-    rows[0].update(friction=None, contacts=None, outcome=None)
-
-
 def test_cells_that_must_not_be_null_are_a_fault_not_a_crash(copy):
-    forged(copy, "grasps", empty_cells)
+    forged(copy, "grasps", first(friction=None, contacts=None, outcome=None))
     assert any("grasps" in fault or "a row is not" in fault for fault in verify(copy))

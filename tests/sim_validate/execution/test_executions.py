@@ -80,10 +80,6 @@ BAD = {
     ),
     "fell": (of_trial(survived=True), r"trial lift: survived is false where the fate is dropped"),
     "opposite": (of_first(survived=True), r"executions\[0\]\.survived: true contradicts"),
-    "no squeeze": (
-        lambda d: d["executions"][0].pop("squeeze_n"),
-        r"executions\[0\]\.squeeze_n: missing; add it",
-    ),
     "one finger": (
         of_first(squeeze_n=[[1, 0, 0]], tip_radius_m=[0.004]),
         r"executions\[0\]\.squeeze_n must have a force for each contact, at least two, got 1",

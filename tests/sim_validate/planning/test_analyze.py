@@ -53,10 +53,14 @@ def test_the_centers_of_a_tetrahedron(analyze):
     edges; the torque part of G G' is (4/3 - 4/9) I, and smaller than the force part. The l1
     quality is bracketed by repeated qhull with exact support points.
     """
-    code, document = analyze(TETRAHEDRON)
+    code, document = analyze(TETRAHEDRON, "--max-normal-force-n", "5")
     (grasp,) = document["grasps"]
     assert code == Exit.GOOD
     assert (grasp["id"], grasp["closed"], grasp["outcome"]) == ("0", True, "closed")
+    weakest, everywhere = grasp["weakest_axis_wrench"], grasp["resisted_in_every_direction_n"]
+    assert everywhere == pytest.approx(5.0 * grasp["ferrari_canny_linf_n"][0], rel=1e-12)
+    assert 0.0 < everywhere <= weakest["limit"] <= weakest["upper"]
+    assert np.linalg.norm(weakest["wrench"]) == 1.0
     assert grasp["closure_margin"] == pytest.approx(0.125, abs=1e-9)
     assert grasp["critical_friction"] == 0.0
     lower, upper = grasp["ferrari_canny_l1_n"]
@@ -71,16 +75,6 @@ def test_the_centers_of_a_tetrahedron(analyze):
     assert grasp["hull_volume"] > 0.0
     assert grasp["undecided"] == {}
     assert document["complete"] is True
-
-
-def test_what_is_resisted_in_every_direction_is_no_more_than_along_the_axes(analyze):
-    _, document = analyze(TETRAHEDRON, "--max-normal-force-n", "5")
-    (grasp,) = document["grasps"]
-    weakest = grasp["weakest_axis_wrench"]
-    everywhere = grasp["resisted_in_every_direction_n"]
-    assert everywhere == pytest.approx(5.0 * grasp["ferrari_canny_linf_n"][0], rel=1e-12)
-    assert 0.0 < everywhere <= weakest["limit"] <= weakest["upper"]
-    assert np.linalg.norm(weakest["wrench"]) == 1.0
 
 
 def test_forces_and_separating_wrench_prove_themselves_from_the_document(analyze):
@@ -115,6 +109,8 @@ def test_two_contacts_are_never_closed(analyze):
     assert grasp["verified"]["closure"] is True
     assert grasp["resisted_in_every_direction_n"] == 0.0
     assert grasp["hull_volume"] == grasp["smallest_singular_value"] == 0.0
+    _, document = analyze({"contacts": contacts(CROSS, [[0.0, 0, 1]] * 4), "friction": 0.0})
+    assert document["grasps"][0]["min_weight"] is None  # of contacts that all push along z
 
 
 def test_both_ends_of_the_critical_friction_are_shown(analyze, capsys):
@@ -133,13 +129,6 @@ def test_both_ends_of_the_critical_friction_are_shown(analyze, capsys):
     shown = re.search(r"proved between ([0-9.]+) and ([0-9.]+)", words)
     assert lower - 1e-7 <= float(shown[1]) <= lower, "rounded down"
     assert upper <= float(shown[2]) <= upper + 1e-7, "rounded up"
-
-
-def test_a_weight_that_no_weights_balance_is_null(analyze):
-    """Contacts that all push along z."""
-    code, document = analyze({"contacts": contacts(CROSS, [[0.0, 0, 1]] * 4), "friction": 0.0})
-    assert code == Exit.NEGATIVE
-    assert document["grasps"][0]["min_weight"] is None
 
 
 def test_several_grasps_are_judged_one_by_one(analyze, capsys):
@@ -245,9 +234,6 @@ def test_a_document_is_read_as_it_was_made(analyze):
     assert found.grasps[0].wrenches[0].least_norm_forces_n is None
 
 
-ROOT = Path(__file__).parents[3]
-
-
 def refused(content, capsys, *flags):
     """What is said about a file that is refused."""
     text = content if isinstance(content, str) else json.dumps(content)
@@ -273,15 +259,9 @@ def test_friction_is_that_of_the_contact_then_the_flag_then_the_file(analyze):
     assert used("--friction", "0.2") == [0.9, 0.2, 0.2, 0.2]
 
 
-def test_outward_normals_are_turned(analyze):
-    outward = TETRAHEDRON | {"contacts": contacts(TETRA_CENTERS, -TETRA_NORMALS)}
-    assert analyze(outward, "--outward") == analyze(TETRAHEDRON)
-    assert analyze(outward) != analyze(TETRAHEDRON)
-
-
-def test_normals_with_three_digits_are_made_unit_vectors(analyze):
-    file = TETRAHEDRON | {"contacts": contacts(TETRA_CENTERS, np.round(TETRA_NORMALS, 3))}
-    code, document = analyze(file)
+def test_normals_are_turned_where_they_point_outward_and_made_unit_vectors(analyze):
+    outward = TETRAHEDRON | {"contacts": contacts(TETRA_CENTERS, -np.round(TETRA_NORMALS, 3))}
+    code, document = analyze(outward, "--outward")
     assert code == Exit.GOOD
     _, normals = arms_and_normals(document["grasps"][0])
     assert normals == pytest.approx(TETRA_NORMALS, abs=1e-12)
@@ -312,7 +292,6 @@ ONE = TETRAHEDRON["contacts"][0]
         (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
         (changed(["friction"], ...), 'contacts[0].friction: the key is missing; give it there'),
         (changed(["mu"], 0.5), "no field is named 'mu'; choose from contacts, grasps, friction"),
-        (changed(["contacts"], [ONE]), "contacts must have a length of at least 2 and at most 100"),
         (changed(["contacts"], [ONE] * 3), "all contacts lie within"),
         (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
         (changed(["contacts", 3, "normal", 0], float("nan")), "contacts[3].normal[0]: expected a"),
@@ -347,9 +326,6 @@ def test_a_config_file_gives_wrenches(analyze):
 
 
 def test_the_page_of_files_shows_one_that_is_read(analyze):
-    page = (ROOT / "docs" / "files.md").read_text()
+    page = Path(__file__).parents[3].joinpath("docs", "files.md").read_text()
     shown = json.loads(re.search(r"```json\n(.*?)```", page, re.DOTALL)[1])
-    code, document = analyze(shown)
-    assert code == Exit.GOOD
-    assert len(document["grasps"][0]["positions_m"]) == 4
-    assert document["grasps"][0]["verified"]["closure"] is True
+    assert analyze(shown)[0] == Exit.GOOD

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import sim_validate as sv
-from grasp_core.geometry.polygons import plane_frame
-from grasp_core.objects.on_faces import within
 from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.regions.proof import TwistCover
 from sim_validate.kit.exit_codes import Exit
@@ -61,16 +59,12 @@ def test_the_proofs_can_be_checked_from_their_files(folder):
     assert checked == 3
 
 
-def test_one_grasp_with_a_reserve(folder, capsys):
-    name = json.loads((folder / "grasps.json").read_text())["grasps"][0]["id"]
-    asked = ["regions", str(folder / "grasps.json"), "--grasp", name, "--json"]
-    asked += ["--max-cones", "300"]
-    assert main([*asked, "--reserve", ".4"]) == Exit.GOOD
-    found = json.loads(capsys.readouterr().out)
+def test_one_grasp_with_a_reserve(folder, answer):
+    without = json.loads((folder / "regions.json").read_text())["grasps"][0]
+    asked = ["regions", folder / "grasps.json", "--grasp", without["id"], "--max-cones", "300"]
+    found = answer(*asked, "--reserve", ".4")
     (grasp,) = found["grasps"]
-    assert (grasp["id"], found["reserve"]) == (name, 0.4)
-    assert main(asked) == Exit.GOOD
-    (without,) = json.loads(capsys.readouterr().out)["grasps"]
+    assert (grasp["id"], found["reserve"]) == (without["id"], 0.4)
     assert grasp["disc_radius_m"] < without["disc_radius_m"]
 
 
@@ -138,18 +132,10 @@ def test_plans_may_come_with_certified_regions(tmp_path, folder):
             continue
         assert new.radius > old["radius_m"]
         widened += 1
-        for region, contact in zip(new.regions, new.contacts, strict=True):
-            ring = ring_around(contact, 0.999 * new.radius)
-            assert all(within(point, region.polygon, contact.normal, 0.0) for point in ring)
     assert widened >= 2
 
 
-def ring_around(contact, radius):
-    frame = plane_frame(contact.normal)
-    turns = np.linspace(0.0, 2.0 * np.pi, 60)
-    return contact.position + radius * np.column_stack([np.cos(turns), np.sin(turns)]) @ frame.T
-
-
+@pytest.mark.slow
 def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
     asked = ["run", "tetrahedron", "--limit", "1", "--families", "concurrent"]
     asked += ["--out", str(tmp_path)]
@@ -162,27 +148,13 @@ def test_a_run_keeps_regions_and_proofs_and_the_next_removes_them(tmp_path):
     assert not list((tmp_path / "proofs").iterdir())
 
 
-@pytest.mark.slow
-def test_regions_stay_clear_of_edges_that_contacts_are_near_to(folder, tmp_path):
-    saved = grasps_from_json((folder / "grasps.json").read_text())
-    asked = ["regions", str(folder / "grasps.json"), "--max-cones", "300", "--out", str(tmp_path)]
-    assert main([*asked, "--edge-clearance-m", "0.006", "-q"]) == Exit.GOOD
-    near = 0
-    for grasp in saved.grasps:
-        found = sv.load_regions(tmp_path / "proofs" / f"{grasp.id}.npz")
-        assert clearance_of(saved.body, grasp, found.regions) > 0.006 - 1e-9
-        near += float(np.linalg.norm(found.centers - grasp.positions, axis=1).max()) > 1e-6
-    assert near > 0
-    assert main([*asked, "--edge-clearance-m", "0.05", "-q"]) == Exit.NEGATIVE
-
-
-def clearance_of(body, grasp, regions):
-    """How far regions are from the edges of their faces."""
-    least = np.inf
-    for region, index in zip(regions, grasp.faces, strict=True):
-        face = body.faces[index]
-        edges = np.roll(face.polygon, -1, axis=0) - face.polygon
-        inward = np.cross(face.normal, edges) / np.linalg.norm(edges, axis=1, keepdims=True)
-        inside = np.einsum("ki,cki->ck", inward, region.polygon[:, None] - face.polygon)
-        least = min(least, inside.min())
-    return least
+def test_regions_can_be_asked_to_stay_clear_of_edges(folder, answer):
+    asked = ["regions", folder / "grasps.json", "--max-cones", "300", "--limit", "1"]
+    near, clear = (
+        answer(*asked, "--edge-clearance-m", clearance)["grasps"][0]["area_m2"]
+        for clearance in (0.0, 0.006)
+    )
+    assert clear < near
+    assert (
+        answer(*asked, "--edge-clearance-m", "0.05", code=Exit.NEGATIVE)["summary"]["proved"] == 0
+    )

@@ -1,11 +1,12 @@
 """Trials of verdicts and of rows of datasets, replayed from the command line."""
 
 import json
+import shutil
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
-import sim_validate as sv
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -13,26 +14,21 @@ from tests.sim_validate.changing import slipped
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(wedge_plan, tmp_path_factory):
     """A run with a task that is too much."""
     folder = tmp_path_factory.mktemp("run")
     task = {"wrenches": [{"name": "too much", "force_n": [0, 0, 90]}]}
     (folder / "task.json").write_text(json.dumps(task))
-    planned = ["plan", "screwdriver", "--limit", "1", "--out", str(folder), "-q"]
-    assert main(planned) == Exit.GOOD
+    grasps = shutil.copy(wedge_plan, folder)
     trials = ("--wrenches", str(folder / "task.json"), "--seed", "3", "--repeats", "2")
-    grasps = str(folder / "grasps.json")
-    assert main(["validate", grasps, *trials, "--out", str(folder), "-q"]) == Exit.NEGATIVE
+    words = ["validate", str(grasps), "--limit", "1", *trials, "--out", str(folder), "-q"]
+    assert main(words) == Exit.NEGATIVE
     return folder
 
 
 @pytest.fixture
-def replay(capsys):
-    def replay(*flags, code=Exit.GOOD):
-        assert main(["replay", *map(str, flags), "--json"]) == code
-        return json.loads(capsys.readouterr().out)
-
-    return replay
+def replay(answer):
+    return partial(answer, "replay")
 
 
 def verdicts_in(folder):
@@ -86,40 +82,6 @@ def test_a_trial_that_ends_otherwise_than_recorded_is_negative(folder, tmp_path,
     assert (found["outcome"], found["recorded_outcome"]) == ("held", "slipped")
 
 
-@pytest.mark.usefixtures("built_here")
-def test_dataset_rows(tmp_path, replay, capsys):
-    out = tmp_path / "ds"
-    assert (
-        main(
-            [
-                "dataset",
-                "build",
-                "wedge",
-                "--families",
-                "concurrent",
-                "--limit",
-                "1",
-                "--out",
-                str(out),
-                "-q",
-            ]
-        )
-        == Exit.GOOD
-    )
-    capsys.readouterr()
-    tables = sv.load_dataset(out)
-    rows = tables["grasps"]
-    assert len(rows["grasp_id"]) >= 2
-    for name, outcome in zip(rows["grasp_id"], rows["outcome"], strict=True):
-        found = replay(out, "--grasp", name)
-        trials = [row for row, of in enumerate(tables["trials"]["grasp_id"]) if of == name]
-        by_name = {tables["trials"]["name"][row]: row for row in trials}
-        row = by_name[found["wrench"]]
-        assert found["outcome"] == tables["trials"]["outcome"][row]
-        assert found["displacement_m"] == tables["trials"]["displacement_m"][row]
-        assert found["recorded_outcome"] == outcome
-
-
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
@@ -135,9 +97,8 @@ def test_what_is_not_there_is_named(folder, capsys, flags, message):
     assert message in capsys.readouterr().err
 
 
-def test_grasps_of_another_object_are_refused(folder, tmp_path, capsys):
-    assert main(["plan", "wedge", "--limit", "1", "--out", str(tmp_path), "-q"]) == Exit.GOOD
-    other = str(tmp_path / "grasps.json")
+def test_grasps_of_another_object_are_refused(folder, bracket_plan, capsys):
+    other = str(bracket_plan)
     assert main(["replay", str(folder), "--grasp", "x", "--grasps", other]) == Exit.INPUT
     assert "are on another object" in capsys.readouterr().err
 
