@@ -15,9 +15,15 @@ def changed(path, change):
     return document
 
 
-def first_grasp(**values):
-    """A change of the first grasp that a document lists."""
-    return lambda document: document["grasps"][0].update(values)
+def at(*place, **values):
+    """A change of the object that keys and numbers in lists lead to in a document."""
+
+    def change(document):
+        for key in place:
+            document = document[key]
+        document.update(values)
+
+    return change
 
 
 def changed_verdicts(path, change):

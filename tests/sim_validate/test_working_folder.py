@@ -45,16 +45,3 @@ def test_a_scene_of_which_mujoco_warns_leaves_nothing(noisy, empty, capfd):
     assert compiled(f"<mujoco>{scene}</worldbody></mujoco>").nmesh == 1
     assert not "".join(capfd.readouterr())
     assert not list(empty.iterdir())
-
-
-@pytest.mark.slow
-def test_commands_write_where_they_are_told(empty, tmp_path):
-    out, grasps = str(tmp_path / "out"), str(tmp_path / "out" / "grasps.json")
-    assert main(["plan", "l-bracket", "--limit", "1", "--out", out, "-q"]) == Exit.GOOD
-    for words in (
-        ["validate", grasps, "--out", out], ["reach", grasps, "--out", out],
-        ["execute", grasps, "--mass-kg", "0.1", "--trials", "stop", "--out", out],
-        ["report", out],
-    ):  # fmt: skip
-        assert main([*words, "-q"]) in {Exit.GOOD, Exit.NEGATIVE}
-        assert not list(empty.iterdir())

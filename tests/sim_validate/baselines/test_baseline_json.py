@@ -15,6 +15,7 @@ from sim_validate.baselines.baseline import (
 )
 from sim_validate.engine.traces import Outcome
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, entry
+from tests.sim_validate.changing import at, changed
 from tests.sim_validate.rigs import grasps
 
 
@@ -29,29 +30,23 @@ def test_a_baseline_comes_back_and_has_a_line_for_each_grasp():
     assert [json.loads(line.strip().rstrip(","))["id"] for line in lines] == [ENTRY.id, "p"]
 
 
-def spoiled(change):
-    record = json.loads(BEFORE.text())
-    change(record)
-    return json.dumps(record)
-
-
-def with_entry(**changed):
-    return spoiled(lambda record: record["grasps"][0].update(changed))
-
-
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("change", "message"),
     [
-        (spoiled(lambda r: r.update(grasps=[])), "grasps: expected at least one grasp"),
-        (spoiled(lambda r: r.update(grasps_file="/etc/passwd")), "grasps_file: expected a path"),
-        (spoiled(lambda r: r["settings"]["setup"].update(surface="foo")), "settings.setup.surface"),
-        (spoiled(lambda r: r["settings"]["noise"].update(mass=-0.1)), "settings.noise.mass"),
-        (with_entry(outcome="slipped"), r"grasps\[0\]: .*`outcome` slipped contradicts `not_held`"),
-        (spoiled(lambda r: r["grasps"].append(r["grasps"][0])), "the same id"),
+        (at(grasps=[]), "grasps: expected at least one grasp"),
+        (at(grasps_file="/etc/passwd"), "grasps_file: expected a path"),
+        (at("settings", "setup", surface="foo"), "settings.setup.surface"),
+        (at("settings", "noise", mass=-0.1), "settings.noise.mass"),
+        (
+            at("grasps", 0, outcome="slipped"),
+            r"grasps\[0\]: .*`outcome` slipped contradicts `not_held`",
+        ),
+        (lambda record: record["grasps"].append(record["grasps"][0]), "the same id"),
     ],
 )
-def test_what_is_no_baseline_is_refused_with_the_field(tmp_path, text, message):
-    path = write_text(tmp_path / "b.json", text)
+def test_what_is_no_baseline_is_refused_with_the_field(tmp_path, change, message):
+    path = write_text(tmp_path / "b.json", BEFORE.text())
+    changed(path, change)
     with pytest.raises(gc.InputError, match=message) as raised:
         read_baseline(path)
     assert str(raised.value).startswith(f"{path}: ")

@@ -6,47 +6,24 @@ import math
 import pytest
 
 from sim_validate.baselines.baseline import Baseline, Entry, How, VerdictFigures
-from sim_validate.baselines.compare import (
-    OTHER_VERSIONS,
-    Carried,
-    Status,
-    compare,
-    failing,
-)
+from sim_validate.baselines.compare import OTHER_VERSIONS, Carried, Status, compare, failing
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.kit.files import AboutObject
 from sim_validate.settings import HoldProtocol
 
 FIGURES = VerdictFigures(
-    outcome=Outcome.HELD,
-    wrenches=13,
-    not_held=(),
-    controls=4,
-    controls_held=0,
-    mismatches=0,
-    predicted_critical_friction=0.2,
-    simulated_critical_friction=0.2001,
-    limit_n=3.0,
-    simulated_limit_n=2.99,
-    displacement_m=1e-5,
-    rotation_rad=1e-4,
-    noisy_trials=100,
-    noisy_not_held=(3, 50),
-    noisy_close=(7, 50),
-)
+    outcome=Outcome.HELD, wrenches=13, not_held=(), controls=4, controls_held=0, mismatches=0,
+    predicted_critical_friction=0.2, simulated_critical_friction=0.2001,
+    limit_n=3.0, simulated_limit_n=2.99, displacement_m=1e-5, rotation_rad=1e-4,
+    noisy_trials=100, noisy_not_held=(3, 50), noisy_close=(7, 50),
+)  # fmt: skip
 ENTRY = Entry("c-0-1-2-3", "1f", FIGURES)
 BEFORE = Baseline(
-    grasps_file="grasps.json",
-    limit=None,
-    object=AboutObject("wedge", "", "ab"),
-    friction=0.5,
-    planned_radius_m=None,
-    settings=How(),
+    grasps_file="grasps.json", limit=None, object=AboutObject("wedge", "", "ab"), friction=0.5,
+    planned_radius_m=None, settings=How(), arithmetic="as here", entries=(ENTRY,),
     versions={"graspproof": "1", "mujoco": "4.0.0", "machine": "x86_64", "numpy": "2"},
-    arithmetic="as here",
-    entries=(ENTRY,),
-)
+)  # fmt: skip
 OTHERS = {"versions": {**BEFORE.versions, "mujoco": "4.1.0"}}
 OTHER_ARITHMETIC = {"arithmetic": "as elsewhere"}
 SLIPPED = {"outcome": Outcome.SLIPPED, "not_held": ("weakest",)}

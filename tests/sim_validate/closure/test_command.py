@@ -21,15 +21,12 @@ def planned(wedge_plan, tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def verdict(planned, capsys):
+def verdict(planned, answer):
     """Validates with flags; answers with the one verdict."""
 
     def validated(*flags, code=Exit.GOOD):
-        assert (
-            main(["validate", str(planned / "grasps.json"), "--limit", "1", *flags, "--json"])
-            == code
-        )
-        (found,) = json.loads(capsys.readouterr().out)["verdicts"]
+        asked = ["validate", planned / "grasps.json", "--limit", "1", *flags]
+        (found,) = answer(*asked, code=code)["verdicts"]
         return found
 
     return validated

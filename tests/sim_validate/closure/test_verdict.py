@@ -10,7 +10,7 @@ import grasp_core as gc
 import sim_validate as sv
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
-from tests.sim_validate.changing import changed
+from tests.sim_validate.changing import at, changed
 
 
 @pytest.fixture(scope="module")
@@ -43,30 +43,15 @@ def test_verdicts_are_a_table(folder):
     assert (table["simulated_critical_friction"] > 0.0).all()
 
 
-def _slipped(document):
-    document["verdicts"][0]["wrenches"][2]["outcome"] = "slipped"
-
-
-def _control(document):
-    document["verdicts"][0]["controls"][0]["held"] = True
-
-
-def _repeated(document):
-    document["verdicts"][0]["robustness"]["held"] = 1
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda each: each["verdicts"][0].update(held=False), r"verdicts\[0\].held: false contrad"),
-        (lambda each: each["verdicts"][0].update(outcome="slipped"), "outcome: 'slipped' contra"),
-        (_slipped, r"verdicts\[0\].outcome: 'held' contradicts"),
-        (_control, r"controls\[0\].held: true contradicts"),
-        (_repeated, "robustness.held: 1 contradicts"),
-        (
-            lambda each: each["summary"].update(controls_let_go=0),
-            "summary.controls_let_go: 0 contr",
-        ),
+        (at("verdicts", 0, held=False), r"verdicts\[0\].held: false contradicts"),
+        (at("verdicts", 0, outcome="slipped"), "outcome: 'slipped' contradicts"),
+        (at("verdicts", 0, "wrenches", 2, outcome="slipped"), "outcome: 'held' contradicts"),
+        (at("verdicts", 0, "controls", 0, held=True), r"controls\[0\].held: true contradicts"),
+        (at("verdicts", 0, "robustness", held=1), "robustness.held: 1 contradicts"),
+        (at("summary", controls_let_go=0), "summary.controls_let_go: 0 contradicts"),
         (lambda each: each["verdicts"].pop(), "summary.grasps: 2 contradicts"),
     ],
     ids=["held", "outcome", "trial", "control", "repeats", "summary", "one fewer"],

@@ -9,10 +9,9 @@ import pytest
 import trimesh
 
 import grasp_core as gc
-from scenes.example_objects import example_object
 from sim_validate import load_dataset
 from sim_validate.datasets.build import build
-from sim_validate.datasets.open_dataset import mesh_text, read_manifest, write_manifest
+from sim_validate.datasets.open_dataset import read_manifest, write_manifest
 from sim_validate.datasets.verify import verify
 from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.configs import CONFIG, rows_of
@@ -80,24 +79,6 @@ def leaning(rows):
 def test_rows_that_contradict_each_other_are_named(copy, name, change, message):
     forged(copy, name, change)
     assert any(message in fault for fault in verify(copy))
-
-
-@pytest.mark.slow
-def test_a_dataset_of_tiny_triangles_verifies(tmp_path):
-    """A fine mesh of an object of 3 mm, turned: areas of 5e-9 square metres."""
-    solid = example_object("tetrahedron")
-    points, corners = solid.vertices, solid.triangles
-    for _ in range(4):
-        points, corners = trimesh.remesh.subdivide(points, corners)
-    turn = trimesh.transformations.rotation_matrix(1.0, [1.0, 2.0, 3.0])[:3, :3]
-    points = 1.5e-3 / solid.radius * points @ turn
-    mesh = tmp_path / "tiny.obj"
-    mesh.write_text(mesh_text(gc.Polyhedron.from_mesh(points, corners)))
-    config = dataclasses.replace(CONFIG, objects=(str(mesh),), frictions=(0.5,))
-    built = build(config, tmp_path / "ds", Here(), silent)
-    assert built.manifest.rows["objects"] == 1
-    assert built.manifest.rows["grasps"] >= 2
-    assert verify(tmp_path / "ds") == []
 
 
 def shifted(rows, column):

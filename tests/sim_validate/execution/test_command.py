@@ -178,10 +178,9 @@ def test_flags_that_make_no_sense_are_refused_before_anything_runs(here, capsys,
 RUN = ["run", "tetrahedron", "--limit", "1", "--no-report", "--out", "r"]
 
 
-def test_run_executes_grasps_too_and_a_run_without_removes_the_file(here, capsys):
+def test_run_executes_grasps_too_and_a_run_without_removes_the_file(here, answer):
     flags = ["--execute", "--mass-kg", "0.1", "--trials", "stop", "--seed", "3"]
-    assert main([*RUN, *flags, "--json"]) == Exit.GOOD
-    document = json.loads(capsys.readouterr().out)
+    document = answer(*RUN, *flags)
     written = json.loads((here / "r" / "executions.json").read_text())
     assert document.pop("executions") == written
     assert document == json.loads((here / "r" / "verdicts.json").read_text())

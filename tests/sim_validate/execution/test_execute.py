@@ -111,18 +111,6 @@ def test_trials_of_no_size_are_left_out_with_a_reason(kind, setting):
     assert found.skipped == (Skipped(kind, f"its size is 0 ({setting}, --{flag})"),)
 
 
-def test_friction_counts_for_each_contact():
-    """One with less is the first to slip."""
-    settings = sv.ExecutionSettings(0.2, trials=("weight",), tip_radius_m=0.005)
-    equal, worse = (
-        sv.execute(box(), opposed(), friction, settings) for friction in (0.4, [0.4, 0.4, 0.2, 0.2])
-    )
-    assert worse.load_multiple < equal.load_multiple
-    for found in (equal, worse):
-        (trial,) = found.trials
-        assert trial.simulated_first_slip == pytest.approx(trial.predicted_first_slip, rel=0.02)
-
-
 @pytest.mark.parametrize("name", ["l-bracket", pytest.param("mug", marks=pytest.mark.slow)])
 def test_objects_that_are_not_convex_are_held_on_their_own_surfaces(name):
     body, grasp = planned(name)

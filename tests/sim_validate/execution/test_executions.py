@@ -17,6 +17,7 @@ from sim_validate.execution.verdict import (
     ended,
 )
 from sim_validate.settings import ExecutionSettings
+from tests.sim_validate.changing import at
 from tests.sim_validate.execution.executed import (
     BODY,
     ENOUGH,
@@ -65,32 +66,33 @@ def test_the_file_holds_the_impulse_that_was_used():
     assert usual.settings.knock_n_s == 0.05
 
 
-def of_trial(**changes):
-    return lambda document: document["executions"][0]["trials"][0].update(changes)
-
-
-def of_first(**changes):
-    return lambda document: document["executions"][0].update(changes)
-
-
 BAD = {
     "slip": (
-        of_trial(slip_m=None),
+        at("executions", 0, "trials", 0, slip_m=None),
         r"trials\[0\]: trial lift: slip_m, displacement_m and turn_rad are infinite",
     ),
-    "fell": (of_trial(survived=True), r"trial lift: survived is false where the fate is dropped"),
-    "opposite": (of_first(survived=True), r"executions\[0\]\.survived: true contradicts"),
+    "fell": (
+        at("executions", 0, "trials", 0, survived=True),
+        r"trial lift: survived is false where the fate is dropped",
+    ),
+    "opposite": (
+        at("executions", 0, survived=True),
+        r"executions\[0\]\.survived: true contradicts",
+    ),
     "one finger": (
-        of_first(squeeze_n=[[1, 0, 0]], tip_radius_m=[0.004]),
+        at("executions", 0, squeeze_n=[[1, 0, 0]], tip_radius_m=[0.004]),
         r"executions\[0\]\.squeeze_n must have a force for each contact, at least two, got 1",
     ),
-    "reason": (of_first(reason="heavy"), r"executions\[0\]: .* an execution, or a reason .* both"),
+    "reason": (
+        at("executions", 0, reason="heavy"),
+        r"executions\[0\]: .* an execution, or a reason .* both",
+    ),
     "neither": (
-        lambda d: d["executions"][2].update(reason=None),
+        at("executions", 2, reason=None),
         r"executions\[2\]: .* an execution, or a reason .* neither",
     ),
     "radii": (
-        of_first(tip_radius_m=[0.004] * 3),
+        at("executions", 0, tip_radius_m=[0.004] * 3),
         r"executions\[0\]\.tip_radius_m must have one entry for each of the 4 of squeeze",
     ),
     "needless": (

@@ -1,6 +1,5 @@
 """The command `hand`: what a hand was read as."""
 
-import json
 import math
 import re
 from pathlib import Path
@@ -17,9 +16,8 @@ def words(tmp_path):
     return ["hand", three_fingers_file(tmp_path), "--fingertips", ",".join(THREE_TIPS)]
 
 
-def test_every_joint_and_fingertip_of_a_file_is_shown(words, capsys):
-    assert main([*words, "--json"]) == Exit.GOOD
-    facts = json.loads(capsys.readouterr().out)
+def test_every_joint_and_fingertip_of_a_file_is_shown(words, answer):
+    facts = answer(*words)
     assert [finger["name"] for finger in facts["fingers"]] == list(THREE_TIPS)
     assert [finger["tip"]["radius_m"] for finger in facts["fingers"]] == pytest.approx([0.008] * 3)
     assert [len(finger["links"]) for finger in facts["fingers"]] == [2, 3, 3]

@@ -1,6 +1,5 @@
 """The command `reach`: its file, its exit codes, and what it refuses."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -37,16 +36,13 @@ def test_it_writes_poses_that_are_in_force_closure(bracket_plan, tmp_path, capsy
         assert each.used.tolist() == [0, 1, 2, 3]
 
 
-def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path, capsys):
+def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path, answer):
     """A hand whose fingers all bend the same way cannot enclose anything."""
     path = tmp_path / "plain.xml"
     path.write_text(hand_mjcf(plain_hand()))
     tips = ",".join(f"f{i}_tip" for i in range(4))
-    code = main(["reach", str(bracket_plan), "--hand", str(path), "--fingertips", tips,
-                 "--limit", "1", "--starts", "5", "--json"])  # fmt: skip
-    answer = json.loads(capsys.readouterr().out)
-    assert code == Exit.NEGATIVE
-    (only,) = answer["reaches"]
+    asked = ["--hand", path, "--fingertips", tips, "--limit", "1", "--starts", "5"]
+    (only,) = answer("reach", bracket_plan, *asked, code=Exit.NEGATIVE)["reaches"]
     assert only["joints_rad"] is None
     assert "no pose was found" in only["explanation"]
 

@@ -181,12 +181,11 @@ def test_center_and_scale_are_the_contacts_own_unless_given(analyze):
     assert flagged["center_from"] == "file"
 
 
-def test_grasps_of_a_plan_are_measured_by_their_object(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_grasps_of_a_plan_are_measured_by_their_object(answer, capsys):
     assert main(["plan", "wedge", "--limit", "3", "--out", "p", "-q"]) == Exit.GOOD
     planned = json.loads(Path("p/grasps.json").read_text())
-    assert main(["analyze", "p/grasps.json", "--json"]) == Exit.GOOD
-    document = json.loads(capsys.readouterr().out)
+    document = answer("analyze", "p/grasps.json")
     assert len(document["grasps"]) == 3
     center = planned["object"]["center_of_mass_m"]
     vertices = np.array(planned["object"]["mesh"]["vertices_m"])

@@ -8,7 +8,7 @@ from grasp_core.files.text_files import write_text
 from sim_validate.baselines.compare import Status
 from sim_validate.baselines.suite import suite_from_toml
 from sim_validate.pytest_plugin import MOST_TOLD, sections
-from tests.sim_validate.changing import changed
+from tests.sim_validate.changing import at, changed
 from tests.sim_validate.plugin.project import copied, properties_in, run_pytest, run_pytest_alone
 
 CODE = """
@@ -58,7 +58,7 @@ def test_a_grasp_that_slips_says_at_which_wrench(blessed, tmp_path):
     copied(blessed, tmp_path)
     baseline = tmp_path / "wedge.baseline.json"
     push = {"name": "far too much", "wrench": [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]}
-    changed(baseline, lambda record: record["settings"].update(wrenches=[push]))
+    changed(baseline, at("settings", wrenches=[push]))
     code, said = run_pytest(tmp_path)
     assert code == 1
     assert "outcome: held -> slipped" in said

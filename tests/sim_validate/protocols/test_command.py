@@ -9,7 +9,7 @@ from sim_validate.hands.dexgraspbench import load_dex_record
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.protocols.verdict import Judgements
-from tests.sim_validate.changing import changed
+from tests.sim_validate.changing import at, changed
 
 
 def finite(document):
@@ -86,8 +86,8 @@ def judged(wedge_plan, tmp_path_factory):
 @pytest.mark.parametrize(
     ("change", "said"),
     [(lambda record: record["judgements"][0].pop("closed"), "closed"),
-     (lambda record: record["object"].update(content_sha256="0"), "another object"),
-     (lambda record: record["summary"]["dexonomy"].update(more=1), "summary")],
+     (at("object", content_sha256="0"), "another object"),
+     (at("summary", "dexonomy", more=1), "summary")],
     ids=["field", "object", "unknown"],
 )  # fmt: skip
 def test_a_report_refuses_judgements_that_do_not_fit(change, said, judged, tmp_path, capsys):

@@ -8,10 +8,6 @@ from sim_validate.protocols.published import protocol
 AXES = {(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)}
 
 
-def directions(test, mass_kg=1.0):
-    return {tuple(np.round(f / np.linalg.norm(f)).astype(int)) for f in test.forces(mass_kg)}
-
-
 def test_dexgraspbench_is_its_file():
     """eval.yaml: obj_mass 0.1, miu_coef 0.6 and 0.02, trans_thre 0.05, angle_thre 15, max_pene
     0.01. fc_mocap.py: 10 times the mass, six directions, ten looks after 50 steps of 4 ms each.
@@ -22,7 +18,7 @@ def test_dexgraspbench_is_its_file():
     assert test.passing.most_overlap_m == 0.01
     assert test.passing.fingers == 0
     assert test.close_s == test.squeeze_s == pytest.approx(10 * 10 * 0.004)
-    assert directions(test) == AXES
+    assert {tuple(way) for way in np.sign(np.round(test.forces(1.0), 9))} == AXES
     assert len(test.runs) == 6
     for (step,) in test.runs:
         assert np.linalg.norm(step.force(0.1)) == pytest.approx(10 * 0.1)
@@ -41,23 +37,3 @@ def test_contacts_of_dexgraspbench_are_the_mean_of_a_hands_and_an_objects():
     assert physics.solref == pytest.approx(np.mean([[0.005, 1.0], [0.02, 1.0]], axis=0))
     both = [[0.5, 0.99, 0.0001, 0.5, 2.0], [0.9, 0.95, 0.001, 0.5, 2.0]]
     assert physics.solimp == pytest.approx(np.mean(both, axis=0))
-
-
-def test_the_paper_has_a_lighter_object_and_softer_joints():
-    """Branch baseline: obj_mass 0.03; README: kp was 1, and is 5."""
-    paper, main = protocol("dexgraspbench-paper"), protocol("dexgraspbench")
-    assert (paper.mass_kg, paper.servo_n_m_per_rad) == (0.03, 1.0)
-    assert np.linalg.norm(paper.forces(0.03), axis=1) == pytest.approx(0.3)
-    assert (paper.passing, paper.physics, paper.runs) == (main.passing, main.physics, main.runs)
-
-
-def test_dexonomy_is_its_file():
-    """eval.yaml: 0.05 m and 15 deg; mujoco_env.py: 9.8 times the mass, ten looks after 50 steps of
-    4 ms each, and five commands of five steps for each stage."""
-    test = protocol("dexonomy")
-    assert (test.mass_kg, test.friction, test.physics.torsion_m) == (0.1, 0.6, 0.02)
-    assert (test.passing.most_m, test.passing.most_deg) == (0.05, 15.0)
-    assert test.close_s == test.squeeze_s == pytest.approx(5 * 5 * 0.004)
-    assert directions(test) == AXES
-    assert {step.seconds for run in test.runs for step in run} == {2.0}
-    assert np.linalg.norm(test.forces(0.1), axis=1) == pytest.approx(0.98)

@@ -26,11 +26,9 @@ def nowhere(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
 
 
-def test_files_are_written_and_listed(wedge_plan, tmp_path, capsys):
+def test_files_are_written_and_listed(wedge_plan, tmp_path, answer):
     picture, page = tmp_path / "new" / "a.svg", tmp_path / "new" / "a.html"
-    asked = ["view", str(wedge_plan), "--picture", str(picture), "--page", str(page), "--json"]
-    assert main(asked) == Exit.GOOD
-    shown = json.loads(capsys.readouterr().out)
+    shown = answer("view", wedge_plan, "--picture", picture, "--page", page)
     first = json.loads(wedge_plan.read_text())["grasps"][0]["id"]
     assert shown == {"id": first, "files": [str(picture), str(page)]}
     assert picture.read_text().startswith("<svg ")

@@ -30,7 +30,7 @@ from sim_validate.report.report import write_report
 from sim_validate.report.run_folder import runs_in, said_of_both
 from sim_validate.report.sections import execute_command
 from sim_validate.settings import ExecutionSettings
-from tests.sim_validate.changing import changed, slipped
+from tests.sim_validate.changing import at, changed, slipped
 from tests.sim_validate.execution.executed import execution, trial
 from tests.sim_validate.report.test_report import EVIL, Page
 
@@ -190,9 +190,9 @@ def test_a_control_that_held_is_bad_news(copy, tmp_path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda each: each["object"].update(content_sha256="0"), "another object than grasps.json"),
-        (lambda each: each["executions"][0].update(contacts_sha256="0"), "contacts of .* differ"),
-        (lambda each: each["executions"][0].update(survived=True), r"executions\[0\].survived"),
+        (at("object", content_sha256="0"), "another object than grasps.json"),
+        (at("executions", 0, contacts_sha256="0"), "contacts of .* differ"),
+        (at("executions", 0, survived=True), r"executions\[0\].survived"),
     ],
 )  # fmt: skip
 def test_files_of_other_runs_are_refused(copy, change, says):
@@ -219,8 +219,7 @@ def test_names_and_reasons_are_escaped(copy, tmp_path):
 
 def test_clips_that_were_made_are_shown(copy, tmp_path, monkeypatch):
     finer = PhysicsSettings(timestep=0.001)
-    changed(copy / "executions.json",
-            lambda each: each["executions"][0].update(physics=asdict(finer)))  # fmt: skip
+    changed(copy / "executions.json", at("executions", 0, physics=asdict(finer)))
 
     def film(job, name, path):
         assert (job.friction, job.settings, job.physics["timestep"]) == (0.4, SETTINGS, 0.001)

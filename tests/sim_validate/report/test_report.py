@@ -19,7 +19,7 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
 from sim_validate.report.run_folder import said_of
-from tests.sim_validate.changing import changed, changed_verdicts, slipped
+from tests.sim_validate.changing import at, changed, changed_verdicts, slipped
 
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
 
@@ -161,7 +161,7 @@ def spoiled(found):
 
 @pytest.mark.usefixtures("no_pictures")
 def test_names_are_escaped(copy, tmp_path):
-    changed(copy / "grasps.json", lambda each: each["object"].update(name=EVIL))
+    changed(copy / "grasps.json", at("object", name=EVIL))
     changed_verdicts(copy / "verdicts.json", spoiled)
     changed(copy / "regions.json", without_proofs)
     index = write_report(copy, tmp_path / "out", jobs=1).index
@@ -218,7 +218,7 @@ def test_several_runs_make_one_report(copy, tmp_path):
     both = tmp_path / "both"
     shutil.copytree(copy, both / "b")
     shutil.copytree(copy, both / "a")
-    changed(both / "b" / "grasps.json", lambda each: each["object"].update(name="other"))
+    changed(both / "b" / "grasps.json", at("object", name="other"))
     (both / "empty").mkdir()
     report = write_report(both, jobs=1, limit=1)
     assert report.grasps == 2
@@ -274,7 +274,7 @@ def test_pages_are_not_put_among_other_things(copy, tmp_path, capsys):
 
 @pytest.mark.usefixtures("no_pictures")
 def test_regions_for_more_friction_are_not_shown(copy, tmp_path):
-    changed(copy / "regions.json", lambda each: each.update(friction=0.6))
+    changed(copy / "regions.json", at(friction=0.6))
     pages = pages_of(write_report(copy, tmp_path / "out", jobs=1, limit=1).index.parent)
     said = " ".join(next(page for path, page in pages.items() if path.stem != "index").said)
     assert "Certified regions are for friction 0.6: not shown" in said
@@ -294,9 +294,9 @@ def test_bad_news_has_a_name(small_run):
 @pytest.mark.parametrize(
     ("file", "change", "says"),
     [
-        ("verdicts.json", lambda each: each["object"].update(content_sha256="0"), "another object"),
-        ("verdicts.json", lambda each: each["verdicts"][0].update(contacts_sha256="0"), "contradi"),
-        ("regions.json", lambda each: each["grasps"][0].update(contacts_sha256="0"), "contacts"),
+        ("verdicts.json", at("object", content_sha256="0"), "another object"),
+        ("verdicts.json", at("verdicts", 0, contacts_sha256="0"), "contradicts"),
+        ("regions.json", at("grasps", 0, contacts_sha256="0"), "contacts"),
     ],
 )  # fmt: skip
 def test_files_that_are_not_ours_are_refused(copy, file, change, says):
