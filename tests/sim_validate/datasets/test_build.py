@@ -149,18 +149,6 @@ def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeyp
     assert not engine.submitted
 
 
-def test_two_builds_do_not_work_in_one_folder(tmp_path):
-    def another(_):
-        with pytest.raises(gc.InputError, match="another command is writing to it"):
-            build(one, tmp_path / "ds", Here(), silent)
-        tried.append(1)
-
-    tried = []
-    one = dataclasses.replace(CONFIG, objects=("tetrahedron",), frictions=(0.5,))
-    build(one, tmp_path / "ds", Here(another), silent)
-    assert len(tried) == 1
-
-
 def test_a_dataset_of_other_settings_is_left_alone(copy):
     with pytest.raises(gc.InputError, match="made with other settings"):
         build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)

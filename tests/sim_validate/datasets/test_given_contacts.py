@@ -16,6 +16,7 @@ from sim_validate.datasets.verify import verify
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.sim_validate.datasets.engines import Here, silent
+from tests.sim_validate.planning.test_analyze import contacts
 
 pytest.importorskip("pyarrow")
 BODY = example_object("wedge")
@@ -27,16 +28,7 @@ def planned():
 
 
 def contacts_file(path, grasps):
-    listed = [
-        {
-            "id": name,
-            "contacts": [
-                {"position_m": list(p), "normal": list(n)}
-                for p, n in zip(points, normals, strict=True)
-            ],
-        }
-        for name, points, normals in grasps
-    ]
+    listed = [{"id": name, "contacts": contacts(*where)} for name, *where in grasps]
     path.write_text(json.dumps({"grasps": listed}))
     return path
 
@@ -92,15 +84,10 @@ def test_what_is_open_lets_go_and_what_is_off_the_object_is_not_tried(planned, t
     corner = face.polygon[0] - face.centroid
     spots = face.centroid + np.outer([0.1, -0.1, 0.2, -0.2], corner)
     far = good.positions + np.array([1.0, 0.0, 0.0])
-    path = contacts_file(
-        tmp_path / "g.json",
-        [
-            ("../../good", good.positions, good.normals),
-            ("one face", spots, [face.normal] * 4),
-            ("far", far, good.normals),
-            ("turned", good.positions, -good.normals),
-        ],
-    )
+    path = contacts_file(tmp_path / "g.json", [
+        ("../../good", good.positions, good.normals), ("one face", spots, [face.normal] * 4),
+        ("far", far, good.normals), ("turned", good.positions, -good.normals),
+    ])  # fmt: skip
     found = judged(tmp_path / "ds", path)
     assert list(found["name"]) == ["../../good", "one face", "far", "turned"]
     np.testing.assert_array_equal(found["held"], [1.0, 0.0, np.nan, np.nan])
@@ -130,20 +117,12 @@ def test_three_contacts_and_two_objects_are_refused(tmp_path):
 
 
 def test_a_bad_row_is_named_by_its_file_and_its_number(planned, tmp_path):
-    points = np.array([grasp.positions for grasp in planned])
-    normals = np.array([grasp.normals for grasp in planned])
-    long = normals * np.array([1, 2])[:, None, None]
-    rows = zip("ab", points, long, strict=True)
-    with pytest.raises(
-        gc.InputError, match=r"g.json: grasps\[1\].contacts\[\d\].normal: its length"
+    one, two = planned
+    good = ("a", one.positions, one.normals)
+    for bad, said in (
+        (("b", two.positions, 2.0 * two.normals), r"contacts\[\d\].normal: its length"),
+        (("b", 1e-12 * two.positions, two.normals), "contacts: the contacts are .* m"),
     ):
-        read_given(contacts_file(tmp_path / "g.json", rows))
-    rows = [("a", points[0], normals[0]), ("b", 1e-12 * points[1], normals[1])]
-    with pytest.raises(gc.InputError, match=r"g.json: grasps\[1\].contacts: the contacts are .* m"):
-        read_given(contacts_file(tmp_path / "g.json", rows))
-    document = json.loads(contacts_file(tmp_path / "g.json", rows[:1] * 2).read_text())
-    document["grasps"][1].update(id="c")
-    document["grasps"][1]["contacts"][2]["friction"] = 0.3
-    (tmp_path / "g.json").write_text(json.dumps(document))
-    with pytest.raises(gc.InputError, match=r"g.json: grasps\[1\] \(c\): friction: remove it"):
-        read_given(tmp_path / "g.json")
+        path = contacts_file(tmp_path / "g.json", [good, bad])
+        with pytest.raises(gc.InputError, match=rf"g.json: grasps\[1\].{said}"):
+            read_given(path)

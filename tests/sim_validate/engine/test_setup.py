@@ -18,10 +18,8 @@ from sim_validate.engine.setup import (
     [
         ("[physics]\ntimestp = 0.001\n", r"physics: no setting is named .timestp.*timestep"),
         ("timestep = 0.001\n", "no setting is named .timestep.; choose from fingers, physics"),
-        ("[hold]\nload_share = 2.0\n", "load_share must be a number from 0.1 up to 0.999"),
         ("[physics]\ngravity = [0.0, 0.0, -9.81]\n", r"gravity must be zero.*--weight-n"),
         ("[physics]\ncondim = 4\n", r"setup.toml: physics.condim must be 3"),
-        ("[physics\n", "not TOML"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said(tmp_path, text, words):

@@ -32,21 +32,6 @@ def test_a_table_says_how_objects_are_executed():
     assert of_table({"mass_kg": 2}).for_body(wedge) == sv.ExecutionSettings(mass_kg=2.0)
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ("soft", "execution: expected a table of settings, got 'soft'"),
-        ({"mass_kg": 1.0, "density_kg_m3": 1.0}, "execution: mass_kg and density_kg_m3 exclude"),
-        ({"mass_kg": 1.0, "left": 1}, "execution: no setting is named 'left'"),
-        ({"density_kg_m3": True}, "execution.density_kg_m3 must be a number"),
-    ],
-)
-def test_what_is_refused_names_the_setting(table, message):
-    with pytest.raises(gc.InputError) as raised:
-        of_table(table)
-    assert message in str(raised.value)
-
-
 def test_trials_are_put_in_order_and_counted_once():
     chosen = sv.ExecutionSettings(0.1, trials=["knock", "lift", "knock"])
     assert chosen.trials == ("lift", "knock")

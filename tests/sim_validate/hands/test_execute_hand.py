@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import grasp_core as gc
 import sim_validate as sv
-from grasp_core.errors import InputError
 from sim_validate.hands.trials import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, stood
@@ -49,14 +47,3 @@ def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost():
     )
     assert not found.survived
     assert found.least_predicted_loss < 1.0
-
-
-def test_what_cannot_be_executed_is_refused():
-    reach, hand = stood("allegro")
-    body = scaled(OBJECT, RADIUS)
-    with pytest.raises(InputError, match="expected mass_kg or settings"):
-        sv.execute_hand(hand, body, reach, FRICTION)
-    with pytest.raises(InputError, match="torque limit for each joint"):
-        sv.execute_hand(gc.load_hand("allegro"), body, reach, FRICTION, mass_kg=MASS)
-    with pytest.raises(InputError, match="not in force closure"):
-        sv.execute_hand(hand, body, reach, 0.001, mass_kg=MASS)

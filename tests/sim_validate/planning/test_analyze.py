@@ -1,7 +1,7 @@
 """The command `analyze`: what it reads and refuses, and what it says of contacts."""
 
-import copy
 import json
+import math
 import re
 from pathlib import Path
 
@@ -266,34 +266,21 @@ def test_normals_are_turned_where_they_point_outward_and_made_unit_vectors(analy
     assert normals == pytest.approx(TETRA_NORMALS, abs=1e-12)
 
 
-def changed(place, value):
-    """The file of the tetrahedron with one entry set, or removed where the value is `...`."""
-    file = copy.deepcopy(TETRAHEDRON)
-    owner = file
-    for key in place[:-1]:
-        owner = owner[key]
-    if value is ...:
-        del owner[place[-1]]
-    else:
-        owner[place[-1]] = value
-    return file
-
-
-ONE = TETRAHEDRON["contacts"][0]
+ONE, TWO, *_ = TETRAHEDRON["contacts"]
 
 
 @pytest.mark.parametrize(
     ("content", "words"),
     [
         ("[1]", "a contacts file must hold one JSON object, got a list"),
-        (changed(["friction"], None), "friction: null is not allowed; give a value, or leave the"),
+        (TETRAHEDRON | {"friction": None}, "friction: null is not allowed; give a value"),
         ("{}", '"contacts" (one grasp) or "grasps" (several)'),
         (TETRAHEDRON | {"grasps": [{"contacts": [ONE, ONE]}]}, '"contacts" (one grasp)'),
-        (changed(["friction"], ...), 'contacts[0].friction: the key is missing; give it there'),
-        (changed(["mu"], 0.5), "no field is named 'mu'; choose from contacts, grasps, friction"),
-        (changed(["contacts"], [ONE] * 3), "all contacts lie within"),
-        (changed(["contacts", 2, "normal"], [0, 0, 1.01]), "contacts[2].normal: its length must"),
-        (changed(["contacts", 3, "normal", 0], float("nan")), "contacts[3].normal[0]: expected a"),
+        ({"contacts": TETRAHEDRON["contacts"]}, 'contacts[0].friction: the key is missing'),
+        (TETRAHEDRON | {"mu": 0.5}, "no field is named 'mu'; choose from contacts, grasps"),
+        (TETRAHEDRON | {"contacts": [ONE] * 3}, "all contacts lie within"),
+        ({"contacts": [ONE, TWO | {"normal": [0, 0, 1.01]}]}, "contacts[1].normal: its length"),
+        ({"contacts": [ONE, TWO | {"normal": [math.nan, 0, 1]}]}, "contacts[1].normal[0]: expected a"),
         ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]},
          "grasps[0].contacts[1].normal must have shape (3,)"),
         ({"grasps": [{"id": "1", "contacts": [ONE, ONE]}, {"contacts": [ONE, ONE]}]},

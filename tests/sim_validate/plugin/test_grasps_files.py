@@ -107,7 +107,7 @@ def test_settings_that_the_baseline_was_not_made_with_are_not_compared(blessed, 
     copied(blessed, tmp_path)
     task = {"wrenches": [{"name": "lift", "force_n": [0, 0, -0.1]}]}
     write_text(tmp_path / "task.json", json.dumps(task))
-    write_text(tmp_path / "setup.toml", "[hold]\nhold_s = 0.3\n")
+    write_text(tmp_path / "setup.toml", "[fingers]\nfingertip_radius_m = 0.003\n")
     path = write_text(
         tmp_path / "wedge.grasps.toml",
         'grasps = "grasps.json"\nrepeats = 2\nseed = 5\nwrenches = "task.json"\n'
@@ -118,37 +118,31 @@ def test_settings_that_the_baseline_was_not_made_with_are_not_compared(blessed, 
     assert finding.status is Status.NOT_COMPARABLE
     said = " ".join(finding.reasons)
     for reason in ("repeats: 0 -> 2", "seed: 0 -> 5", "wrenches.lift: None -> ",
-                   "setup.hold.hold_s: 0.4 -> 0.3"):  # fmt: skip
+                   "setup.fingers.fingertip_radius_m: None -> 0.003"):  # fmt: skip
         assert reason in said
 
 
-@pytest.mark.slow
-def test_other_projects_see_nothing_of_it_and_import_nothing_heavy(tmp_path):
-    write_text(
-        tmp_path / "conftest.py",
-        """
+SEEN = """
 def pytest_runtest_logreport(report):
     assert not any("grasp" in name for name in vars(report)), vars(report)
-""",
-    )
-    write_text(
-        tmp_path / "test_plain.py",
-        """
+"""
+PLAIN = """
 import sys
 
 def test_nothing_heavy_is_imported():
     assert not {"numpy", "mujoco", "tyro"} & set(sys.modules)
-""",
-    )
+"""
+
+
+@pytest.mark.slow
+def test_other_projects_see_nothing_of_it_and_import_nothing_heavy(tmp_path):
+    files = {"conftest.py": SEEN, "test_plain.py": PLAIN}
+    for name, text in files.items():
+        write_text(tmp_path / name, text)
     code, said = run_pytest_alone(tmp_path, "-W", "error")
     assert code == 0, said
-    after = said.split("collected 1 item")[1]
-    assert "grasp" not in after
-    assert {path.name for path in tmp_path.iterdir()} <= {
-        "conftest.py",
-        "test_plain.py",
-        "__pycache__",
-    }
+    assert "grasp" not in said.split("collected 1 item")[1]
+    assert {path.name for path in tmp_path.iterdir()} <= {*files, "__pycache__"}
 
 
 NOTE = "part.obj has changed: face 3 moved"

@@ -9,7 +9,6 @@ import pytest
 from grasp_core.errors import InputError
 from scenes.drawing.pages import UNITS
 from scenes.drawing.sheets import FINGERS, HAND
-from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
@@ -41,17 +40,6 @@ def changed_run(folder, change):
     run_with_hand(folder)
     changed(folder / "reaches.json", change)
     return folder
-
-
-def test_the_file_holds_the_hand_and_what_was_found(run):
-    _, grasp, hand, reach = standing()
-    saved = Reaches.read(run / "reaches.json")
-    assert saved.hand == hand
-    assert saved[grasp.id].reach == reach
-    assert saved[grasp.id].reach.certificate.verify()
-    assert not saved[OTHER].reach.reached
-    assert (saved.summary["reached"], len(saved)) == (1, 2)
-    assert saved.finger_names(reach) == ("thumb", "ring", "first", "middle")
 
 
 def test_cards_show_the_hand_where_it_stands(report):

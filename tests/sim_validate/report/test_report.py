@@ -14,11 +14,9 @@ from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import load_grasps
 from scenes.drawing.pages import UNITS
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.engine.traces import Outcome
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
-from sim_validate.report.run_folder import said_of
 from tests.sim_validate.changing import at, changed, changed_verdicts, slipped
 
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
@@ -279,16 +277,6 @@ def test_regions_for_more_friction_are_not_shown(copy, tmp_path):
     said = " ".join(next(page for path, page in pages.items() if path.stem != "index").said)
     assert "Certified regions are for friction 0.6: not shown" in said
     assert "Regions are certified" not in said
-
-
-def test_bad_news_has_a_name(small_run):
-    verdict = Verdicts.read(small_run / "verdicts.json")[0]
-    assert said_of(verdict) == ("held", "good")
-    assert said_of(slipped(verdict)) == ("contradicts the analysis", "bad")
-    first = verdict.wrenches[0]
-    late = replace(first, hold=replace(first.hold, outcome=Outcome.TIMEOUT))
-    late = replace(verdict, wrenches=(late, *verdict.wrenches[1:]))
-    assert said_of(late) == ("timeout", "bad")
 
 
 @pytest.mark.parametrize(
