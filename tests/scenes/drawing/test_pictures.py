@@ -49,10 +49,10 @@ def test_no_finger_points_at_the_viewer(name):
         assert min(gaps) > BAR_RADIUS * body.radius
 
 
-@pytest.mark.parametrize("family", ["concurrent", "pencil", "regulus"])
-def test_nothing_is_cut_off(family):
-    body, (grasp,) = grasps("tetrahedron", 0.3, 1, (family,), cones="tilted")
-    assert_whole(grasp_figure(body, grasp, 0.3, legend=True))
+def test_nothing_is_cut_off():
+    for family in ("concurrent", "pencil", "regulus"):
+        body, (grasp,) = grasps("tetrahedron", 0.3, 1, (family,), cones="tilted")
+        assert_whole(grasp_figure(body, grasp, 0.3, legend=True))
 
 
 def test_every_finger_is_seen(wedge, monkeypatch):

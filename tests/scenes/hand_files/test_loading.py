@@ -128,6 +128,7 @@ BAD = {
     ),
     "slide": (gripper().replace('axis="0 0 1"', 'type="slide" axis="0 0 1"'),
               ("s0", "s1", "s2", "s3"), "must be a hinge"),
+    "too large": (gripper() + " " * (4 * 2**20), ("s0", "s1", "s2"), "4 MiB"),
     "refused by MuJoCo": (gripper(extra="<nonsense/>"), ("s0", "s1", "s2"), "cannot compile"),
 }  # fmt: skip
 
@@ -138,12 +139,6 @@ def test_what_is_no_hand_is_refused_with_what_to_do(case, tmp_path):
     (tmp_path / "secret.stl").write_bytes(b"x")
     with pytest.raises(InputError, match=said):
         scenes.load_hand(written(tmp_path / "hands", text), tips)
-
-
-def test_a_file_that_is_too_large_is_refused(tmp_path):
-    path = written(tmp_path, gripper() + " " * (4 * 2**20))
-    with pytest.raises(InputError, match="4 MiB"):
-        scenes.load_hand(path, ("s0", "s1", "s2"))
 
 
 def test_meshes_in_the_folder_of_the_compiler_are_read_and_taken_as_boxes(tmp_path):

@@ -164,14 +164,16 @@ def test_a_fingertip_without_shape_is_the_nearest_of_its_link(tmp_path):
     check_places(hand, text, ("b0", "b1", "b2"), (0.0, 0.0, 0.055))
 
 
-def test_a_finger_without_any_shape_says_what_to_do(tmp_path):
-    with pytest.raises(InputError, match="a sphere of the fingertip's radius"):
-        loaded(tmp_path, robot(tip="", middle=""), TIPS)
-
-
-def test_what_simulators_add_to_urdf_is_left_out(tmp_path):
+def test_what_simulators_add_to_urdf_is_left_out_and_what_is_no_finger_is_refused(tmp_path):
     more = '<gazebo><plugin filename="libx.so" name="x"/></gazebo><transmission name="t"/>'
     assert loaded(tmp_path, robot(more=more), TIPS) == loaded(tmp_path, robot(), TIPS)
+    for text, said in (
+        (robot(tip="", middle=""), "a sphere of the fingertip's radius"),
+        (robot(follows='<mimic joint="jt{n}"/>'),
+         "jb0 must follow a joint that moves, got <mimic> of jt0"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=said):
+            loaded(tmp_path, text, TIPS)
 
 
 def test_joints_of_urdf_follow_others(tmp_path):
@@ -182,11 +184,6 @@ def test_joints_of_urdf_follow_others(tmp_path):
     # -1.2 <= 1.5 q + 0.1 <= 0.9
     assert hand.ranges[0] == pytest.approx([-1.3 / 1.5, 0.8 / 1.5])
     check_places(hand, text)
-
-
-def test_a_joint_that_follows_one_that_does_not_move_is_refused(tmp_path):
-    with pytest.raises(InputError, match="jb0 must follow a joint that moves, got <mimic> of jt0"):
-        loaded(tmp_path, robot(follows='<mimic joint="jt{n}"/>'), TIPS)
 
 
 CRANK = (

@@ -47,13 +47,6 @@ def test_analysis_and_simulation_agree_on_every_repeat(name):
     assert min(held, let_go, missed) >= 1
 
 
-def test_without_noise_every_repeat_holds():
-    body, (grasp,) = grasps("wedge", 0.5, 1)
-    found = repeated(body, grasp, 0.5, noise=STILL, repeats=2).robustness
-    assert (found.held, found.predicted) == (2, 2)
-    assert found.interval[1] == 1.0
-
-
 def test_a_load_beyond_the_limit_is_not_held_however_it_came_about():
     """Loads are 80 % of what is resisted: a mass a third larger is too much, one a tenth is not."""
     body, (grasp,) = grasps("wedge", 0.5, 1)

