@@ -102,12 +102,15 @@ def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
         return replace(found, controls=held + found.controls[1:])
 
     monkeypatch.setattr(jobs, "execution_of", kept)
-    words = ["execute", "grasps.json", "--mass-kg", "0.3", "--limit", "1", *QUICK, "--out", "."]
+    words = ["execute", "grasps.json", "--limit", "1", *QUICK, "--out", "."]
     assert main(words) == Exit.INTERNAL
     assert "control friction 0.9 did not slip, though it must" in capsys.readouterr().err
-    (grasp,) = sv.load_executions("executions.json").grasps
+    found = sv.load_executions("executions.json")
+    (grasp,) = found.grasps
     assert grasp.survived
     assert not grasp.controls_let_go
+    volume = scenes.example_object("wedge").volume  # without a mass, that of water
+    assert found.settings.mass_kg == pytest.approx(1000.0 * volume, rel=1e-8)
 
 
 @pytest.mark.usefixtures("here")
@@ -131,11 +134,6 @@ def test_what_was_done_is_kept_where_the_simulator_fails(capsys, monkeypatch):
 def settings_of(here, *flags, code=Exit.GOOD):
     assert main(["execute", "grasps.json", "--limit", "1", "--out", ".", "-q", *flags]) == code
     return sv.load_executions(here / "executions.json").settings
-
-
-def test_an_object_without_a_mass_has_the_density_of_water(here):
-    volume = scenes.example_object("wedge").volume
-    assert settings_of(here, *QUICK).mass_kg == pytest.approx(1000.0 * volume, rel=1e-8)
 
 
 def test_a_file_of_flags_and_a_file_of_physics(here):

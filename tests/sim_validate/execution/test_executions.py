@@ -67,39 +67,27 @@ def test_the_file_holds_the_impulse_that_was_used():
 
 
 BAD = {
-    "slip": (
-        at("executions", 0, "trials", 0, slip_m=None),
-        r"trials\[0\]: trial lift: slip_m, displacement_m and turn_rad are infinite",
-    ),
-    "fell": (
-        at("executions", 0, "trials", 0, survived=True),
-        r"trial lift: survived is false where the fate is dropped",
-    ),
-    "opposite": (
-        at("executions", 0, survived=True),
-        r"executions\[0\]\.survived: true contradicts",
-    ),
+    "slip": (at("executions", 0, "trials", 0, slip_m=None),
+             r"trials\[0\]: trial lift: slip_m, displacement_m and turn_rad are infinite"),
+    "fell": (at("executions", 0, "trials", 0, survived=True),
+             r"trial lift: survived is false where the fate is dropped"),
+    "opposite": (at("executions", 0, survived=True),
+                 r"executions\[0\]\.survived: true contradicts"),
     "one finger": (
         at("executions", 0, squeeze_n=[[1, 0, 0]], tip_radius_m=[0.004]),
         r"executions\[0\]\.squeeze_n must have a force for each contact, at least two, got 1",
     ),
-    "reason": (
-        at("executions", 0, reason="heavy"),
-        r"executions\[0\]: .* an execution, or a reason .* both",
-    ),
-    "neither": (
-        at("executions", 2, reason=None),
-        r"executions\[2\]: .* an execution, or a reason .* neither",
-    ),
-    "radii": (
-        at("executions", 0, tip_radius_m=[0.004] * 3),
-        r"executions\[0\]\.tip_radius_m must have one entry for each of the 4 of squeeze",
-    ),
+    "reason": (at("executions", 0, reason="heavy"),
+               r"executions\[0\]: .* an execution, or a reason .* both"),
+    "neither": (at("executions", 2, reason=None),
+                r"executions\[2\]: .* an execution, or a reason .* neither"),
+    "radii": (at("executions", 0, tip_radius_m=[0.004] * 3),
+              r"executions\[0\]\.tip_radius_m must have one entry for each of the 4 of squeeze"),
     "needless": (
         lambda d: d["executions"][1].update(enough=d["executions"][0]["enough"]),
         r"executions\[1\]\.enough must be None \(null\), as every trial was survived",
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", BAD)

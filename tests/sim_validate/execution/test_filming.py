@@ -60,33 +60,23 @@ def test_a_trial_that_there_is_not_is_refused(held, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.fixture(scope="module")
-def asked(held):
-    """What is drawn of a shake, without graphics."""
-    found = {}
+def test_what_is_filmed_is_the_motion_in_its_true_size_and_slowed_down(held, monkeypatch):
+    """The palm follows the shake: a over omega squared to either side of its middle. The time of
+    0.75 s is that of the frames over the factor that the caption says."""
+    asked = {}
 
-    def write(scene, joints, path, caption, **more):
-        found.update(scene=scene, joints=joints, caption=caption, **more)
+    def write(_scene, joints, path, caption, **more):
+        asked.update(joints=joints, caption=caption, **more)
         return path
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jobs, "write_held_clip", write)
-        film(ExecutionJob(*held, FRICTION, SETTINGS), "shake along z", held[0].name)
-    return found
-
-
-def test_a_short_trial_is_slowed_down_and_its_caption_says_so(asked):
-    """A shake of 0.75 s: its time is that of the frames over the factor."""
+    monkeypatch.setattr(jobs, "write_held_clip", write)
+    film(ExecutionJob(*held, FRICTION, SETTINGS), "shake along z", held[0].name)
     count = len(asked["joints"])
     assert count >= FRAMES
     name, _, slower = asked["caption"].partition(", ")
     assert name == "shake along z"
     factor = float(slower.removesuffix(" times slower"))
     assert count / 25.0 / factor == pytest.approx(0.15 + 3.0 / SETTINGS.shake_hz, rel=0.03)
-
-
-def test_what_is_filmed_is_the_motion_in_its_true_size(asked):
-    """The palm follows the shake: a over omega squared to either side of its middle."""
     palm = asked["joints"][:, 7:10]
     assert np.abs(palm[:, :2]).max() < 1e-4
     reach = 9.80665 / (2.0 * np.pi * SETTINGS.shake_hz) ** 2

@@ -47,11 +47,6 @@ def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path
     assert "no pose was found" in only["explanation"]
 
 
-def test_a_hand_that_there_is_not_is_refused(bracket_plan, capsys):
-    assert main(["reach", str(bracket_plan), "--hand", "nose"]) == Exit.INPUT
-    assert "hand must be allegro, allegro-urdf, leap" in capsys.readouterr().err
-
-
 def coupled_file(folder):
     """The gripper with fingers that curl as they bend."""
     path = three_fingers_file(folder)
@@ -63,12 +58,19 @@ def coupled_file(folder):
     return ["--hand", path, "--fingertips", ",".join(THREE_TIPS)]
 
 
-@pytest.mark.parametrize("flags", [("--simulate",), ("--mass-kg", "0.05")])
-def test_what_needs_a_motor_at_each_joint_names_the_others(flags, bracket_plan, tmp_path, capsys):
-    assert main(["reach", str(bracket_plan), *coupled_file(tmp_path), *flags]) == Exit.INPUT
-    said = capsys.readouterr().err
-    assert f"{flags[0]} needs a hand with a motor at each joint" in said
-    assert "left_curl follows left_bend, right_curl follows right_bend" in said
+def test_what_cannot_be_reached_or_simulated_is_refused(bracket_plan, tmp_path, capsys):
+    coupled = coupled_file(tmp_path)
+    others = "left_curl follows left_bend, right_curl follows right_bend"
+    for flags, *said in (
+        (["--hand", "nose"], "hand must be allegro, allegro-urdf, leap"),
+        (["--simulate"], "give one for all joints with --torque-limit-n-m"),
+        (["--mass-kg", "0.1"], "--mass-kg needs a torque limit for each joint"),
+        ([*coupled, "--simulate"], "--simulate needs a hand with a motor at each joint", others),
+        ([*coupled, "--mass-kg", "1"], "--mass-kg needs a hand with a motor at each joint", others),
+    ):
+        assert main(["reach", str(bracket_plan), *flags]) == Exit.INPUT
+        found = capsys.readouterr().err
+        assert all(words in found for words in said)
 
 
 def test_a_hand_holds_and_executes_the_grasps_that_it_reaches(bracket_plan, tmp_path, capsys):
@@ -120,13 +122,6 @@ def test_a_hand_of_known_motors_and_links_says_what_it_carries(bracket_plan, tmp
     found = each.payload
     assert 0.0 < found.lower_kg <= found.upper_kg <= 1.002 * found.lower_kg
     assert f"{found.lower_kg:.3g}" in said
-
-
-def test_a_hand_without_torque_limits_is_not_simulated(bracket_plan, capsys):
-    assert main(["reach", str(bracket_plan), "--simulate"]) == Exit.INPUT
-    assert "give one for all joints with --torque-limit-n-m" in capsys.readouterr().err
-    assert main(["reach", str(bracket_plan), "--mass-kg", "0.1"]) == Exit.INPUT
-    assert "--mass-kg needs a torque limit for each joint" in capsys.readouterr().err
 
 
 def test_a_hand_too_weak_for_an_object_says_so(bracket_plan, tmp_path, capsys):

@@ -25,7 +25,7 @@ from sim_validate.kit.files import (
 from sim_validate.main import main
 
 
-def test_only_regular_files_are_read(tmp_path):
+def test_only_regular_files_are_read_and_no_more_of_them_than_the_limit(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     for path, words in (
@@ -38,6 +38,10 @@ def test_only_regular_files_are_read(tmp_path):
     ):
         with pytest.raises(gc.InputError, match=words):
             read_text(type(tmp_path)(path))
+    (tmp_path / "a").write_bytes(b"12345")
+    assert read_bytes(tmp_path / "a", 5) == b"12345"
+    with pytest.raises(gc.InputError, match="larger than 4 bytes"):
+        read_bytes(tmp_path / "a", 4)
 
 
 @pytest.mark.parametrize(
@@ -49,14 +53,6 @@ def test_only_regular_files_are_read(tmp_path):
 def test_settings_that_never_end_are_refused_at_once(text):
     with pytest.raises(gc.InputError, match=r"not TOML|of the TOML file"):
         tables_of_toml(text)
-
-
-def test_no_more_is_read_than_the_limit(tmp_path):
-    path = tmp_path / "a"
-    path.write_bytes(b"12345")
-    assert read_bytes(path, 5) == b"12345"
-    with pytest.raises(gc.InputError, match="larger than 4 bytes"):
-        read_bytes(path, 4)
 
 
 def test_a_configuration_of_flags_is_a_file_of_values(tmp_path, capsys):
