@@ -33,7 +33,6 @@ def test_fingertips_touch_their_contacts():
 
 
 def test_every_part_of_the_hand_is_drawn_in_its_place():
-    """Corners are on the surfaces of the boxes, placed by the kinematics of the hand."""
     one = held()
     at = places(one.hand, one.joints, one.palm_pose)
     palm = one.palm_pose[:3, 3], one.palm_pose[:3, :3]

@@ -33,7 +33,6 @@ def hand(file):
 
 @pytest.fixture(scope="module")
 def reached(hand):
-    """The object, grasp and pose of each grasp that is reached."""
     tried = [(name, grasp) for name in OBJECTS for grasp in grasps(name, RADIUS)]
     found = [(name, grasp, gc.reach_with(hand, scaled(name, RADIUS), grasp, FRICTION))
              for name, grasp in tried]  # fmt: skip

@@ -154,7 +154,6 @@ def test_the_last_digits_of_contacts_do_not_change_the_text(held):
 
 
 def test_each_fingertip_touches_the_face_of_its_contact(held):
-    """It is the object's own surface that it touches, along the normal, and nothing else."""
     body, grasp, scene, model = held
     assert not scene.layout.on_pads
     assert (scene.layout.solids is None) == (body.name != "screwdriver")

@@ -108,7 +108,6 @@ def test_the_surface_is_the_outer_side_of_solids(name):
 
 
 def test_only_what_is_within_reach_is_there():
-    """The points of left-out pieces are farther from the contact than the reach."""
     body, name = body_of("mug"), "mug"
     (contact,), _ = points_on(body, 1, np.random.default_rng(3))
     reach = 0.3 * body.radius

@@ -69,7 +69,6 @@ def test_all_that_can_be_asked_for_repeats_to_the_last_digit_at_any_number_of_th
 
 
 def test_a_users_wrench_is_applied_as_it_is_and_need_not_hold():
-    """One that the analysis says is resisted, and one that is not: both as predicted."""
     body, (grasp, *_) = grasps("wedge", 0.5, 1)
     small, large = np.array([0, 0, -2.0, 0, 0.05, 0]), np.array([0, 0, -80.0, 0, 0, 0])
     agenda = replace(
@@ -88,8 +87,6 @@ def test_a_users_wrench_is_applied_as_it_is_and_need_not_hold():
 
 
 def test_what_contradicts_the_analysis_is_said(monkeypatch):
-    """With less friction in the simulation only, much goes wrong, and all of it is named."""
-
     def slippery(kind):
         faithful = getattr(Rig, kind)
 

@@ -21,13 +21,8 @@ HOSTILE = (
 
 
 @pytest.fixture(scope="module")
-def folder(small_dataset):
-    return small_dataset
-
-
-@pytest.fixture(scope="module")
-def manifest(folder):
-    return read_manifest(folder)
+def manifest(small_dataset):
+    return read_manifest(small_dataset)
 
 
 def split_card(text):
@@ -37,14 +32,14 @@ def split_card(text):
     return yaml.safe_load(header), body
 
 
-def test_the_card_is_listed_in_the_manifest_and_the_dataset_is_whole(folder, manifest):
+def test_the_card_is_listed_in_the_manifest_and_the_dataset_is_whole(small_dataset, manifest):
     assert CARD in {each.path for each in manifest.files}
-    assert verify(folder) == []
-    assert (folder / CARD).read_text(encoding="utf-8") == card_text(SMALL, manifest)
+    assert verify(small_dataset) == []
+    assert (small_dataset / CARD).read_text(encoding="utf-8") == card_text(SMALL, manifest)
 
 
-def test_the_header_says_where_each_table_and_split_is(folder):
-    header, _ = split_card((folder / CARD).read_text())
+def test_the_header_says_where_each_table_and_split_is(small_dataset):
+    header, _ = split_card((small_dataset / CARD).read_text())
     assert header["license"] == "cc-by-4.0"
     assert header["pretty_name"] == SMALL.title
     assert header["task_categories"] == ["robotics"]
@@ -55,10 +50,10 @@ def test_the_header_says_where_each_table_and_split_is(folder):
     for config in header["configs"]:
         assert [each["split"] for each in config["data_files"]] == ["train", "validation", "test"]
         for each in config["data_files"]:
-            found = set(folder.glob(each["path"]))
+            found = set(small_dataset.glob(each["path"]))
             assert found
             seen |= found
-    assert seen == set(folder.glob("data/*/*.parquet"))
+    assert seen == set(small_dataset.glob("data/*/*.parquet"))
 
 
 @pytest.mark.parametrize("text", HOSTILE)

@@ -33,7 +33,6 @@ def test_a_dataset_is_made_and_nothing_is_wrong_with_it(dataset, answer):
 
 
 def test_a_build_says_how_many_objects_each_split_has(dataset, capsys):
-    """Two objects leave at least one of the three splits without any."""
     assert main(["dataset", "build", *OBJECTS, *LIGHT, "--out", str(dataset)]) == Exit.GOOD
     last = capsys.readouterr().out.splitlines()[-1]
     found = re.fullmatch(r"train (\d), validation (\d), test (\d) objects", last)

@@ -96,7 +96,6 @@ def test_the_least_squeeze_is_no_stronger_than_the_best_one_needs(grasps):
 
 
 def test_a_hand_stands_where_its_joints_say(grasps):
-    """The fingertips of the stated angles lie on the object, at contacts in force closure."""
     hand = gc.load_hand("leap")
     assert {row["hand_reached"] for row in grasps if row["force_closed"]} == {True, False}
     assert {row["hand_reached"] for row in grasps if not row["force_closed"]} == {None}
@@ -257,8 +256,6 @@ def test_draws_depend_on_the_seed_and_not_on_what_else_is_asked_for():
 
 
 def test_a_varied_grasp_beyond_the_simulator_leaves_the_others(monkeypatch):
-    """The row says why its survival is not known."""
-
     def unfaithful(*_, **__):
         raise UnfaithfulError("the simulator is not faithful here")
 

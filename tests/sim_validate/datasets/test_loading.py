@@ -15,16 +15,11 @@ pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")
 
 
-@pytest.fixture(scope="module")
-def folder(small_dataset):
-    return small_dataset
-
-
 @pytest.fixture
-def beside(folder, monkeypatch):
+def beside(small_dataset, monkeypatch):
     """A working folder that holds the dataset as `ds`."""
-    monkeypatch.chdir(folder.parent)
-    return folder
+    monkeypatch.chdir(small_dataset.parent)
+    return small_dataset
 
 
 def snippet(folder, package):
@@ -115,8 +110,8 @@ def test_hugging_face_datasets_loads_it_as_the_card_says(beside, offline, tmp_pa
 
 
 @pytest.mark.parametrize("split", SPLITS)
-def test_every_row_is_met_once_with_its_object(folder, split):
-    chosen = select(folder, split)
+def test_every_row_is_met_once_with_its_object(small_dataset, split):
+    chosen = select(small_dataset, split)
     groups = list(chosen.by_object())
     assert len(groups) == chosen.manifest.count("objects", split)
     for name in TABLES:

@@ -92,18 +92,12 @@ def test_a_worker_that_does_not_see_a_mesh_ends_the_run(tmp_path):
     trimesh.creation.box(extents=(0.04, 0.05, 0.06)).export(path)
     config = dataclasses.replace(CONFIG, objects=(str(path),))
 
-    def hide(_):
-        path.rename(tmp_path / "aside")
-
-    with pytest.raises(WorkerError, match="cannot find this mesh"):
-        build(config, tmp_path / "ds", Here(hide), silent)
-    (tmp_path / "aside").rename(path)
-
-    def change(_):
-        path.write_bytes(path.read_bytes() + b" ")
-
-    with pytest.raises(WorkerError, match="has changed since the build began"):
-        build(config, tmp_path / "ds", Here(change), silent)
+    for spoil, said in (
+        (lambda _: path.write_bytes(path.read_bytes() + b" "), "has changed since the build began"),
+        (lambda _: path.unlink(), "cannot find this mesh"),
+    ):
+        with pytest.raises(WorkerError, match=said):
+            build(config, tmp_path / "ds", Here(spoil), silent)
     assert not (tmp_path / "ds" / "manifest.json").exists()
 
 

@@ -99,7 +99,6 @@ def look(ends, sample, joints, speeds=RESTING):
 
 
 def test_verdicts_are_those_of_the_full_length(held):
-    """At loads and frictions around the limits, where a difference would show."""
     body, grasp, _ = held
     wholes, earlies, long, short = zip(*compared(body, grasp, 0.5), strict=True)
     assert len(wholes) > 100

@@ -82,7 +82,6 @@ def test_a_run_that_goes_on_at_the_same_steps_is_the_first_one(kind):
 
 
 def test_one_trial_that_diverges_loses_one_trial(monkeypatch):
-    """All others are as they would be without it."""
     body, grasp = planned("box")
     settings = sv.ExecutionSettings(0.1, trials=("weight", "knock"))
     plain = sv.execute(body, grasp, 0.5, settings)

@@ -84,7 +84,6 @@ def test_the_stiffness_is_the_least_that_keeps_the_object_in_its_place():
 
 
 def test_where_no_push_is_enough_a_proof_says_so():
-    """Contacts without force closure, and motors that are too weak."""
     body, grasp = planned("wedge")
     assert not gc.force_closure(grasp, friction=0.03).closed
     with pytest.raises(NoSqueezeError, match="it is proved that no balanced squeeze") as raised:

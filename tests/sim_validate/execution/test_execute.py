@@ -85,7 +85,6 @@ def test_two_runs_are_equal_to_the_last_bit(light):
 
 
 def test_thresholds_decide_what_counts_as_held(light):
-    """Whether a motion counts as held depends on how far the object may go."""
     body, grasp = planned("box")
     near = replace(LIGHT, trials=("shake",))
     far = light.of_kind("shake")
@@ -124,7 +123,6 @@ def test_objects_that_are_not_convex_are_held_on_their_own_surfaces(name):
 
 
 def test_a_curved_surface_is_there_as_far_as_fingertips_come_and_no_farther():
-    """What lies beyond does not change what becomes of an object that is held."""
     body = dented_ball()
     grasp = gc.plan(body, 0.5, limit=1).grasps[0]
     settings = sv.ExecutionSettings(mass_kg=0.1, trials=("weight", "misplaced"), off_mm=1.0)

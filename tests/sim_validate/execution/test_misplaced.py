@@ -80,7 +80,6 @@ def test_fingertips_touch_where_they_stop_and_nowhere_before(misplaced):
 
 
 def test_a_finger_that_meets_nothing_stops_beyond_its_place():
-    """The object is far aside: all fingers pass it."""
     layout = layout_of("box")
     (pose,) = misplacements(layout, 10.0 * layout.radius_m, 0.0, 1, 0)
     reached = met(layout, (pose,), OFF_M, 0.0)

@@ -77,7 +77,6 @@ def kept_in(project):
 
 
 def test_grasps_are_carried_over_to_a_changed_part_and_it_is_said_how_it_changed(project):
-    """The grasp of this part holds on it as before, to within the bands."""
     part = edited(project)
     code, said = run_pytest(project, "--junitxml", "j.xml")
     assert code == 0, said
@@ -349,7 +348,6 @@ def test_comments_line_ends_and_the_order_of_vertices_are_no_change(project):
 
 
 def test_a_part_elsewhere_is_named_in_the_file(project):
-    """And other files with the object's name then do not count."""
     elsewhere = project / "cad"
     elsewhere.mkdir()
     (project / "part.obj").rename(elsewhere / "renamed.obj")

@@ -23,7 +23,6 @@ def small_run(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def small_report(small_run, tmp_path_factory):
-    """The folder of its report."""
     return write_report(small_run, tmp_path_factory.mktemp("report"), jobs=1).index.parent
 
 

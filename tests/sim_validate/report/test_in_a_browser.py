@@ -158,7 +158,6 @@ WIDTHS = (390, 1280)
 def test_everything_is_on_the_screen_and_can_be_read_by_day_and_by_night(
     browser, shown, kind, width
 ):
-    """Nothing is cut off, and neither a page nor a table scrolls sideways."""
     for dark in (False, True):
         opened(browser, shown[kind], width=width, dark=dark, touch=width < 500)
         browser.execute_script(

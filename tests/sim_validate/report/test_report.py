@@ -134,7 +134,6 @@ def test_its_commands_are_commands(small_run, small_report, asked, monkeypatch):
 
 @pytest.fixture
 def copy(small_run, tmp_path):
-    """Another run to spoil."""
     return shutil.copytree(small_run, tmp_path / "copy")
 
 
