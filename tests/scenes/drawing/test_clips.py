@@ -64,37 +64,19 @@ def test_without_pillow_the_extra_is_named(scene, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.fixture(scope="module")
-def held_scene():
+def test_what_points_up_is_drawn_up(tmp_path, monkeypatch):
+    """Of a palm and an object that shift together."""
     body, (grasp,) = grasps("wedge", 0.5, 1)
     squeeze = 3.0 * even_forces(grasp.positions, grasp.normals, 0.4)
     grip = gc.grip(body, grasp, 0.5, squeeze)
-    return scenes.build_held_scene(body, grip, scenes.HeldSettings(mass_kg=0.2))
-
-
-def held_joints(count, shift):
-    """Joints of a held object whose palm and object shift together."""
-    joints = np.zeros((count, 25))
+    held_scene = scenes.build_held_scene(body, grip, scenes.HeldSettings(mass_kg=0.2))
+    up, parts = np.array([0.6, 0.0, 0.8]), {}
+    joints = np.zeros((5, 25))
     joints[:, 3] = 1.0
-    joints[:, :3] = joints[:, 7:10] = np.linspace(0.0, 1.0, count)[:, None] * np.array(shift)
-    return joints
-
-
-def drawn_with(monkeypatch, *arguments, **more):
-    """What is handed to the process that draws."""
-    found = {}
-    monkeypatch.setattr(clips, "_written", lambda path, **parts: found.update(parts) or path)
-    write_held_clip(*arguments, **more)
-    return found
-
-
-def test_what_points_up_is_drawn_up(held_scene, tmp_path, monkeypatch):
-    up = np.array([0.6, 0.0, 0.8])
-    joints = held_joints(5, 0.3 * up)
+    joints[:, :3] = joints[:, 7:10] = np.linspace(0.0, 0.3, 5)[:, None] * up
     table = (-0.1 * up, np.array([1.0, 0.0, 0.0, 0.0]))
-    parts = drawn_with(
-        monkeypatch, held_scene, joints, tmp_path / "a.gif", "lift", up=up, table=table
-    )
+    monkeypatch.setattr(clips, "_written", lambda path, **drawn: parts.update(drawn) or path)
+    write_held_clip(held_scene, joints, tmp_path / "a.gif", "lift", up=up, table=table)
     np.testing.assert_allclose(parts["joints"][-1, :3], [0.0, 0.0, 0.3], atol=1e-12)
     np.testing.assert_allclose(parts["middle"], [0.0, 0.0, 0.15], atol=1e-12)
     np.testing.assert_allclose(parts["table"][:3], [0.0, 0.0, -0.1], atol=1e-12)

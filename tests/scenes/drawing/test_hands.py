@@ -14,17 +14,13 @@ from scenes.drawing.pictures import write_picture
 from tests.scenes.drawing.standing import ROUNDING, held, standing
 
 
-def tips_of(shapes):
-    return [shape for shape in shapes if shape.role == "fingertip"]
-
-
 def test_fingertips_touch_their_contacts():
     """A coarse ball lies inside the true one, by 1 - cos(a / 2)^2 of its radius at most."""
     one = held()
     gaps = np.linalg.norm(one.tips - one.positions, axis=1) - one.tip_radii
     np.testing.assert_allclose(gaps, 0.0, atol=ROUNDING)
     coarse = 1.0 - math.cos(0.25 * math.pi / STEPS) ** 2
-    shapes = tips_of(hand_shapes(one))
+    shapes = [shape for shape in hand_shapes(one) if shape.role == "fingertip"]
     assert [shape.finger for shape in shapes] == [2, 3, 1, 0]  # first, middle, ring, thumb
     for shape in shapes:
         contact, radius = one.contacts[shape.finger], one.tip_radii[shape.finger]

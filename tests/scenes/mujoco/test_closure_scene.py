@@ -20,13 +20,6 @@ def held(request):
     return body, grasp, scene, mujoco.MjModel.from_xml_string(scene.xml)
 
 
-@pytest.fixture(scope="module")
-def on_pads(held):
-    body, grasp, *_ = held
-    scene = scenes.build_scene(body, grasp, 0.5, surface="pads")
-    return body, grasp, scene, mujoco.MjModel.from_xml_string(scene.xml)
-
-
 def touching(model, data):
     """The fingertip of each contact, and the normal that points out of it."""
     for contact in data.contact:
@@ -62,8 +55,10 @@ def test_every_setting_reaches_the_compiled_model(held):
         assert model.geom_friction[geom, 0] == 0.5
 
 
-def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(on_pads):
-    body, grasp, scene, model = on_pads
+def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(held):
+    body, grasp, *_ = held
+    scene = scenes.build_scene(body, grasp, 0.5, surface="pads")
+    model = mujoco.MjModel.from_xml_string(scene.xml)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
     mujoco.mj_kinematics(model, data)

@@ -39,10 +39,6 @@ def test_one_byte_changed_in_a_file_of_any_kind_is_named(dataset, tmp_path):
         shutil.rmtree(spoiled)
 
 
-def untried(rows):
-    rows[0].update(label="given", outcome="not_tried", held=None, trials=0)
-
-
 def leaning(rows):
     """A normal that is not the surface's, with the margin it gives."""
     row = rows[0]
@@ -61,7 +57,11 @@ def leaning(rows):
         ("grasps", first(object_id="0" * 64), "in object_id, has no row"),
         ("grasps", first(force_closed=False), "force_closed is"),
         ("grasps", first(contact_points_m=[[1.0, 0.0, 0.0]] * 4), "not on the object"),
-        ("grasps", untried, "claims results, although"),
+        (
+            "grasps",
+            first(label="given", outcome="not_tried", held=None, trials=0),
+            "claims results, although",
+        ),
         ("grasps", first(trials=0), "must have trials"),
         ("grasps", first(trials=1), "by the table of trials"),
         ("grasps", first(friction=0.9), "not among those of config"),

@@ -36,12 +36,6 @@ def report(run, tmp_path_factory):
     return write_report(run, tmp_path_factory.mktemp("report"), jobs=1).index.parent
 
 
-def changed_run(folder, change):
-    run_with_hand(folder)
-    changed(folder / "reaches.json", change)
-    return folder
-
-
 def test_cards_show_the_hand_where_it_stands(report):
     index = Page((report / "index.html").read_text())
     pictures = [known["src"] for tag, known in index.tags if tag == "img"]
@@ -123,7 +117,8 @@ def doubled(record):
     ],
 )
 def test_a_file_that_contradicts_itself_or_its_grasps_is_refused(change, said, tmp_path):
-    folder = changed_run(tmp_path, change)
+    folder = run_with_hand(tmp_path)
+    changed(folder / "reaches.json", change)
     with pytest.raises(InputError, match=rf"reaches\.json: .*{said}"):
         write_report(folder, jobs=1)
 
