@@ -242,9 +242,11 @@ def test_a_joint_that_is_held_at_an_angle_has_no_other(tmp_path):
     assert hand.ranges[names.index("b0")] == pytest.approx([0.3 + np.deg2rad(10.0)] * 2)
 
 
+TENDON = '<fixed name="pull"><joint joint="b0" coef="1"/><joint joint="c0" coef="1"/></fixed>'
+
+
 def test_tendons_without_rules_leave_joints_free_with_a_note(tmp_path):
-    tendon = '<fixed name="pull"><joint joint="b0" coef="1"/><joint joint="c0" coef="1"/></fixed>'
-    hand = coupled(tmp_path, "", tendon)
+    hand = coupled(tmp_path, "", TENDON)
     assert hand.couplings == ()
     assert any("tendons are left out" in note and "pull" in note for note in hand.notes)
 
@@ -263,9 +265,8 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_other_rules_are_refused_with_their_joints(case, tmp_path):
     equality, said = REFUSED[case]
-    tendon = '<fixed name="pull"><joint joint="b0" coef="1"/><joint joint="c0" coef="1"/></fixed>'
     with pytest.raises(InputError, match=said):
-        coupled(tmp_path, equality, tendon if case == "tendon" else "")
+        coupled(tmp_path, equality, TENDON if case == "tendon" else "")
 
 
 def test_a_weld_that_holds_the_palm_is_no_loop(tmp_path):

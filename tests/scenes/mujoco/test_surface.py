@@ -105,17 +105,3 @@ def test_the_surface_is_the_outer_side_of_solids(name):
     assert not in_solids(name, points + aside).any()
     # a pyramid is thinner than this only on a strip along its edges
     assert np.mean(in_solids(name, points - aside) > 0) > 0.99
-
-
-def test_only_what_is_within_reach_is_there():
-    body, name = body_of("mug"), "mug"
-    (contact,), _ = points_on(body, 1, np.random.default_rng(3))
-    reach = 0.3 * body.radius
-    near = touched_solids(body, contact[None], reach)
-    kept = {corners.tobytes() for corners in near}
-    left = [corners for corners in solids_of(name) if corners.tobytes() not in kept]
-    assert 0 < len(near) < len(solids_of(name)) == len(near) + len(left)
-    rng = np.random.default_rng(4)
-    for corners in left:
-        points = rng.dirichlet(np.ones(len(corners) - 1), 50) @ corners[:-1]
-        assert np.linalg.norm(points - contact, axis=1).min() > reach
