@@ -231,6 +231,8 @@ def test_a_scan_with_a_hole_is_planned_for_fingers_and_holds_on_its_true_surface
     saved = json.loads((here / "r" / "grasps.json").read_text())
     assert saved["object"]["patches"] == {"spread_deg": 10.0, "depth": 0.01, "most": 10}
     assert saved["finger"] == {"radius_m": 0.004, "approach_m": 0.03}
+    assert main(["validate", "r/grasps.json"]) == Exit.GOOD
+    assert "no finger is placed there" in capsys.readouterr().err
     assert main(["inspect", "scan.ply", "--unit", "mm"]) == Exit.GOOD
     said = capsys.readouterr().out
     assert "Its surface is curved: fingers may stand on 20 nearly flat" in said

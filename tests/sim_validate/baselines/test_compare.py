@@ -161,6 +161,13 @@ def test_grasps_that_are_refused_now_have_regressed():
     assert finding.reasons == ("friction: 0.5 -> 0.1", "refused: not closed")
 
 
+def test_grasps_of_another_object_are_not_just_missing():
+    header = {"object": AboutObject("cup", "", "cd")}
+    listed = compare(BEFORE, now(header, name="a-new-one"))
+    assert {finding.status for finding in listed} == {Status.NOT_COMPARABLE}
+    assert listed[0].reasons == ("the object is another one: wedge -> cup",)
+
+
 @pytest.mark.parametrize(
     ("header", "changed", "reason"),
     [

@@ -126,3 +126,8 @@ def test_a_bad_row_is_named_by_its_file_and_its_number(planned, tmp_path):
         path = contacts_file(tmp_path / "g.json", [good, bad])
         with pytest.raises(gc.InputError, match=rf"g.json: grasps\[1\].{said}"):
             read_given(path)
+    document = json.loads(contacts_file(tmp_path / "g.json", [good]).read_text())
+    document["grasps"][0]["contacts"][2]["friction"] = 0.3
+    (tmp_path / "g.json").write_text(json.dumps(document))
+    with pytest.raises(gc.InputError, match=r"g.json: grasps\[0\] \(a\): friction: remove it"):
+        read_given(tmp_path / "g.json")

@@ -98,6 +98,9 @@ def test_columns_of_other_types_and_another_table_are_refused(written, tmp_path)
         read_table(tmp_path / "t.parquet", "objects", TABLES)
     with pytest.raises(gc.InputError, match="expected the columns of the table objects"):
         read_table(written["grasps"], "objects", TABLES)
+    (tmp_path / "t.parquet").write_bytes(written["objects"].read_bytes()[:-8])
+    with pytest.raises(gc.InputError, match=r"t.parquet: this file is not Parquet, or is damaged"):
+        read_table(tmp_path / "t.parquet", "objects", TABLES)
 
 
 def test_files_that_claim_too_much_are_refused_before_they_are_read(written, monkeypatch):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sim_validate as sv
+from grasp_core.errors import InputError
 from sim_validate.hands.trials import HandHolder, hand_execution_settings
 from tests.grasp_core.hands.gripping import FRICTION, scaled
 from tests.sim_validate.hands.executing import MASS, OBJECT, RADIUS, stood
@@ -37,7 +38,7 @@ def test_a_hand_keeps_a_light_object_and_would_slip_where_it_is_predicted_to(nam
     assert np.abs(errors).max() < NEAR, errors
 
 
-def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost():
+def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost_and_an_open_hand_refused():
     reach, hand = stood("allegro")
     body = scaled(OBJECT, RADIUS)
     able = HandHolder(body, hand, reach, FRICTION).squeeze(hand_execution_settings(MASS))
@@ -47,3 +48,7 @@ def test_an_object_ten_times_as_heavy_as_motors_carry_is_lost():
     )
     assert not found.survived
     assert found.least_predicted_loss < 1.0
+    with pytest.raises(InputError, match="expected mass_kg or settings"):
+        sv.execute_hand(hand, body, reach, FRICTION)
+    with pytest.raises(InputError, match="not in force closure"):
+        sv.execute_hand(hand, body, reach, 0.001, mass_kg=MASS)

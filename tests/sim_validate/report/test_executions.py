@@ -14,6 +14,7 @@ from grasp_core.errors import InputError
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.records.grasps_json import load_grasps
 from scenes.settings import PhysicsSettings
+from sim_validate.engine.traces import Outcome
 from sim_validate.execution.command import execution_settings
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
@@ -137,6 +138,9 @@ def test_a_grasp_is_bad_if_its_closure_or_its_execution_is(run):
     ):  # fmt: skip
         assert said_of_both(verdict, found, one) == (f"closure: {closure}; execution: {said}", tone)
         assert said_of_both(verdict, None, None)[0] == closure
+    first = held.wrenches[0]
+    late = replace(first, hold=replace(first.hold, outcome=Outcome.TIMEOUT))
+    assert said_of_both(replace(held, wrenches=(late,)), None, None) == ("timeout", "bad")
 
 
 def test_the_page_of_a_grasp_has_all_of_its_execution(run, report):
