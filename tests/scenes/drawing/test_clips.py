@@ -57,6 +57,14 @@ def test_motions_become_visible_and_no_larger(scene, share):
     assert factor == float(f"{factor:.0e}")
 
 
+def test_without_graphics_the_message_says_so(scene, tmp_path, monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "no-such-library")
+    said = r"MuJoCo cannot draw on this machine: no-such-library: .+"
+    with pytest.raises(GraphicsError, match=said):
+        write_clip(scene, np.eye(1, 19, 3), tmp_path / "clip.gif", "")
+    assert not list(tmp_path.iterdir())
+
+
 def test_without_pillow_the_extra_is_named(scene, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "PIL", None)
     with pytest.raises(GraphicsError, match=r"graspproof\[clips\]"):

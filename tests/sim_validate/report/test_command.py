@@ -99,9 +99,7 @@ def test_without_graphics_there_is_no_clip_and_the_remedy_is_said(
     monkeypatch.setenv("MUJOCO_GL", "no-such-library")
     asked = ["view", str(wedge_plan), "--page", str(tmp_path / "a.html")]
     assert main([*asked, "--clip", str(tmp_path / "a.gif")]) == Exit.INPUT
-    said = capsys.readouterr().err
-    assert "MuJoCo cannot draw on this machine: no-such-library: " in said
-    assert "unset MUJOCO_GL" in said
+    assert "unset MUJOCO_GL" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
 
 
