@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 57_116,
     "modules of packages": 239,
-    "lines of tests": 40_163,
+    "lines of tests": 37_742,
     "lines of docs": 3_900,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
