@@ -13,7 +13,7 @@ from grasp_core.files.records import entries, inside_record
 from grasp_core.kinds import words
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.datasets.rows import TABLES, dataset_tables
+from sim_validate.datasets.columns import TABLES, dataset_tables
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.planning.transfer import TransferFile

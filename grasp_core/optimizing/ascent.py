@@ -46,7 +46,7 @@ from grasp_core.closure.contacts import contact_frames
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.optimizing.grounds import Grounds
+from grasp_core.optimizing.contact_places import Grounds
 from grasp_core.optimizing.search import Found, Searching
 from grasp_core.quality.ferrari_canny import FerrariCanny, InnerPolytope, wrench_set_quality
 from grasp_core.quality.measures import (

@@ -58,7 +58,7 @@ from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import begin, climbed, piece_at
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
-from grasp_core.optimizing.grounds import UNIT, Grounds, exact_maps, grounds_of, grounds_on
+from grasp_core.optimizing.contact_places import UNIT, Grounds, exact_maps, grounds_of, grounds_on
 from grasp_core.optimizing.search import EXACT_GAP, Searching, Stop
 from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, CutTree
 from grasp_core.planning.certify import named

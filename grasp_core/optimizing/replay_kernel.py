@@ -16,7 +16,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy, longer
 from grasp_core.compiled import loop
-from grasp_core.optimizing.grounds import ROOM
+from grasp_core.optimizing.contact_places import ROOM
 from grasp_core.values import FINGERS
 
 BY_PIECES, BY_LINE = 16, 32

@@ -26,7 +26,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
-from grasp_core.optimizing.grounds import (
+from grasp_core.optimizing.contact_places import (
     ALONE,
     REPLAY,
     SEARCH_DIGITS,

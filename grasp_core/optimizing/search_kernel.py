@@ -13,7 +13,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
-from grasp_core.optimizing.grounds import ROOM
+from grasp_core.optimizing.contact_places import ROOM
 from grasp_core.optimizing.replay_kernel import (
     BY_LINE,
     BY_PIECES,

@@ -57,7 +57,7 @@ are off by less than 1e-10, its supports by 2e-10 (1 + mu), and t d(y) of a task
 It refutes a threshold that is lower by `SEARCHED_BELOW`, more than all of these, so that what
 answers in the replay answers in the search. No proof rests on that: the replay decides.
 
-Symmetries. See `grounds`: contacts can be moved by a symmetry, at the cost of its error. It
+Symmetries. See `contact_places`: contacts can be moved by a symmetry, at the cost of its error. It
 takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.
 
 Files. A proof about a whole object is kept as an npz file, which needs no pickles. Its arrays are
@@ -82,7 +82,7 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_bytes, write_parts
 from grasp_core.kinds import FrictionOrZero, Many
-from grasp_core.optimizing.grounds import REPLAY, Grounds, first_nodes, fitting
+from grasp_core.optimizing.contact_places import REPLAY, Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
@@ -95,7 +95,7 @@ SEARCHED_BELOW = 1e-9
 """How far below its threshold a proof is searched for, over 1 + mu, so that replaying it, with
 other roundings, meets no case that is just decided the other way."""
 INEXACT = 1e-7
-"""How far errors of symmetries can lift a measure, over 1 + mu (see `grounds`)."""
+"""How far errors of symmetries can lift a measure, over 1 + mu (see `contact_places`)."""
 TWIST_SLACK = 1e-12
 """How far unit twists may be from length one: their lengths are rounded by less than 1e-15, and a
 wrench is shorter than 8 (1 + mu), so that a support is off by a hundredth of `ROUNDING` at most."""

@@ -50,9 +50,8 @@ from sim_validate.closure.verdict import (
     Verdict,
     WrenchVerdict,
 )
-from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import Gate, measured_gate, require_faithful, require_touch
-from sim_validate.engine.rig import (
+from sim_validate.engine.limits import (
     Analysis,
     CriticalFriction,
     PlannedLoad,
@@ -64,6 +63,7 @@ from sim_validate.engine.rig import (
     released_friction,
 )
 from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.simulate import Bench
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
 from sim_validate.kit.processes import each, processes
 from sim_validate.settings import Noise

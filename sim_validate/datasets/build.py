@@ -43,7 +43,7 @@ from grasp_core.kinds import FieldError, shown
 from grasp_core.processes import Processes
 from grasp_core.provenance import arithmetic
 from scenes.drawing.pages import filled
-from sim_validate.datasets.columns import joined, parquet_bytes, pyarrow, write_files
+from sim_validate.datasets.columns import ROWS, dataset_tables
 from sim_validate.datasets.config import (
     KEYS,
     REFERENCES,
@@ -66,8 +66,8 @@ from sim_validate.datasets.open_dataset import (
     read_manifest,
     write_manifest,
 )
-from sim_validate.datasets.rows import ROWS, dataset_tables
-from sim_validate.datasets.units import (
+from sim_validate.datasets.parquet import joined, parquet_bytes, pyarrow, write_files
+from sim_validate.datasets.work_units import (
     Making,
     WorkerError,
     WorkUnit,

@@ -1,370 +1,397 @@
-"""Makes the columns of a table of the fields of its row class, and reads and writes Parquet files.
+"""Declares the rows of each table: what its columns are called, hold and mean.
 
-A field is a column of its name. A record that is `FLAT` in the row gives a column for each of its
-entries, also one that keeps the figures of another class, so that a new figure is a new column.
-`Asked` marks fields that a dataset only has on request.
-
-Equal rows give equal bytes. Every page carries a checksum, and reading checks it: without that, a
-flipped bit goes unnoticed. Units and meanings are in the metadata of the columns. A whole dataset
-is written one group of rows after another, so that memory does not grow.
+A dataset whose configuration asks for executions has one table and some columns more, and there are
+groups of columns on request, which its manifest names. Names end in their unit. Geometry is in the
+object's own frame, in float64, with normals into the object and torques about its centre of mass. A
+value that could not be measured is null.
 """
 
-import importlib
-import io
-import math
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from enum import Enum
-from functools import cache
-from itertools import chain
-from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from grasp_core.arrays import Shape
-from grasp_core.declared import rules, types
+from grasp_core.arrays import Array, Indices, Shape, Wrench
+from grasp_core.declared import Declared, rules, types
 from grasp_core.errors import InputError
-from grasp_core.figures import Figure, figures, meanings, unit_of
-from grasp_core.files.json_text import shown
-from grasp_core.files.records import Key, entries, record_of
-from grasp_core.kinds import OrInfinity
-from grasp_core.values import FINGERS
-from sim_validate.datasets.config import KEYS, Name
+from grasp_core.figures import Kept, keeps
+from grasp_core.files.records import FLAT
+from grasp_core.kinds import Family, Friction, Number, Range, Seed
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.planning.given_contacts import seat
+from grasp_core.values import FINGERS, Contact
+from sim_validate.closure.verdict import Verdict
+from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName, id_beginning
+from sim_validate.datasets.parquet import (
+    Asked,
+    Column,
+    Known,
+    Tables,
+    Within,
+    cells_of,
+    columns_of,
+    in_columns,
+)
+from sim_validate.engine.traces import HoldVerdict, Outcome
+from sim_validate.execution.verdict import Execution, ExecutionTrial
 
-CellKind: TypeAlias = Literal["text", "bool", "int", "float"]
-Cells: TypeAlias = Mapping[str, Any]
-"""The cells of a row as plain values, by column."""
+GIVEN = "given"
+"""Label of grasps that another tool made."""
+VARIED = "varied"
+"""Label of rows that are made from a grasp and may hold or not."""
+NOT_TRIED = "not_tried"
+"""Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
+anything else about them."""
+UNIT = 1e-9
+"""Largest difference between a normal's length and one."""
+ROUNDING = 1e-6
+"""Share of any number that processors may round differently."""
+CLAIMS = (
+    "survived", "mass_kg", "squeeze_n", "load_multiple", "predicted_first_slip",
+    "simulated_first_slip", "executed_trials", "execution_mismatches",
+)  # fmt: skip
+"""Cells that only executed grasps have."""
+TOLD = ("load_multiple", "payload_kg", "predicted_first_slip", "simulated_first_slip")
+"""Figures of executions that have columns of their own."""
+ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
+"""A vector for each finger, (k, 3); tables have four, null after the last."""
+Lengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
+Four: TypeAlias = Annotated[Indices, Shape(FINGERS, whole=True)]
+Joints: TypeAlias = Annotated[Array, Shape("hand")]
+"""An angle for each joint of the hand."""
+Points: TypeAlias = Annotated[Array, Shape(FINGERS, 3)]
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """The mark of a field that a dataset has only if it has a group of columns."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ObjectRow(Declared):
+    """An object; its mesh, in metres, is `meshes/OBJECT_ID.obj`."""
 
-    group: str
+    object_id: str
+    """SHA-256 hash of the object's mesh; identifies the object."""
+    source_name: str
+    """File name, or name of the built-in object."""
+    source_sha256: str
+    """SHA-256 hash of the mesh file or built-in mesh."""
+    split: SplitName
+    """Part of the dataset: train, validation or test."""
+    vertices: Number
+    """Number of vertices."""
+    triangles: Number
+    """Number of triangles."""
+    faces: Number
+    """Number of planar faces or patches."""
+    curved: bool
+    """Whether the faces are patches of a curved surface."""
+    volume_m3: float
+    """Volume."""
+    volume_source: Literal["surface", "capped surface", "convex hull"]
+    """What volume and centre of mass are of: the surface, the capped surface (small holes were
+    closed), or the convex hull (it is open)."""
+    radius_m: float
+    """Largest distance of a vertex from the centre of mass."""
+    center_of_mass_m: Annotated[Array, Shape(3)]
+    """Centre of mass."""
 
 
-@dataclass(frozen=True, slots=True)
-class Within:
-    """How far a number may be from the one that is computed again; others must be the same."""
-
-    relative: float
-    absolute: float = 0.0
+@keeps(in_columns(Verdict, ("id", "outcome", "predicted_critical_friction")))
+class VerdictCells(Kept):
+    """Figures of a verdict."""
 
 
-Known = OrInfinity | None
-"""A number; None where it could not be measured. Tables have null for both, and for infinity."""
+@keeps(in_columns(Execution, TOLD, "execution_"))
+class ExecutionCells(Kept):
+    """Figures of an execution."""
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """Name, type, unit and meaning of one column of a table."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+class GraspRow(Declared):
+    """Four contacts on an object at one friction, or a negative control made from them."""
 
+    grasp_id: str
+    """Identifies the row: made of object, friction and name."""
+    object_id: str
+    """Object of the grasp."""
+    split: SplitName
+    """Part of the dataset that the object is in."""
     name: str
-    kind: CellKind
-    meaning: str
-    unit: str = ""
-    shape: tuple[int, ...] = ()
-    """Shape of each cell; () for a plain value."""
+    """The grasp's id in the planner's files: family and faces."""
+    label: str
+    """`grasp`, `given` (from elsewhere), `varied`, or the name of the negative control."""
+    control_of: str | None = None
+    """The grasp that a negative control was made from."""
+    friction: Friction
+    """Coulomb coefficient of the plan and of the trials."""
+    family: Family | None = None
+    """Family of the grasp, given by its lines of force; null for controls."""
+    faces: Four | None = None
+    """Indices of the faces or patches; null for controls."""
+    contacts: Annotated[int, Range(least=1, most=FINGERS)]
+    """Number of contacts: four, fewer for some controls."""
+    contact_points_m: ByFinger
+    """Contacts by finger; null after the last."""
+    contact_normals: ByFinger
+    """Inward unit normals; null after the last."""
+    moved_m: Known = None
+    """Largest distance by which a given contact was moved."""
+    force_closed: bool | None = None
+    """Whether it is proved to be in force closure."""
+    closure_margin: Annotated[Known, Within(ROUNDING, 1e-7)] = None
+    """Margin of the exact test of force closure."""
+    critical_friction: Annotated[Known, Within(10.0 * ROUNDING, 1e-7)] = None
+    """Smallest coefficient with force closure."""
+    region_radius_m: Known = None
+    """Radius of the smallest contact region; 0 for points."""
+    region_kind: str | None = None
+    """How contact regions were made: cone, disc, or point for none."""
+    region_radii_m: Lengths | None = None
+    """Largest disc radius in each contact region."""
+    ferrari_canny_lower_n: Known = None
+    """Proved lower bound of Ferrari-Canny quality."""
+    ferrari_canny_upper_n: Known = None
+    """Proved upper bound of Ferrari-Canny quality."""
+    held: bool | None = None
+    """Whether the grasp held in every trial."""
+    outcome: str = NOT_TRIED
+    """`held`, or how the first trial that did not hold ended."""
+    note: str = ""
+    """Why a given grasp was not tried, else empty."""
+    trials: Number = 0
+    """Number of simulated trials."""
+    mismatches: Number = 0
+    """Number of contradictions between simulation and analysis."""
+    verdict: Annotated[VerdictCells | None, FLAT] = None
+    """Figures of the verdict; null for controls."""
+
+    executed: Annotated[bool, Asked(EXECUTED)] = False
+    """Whether trials were simulated; false for negative controls, and where no squeeze carries the
+    weight."""
+    survived: Annotated[bool | None, Asked(EXECUTED)] = None
+    """Whether the object survived every trial; false also where no squeeze carries the weight; null
+    where it is not known."""
+    execution_note: Annotated[str | None, Asked(EXECUTED)] = None
+    """Why a grasp was not executed, or which trials were not possible."""
+    mass_kg: Annotated[Known, Asked(EXECUTED), Within(ROUNDING)] = None
+    """Mass of the object in the execution."""
+    squeeze_n: Annotated[ByFinger | None, Asked(EXECUTED)] = None
+    """Contact forces on the object at rest, by finger."""
+    load_multiple: Annotated[Known, Asked(EXECUTED)] = None
+    """Multiple of the weight, in any direction, that the squeeze is proved to carry."""
+    predicted_first_slip: Annotated[Known, Asked(EXECUTED)] = None
+    """Least multiple of a trial's load at which a contact slips, predicted; null if none ever
+    does."""
+    simulated_first_slip: Annotated[Known, Asked(EXECUTED)] = None
+    """Least multiple of a trial's load that slips, from simulated contact forces."""
+    executed_trials: Annotated[int | None, Asked(EXECUTED)] = None
+    """Number of trials of the execution."""
+    execution_mismatches: Annotated[int | None, Asked(EXECUTED)] = None
+    """Number of the execution's own negative controls that did not slip, but must."""
+    execution: Annotated[ExecutionCells | None, FLAT, Asked(EXECUTED)] = None
+    """Figures of the execution."""
+
+    kind: Annotated[str | None, Asked("kinds")] = None
+    """`planned`, `given`, the name of a negative control, or `friction_below`, .. `mass_near`."""
+    made_from: Annotated[str | None, Asked("kinds")] = None
+    """The grasp that a varied one was made from; null for others."""
+    friction_ratio: Annotated[Known, Asked("kinds")] = None
+    """Friction over critical friction; null where none is known."""
+    displaced_m: Annotated[Lengths | None, Asked("kinds"), Within(0.0, ROUNDING)] = None
+    """Distance of each contact from that of `made_from`."""
+    region_exit_m: Annotated[Lengths | None, Asked("kinds")] = None
+    """How far the region reached in the direction of that move; null where the contact did not
+    move."""
+    mass_ratio: Annotated[Known, Asked("kinds")] = None
+    """Mass over the mass at which `made_from` is predicted to lose the object."""
+
+    span_angle_rad: Annotated[Known, Asked("closure"), Within(ROUNDING, ROUNDING)] = None
+    """Half-angle below which cones positively span."""
+    smallest_singular_value: Annotated[Known, Asked("closure"), Within(ROUNDING, ROUNDING)] = None
+    """Least singular value of the grasp map."""
+    witness_forces_n: Annotated[Points | None, Asked("closure")] = None
+    """Balanced forces on the object, normal parts sum to one."""
+
+    predicted_loss: Annotated[Known, Asked("margins")] = None
+    """Least multiple of a trial's load that loses it."""
+    payload_kg: Annotated[Known, Asked("margins"), Within(ROUNDING)] = None
+    """Mass that the squeeze is proved to carry."""
+    tip_radius_m: Annotated[Known, Asked("margins")] = None
+    """Radius of the fingertips of the execution."""
+
+    least_push_n: Annotated[Known, Asked("least_squeeze")] = None
+    """Least largest push that carries the weight any way."""
+    least_squeeze_n: Annotated[ByFinger | None, Asked("least_squeeze")] = None
+    """Contact forces at rest with that push."""
+
+    hand_reached: Annotated[bool | None, Asked("hand")] = None
+    """Whether a pose of the hand was found; null if not closed."""
+    hand_reason: Annotated[str | None, Asked("hand")] = None
+    """Why no pose was found; empty where one was."""
+    hand_fingers: Annotated[Four | None, Asked("hand")] = None
+    """Number of the hand's finger at each contact."""
+    hand_joints_rad: Annotated[Joints | None, Asked("hand")] = None
+    """Joint angles, finger by finger from the palm."""
+    T_object_palm_m: Annotated[Annotated[Array, Shape(4, 4)] | None, Asked("hand")] = None
+    """Pose of the palm in the object's frame."""
+    hand_points_m: Annotated[Points | None, Asked("hand")] = None
+    """Contacts of the fingertips."""
+    hand_normals: Annotated[Points | None, Asked("hand")] = None
+    """Inward unit normals at these."""
+    hand_open_joints_rad: Annotated[Joints | None, Asked("hand")] = None
+    """Joint angles with open fingers; null if none found."""
+    hand_approach: Annotated[Annotated[Array, Shape(3)] | None, Asked("hand")] = None
+    """Direction of the palm's straight way in; null if none."""
+
+    def _check_together(self) -> None:
+        for name in ("contact_points_m", "contact_normals"):
+            there = np.isfinite(getattr(self, name)).all(axis=1)
+            if there.sum() != self.contacts or not there[: self.contacts].all():
+                raise InputError(f"{name} must have the {self.contacts} that `contacts` says first")
+        if not (np.abs(np.linalg.norm(self.normals, axis=1) - 1.0) <= UNIT).all():
+            raise InputError("contact_normals must be unit vectors")
+        if not self.was_tried:
+            claims = (self.held, self.force_closed, self.closure_margin)
+            if self.label != GIVEN or self.trials or any(claim is not None for claim in claims):
+                raise InputError("the row claims results, although the grasp was not tried")
+        elif self.held is None or self.force_closed is None or not self.trials:
+            raise InputError("a grasp that was tried must have trials, held and force_closed")
+        elif self.force_closed and self.closure_margin is None:
+            raise InputError("closure_margin must be a number where a grasp is in force closure")
+        elif self.held != (self.outcome == Outcome.HELD.value):
+            raise InputError(f"held is {self.held}, but `outcome` is {self.outcome!r}")
+
+        self._check_execution()
+        self._check_pose()
+
+    def _check_execution(self) -> None:
+        """Refuse results of an execution that was not simulated; without a squeeze all is lost."""
+        claims = [name for name in CLAIMS if getattr(self, name) is not None]
+        lost = claims == ["survived"] and not self.survived and self.execution_note
+        control = self.executed and self.control_of is not None
+        if control or (claims and not self.executed and not lost):
+            raise InputError("the row claims results of an execution, although none was simulated")
+        if self.executed and (self.squeeze_n is None or None in (self.mass_kg, self.load_multiple)):
+            raise InputError("an executed row must have its squeeze, its mass and what it carries")
+
+    def _check_pose(self) -> None:
+        """Refuse a hand that is reached without a pose, or not reached without a reason."""
+        if self.hand_reached is not None and self.hand_reached == bool(self.hand_reason):
+            raise InputError(
+                f"hand_reason is {self.hand_reason!r}, but hand_reached is {self.hand_reached}"
+            )
+        pose = (self.hand_joints_rad, self.T_object_palm_m, self.hand_fingers, self.hand_points_m,
+                self.hand_normals)  # fmt: skip
+        if {each is not None for each in pose} != {bool(self.hand_reached)}:
+            raise InputError("the pose of a hand must be there exactly where hand_reached is true")
+
+    @property
+    def was_tried(self) -> bool:
+        """Whether the contacts were simulated, closed or not."""
+        return self.outcome != NOT_TRIED
+
+    @property
+    def points(self) -> Array:
+        """The contacts that are there, (k, 3) [m]."""
+        return self.contact_points_m[: self.contacts]
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals at them, into the object, (k, 3)."""
+        return self.contact_normals[: self.contacts]
+
+    @property
+    def placed(self) -> tuple[Contact, ...]:
+        """The contacts that are there."""
+        return tuple(map(Contact, self.points, self.normals))
+
+    def held_on(self, body: Polyhedron) -> Polyhedron:
+        """Return the object; on curved surfaces contacts not planned have faces of their own."""
+        other = self.label in (GIVEN, VARIED)
+        return seat(body, self.points, self.normals).body if other else body
 
 
-Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
-"""The tables of a dataset, with their columns."""
-Form: TypeAlias = tuple[CellKind, tuple[int, ...]]
-"""Type and shape of a column's cells."""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TrialRow(Declared):
+    """A grasp or control under one wrench, in simulation."""
+
+    grasp_id: str
+    """Grasp that is tried."""
+    trial: Number
+    """Number of the trial, from 0 for each grasp."""
+    name: str
+    """Name of the wrench."""
+    wrench_n_nm: Wrench
+    """Applied force, then torque."""
+    predicted_limit: Known
+    """Largest multiple of the wrench resisted, by analysis."""
+    required_friction: Known
+    """Friction that the planned contact forces need."""
+    hold: Annotated[HoldVerdict, FLAT]
+    simulated_limit: Known
+    """Multiple of the wrench that slips in simulation."""
 
 
-def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[Column, ...]:
-    """Return the columns of a row class in a dataset with some groups of columns.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ExecutionRow(Declared):
+    """A grasp in one trial of its execution, in simulation."""
 
-    A group's size is the length that has its name in the shape of an array; a length that is free
-    is the number of fingers.
-    """
-    own, properties = entries(kind)
-    found: list[Column] = []
-    for each in (*own, *properties):
-        marks = rules(each.kind)
-        if any(isinstance(mark, Asked) and mark.group not in groups for mark in marks):
-            continue
-        if each.flat is not None:
-            found += columns_of(each.flat, groups)
-        else:
-            form, meaning = _form(each.kind, groups), meanings(kind).get(each.name, "")
-            assert form is not None, each.key  # noqa: S101 - all fields of row classes are cells
-            unit = (unit_of(each.key) or "1") if form[0] == "float" else ""
-            found.append(Column(each.key, form[0], meaning.replace("None", "null"), unit, form[1]))
-    return tuple(found)
+    grasp_id: str
+    """Grasp that is executed."""
+    trial: Number
+    """Number of the trial, from 0 for each grasp."""
+    tried: Annotated[ExecutionTrial, FLAT]
+    seed: Annotated[Seed | None, Asked("margins")] = None
+    """Seed that a misplaced trial was drawn by; null for others."""
 
 
-def _form(kind: Any, groups: Mapping[str, int]) -> Form | None:
-    """Return how cells hold values of a kind; None if no cell can."""
-    origin, parts = get_origin(kind), get_args(kind)
-    if origin is Annotated:
-        shape = next((rule for rule in parts[1:] if isinstance(rule, Shape)), None)
-        if shape is None:
-            return _form(parts[0], groups)
-        lengths = (FINGERS if n is None else groups[n] if isinstance(n, str) else n
-                   for n in shape.shape)  # fmt: skip
-        return "int" if shape.whole else "float", tuple(lengths)
-    if origin in (Union, UnionType):
-        return _form(next(part for part in parts if part is not type(None)), groups)
-    if origin is tuple:
-        return _form_of_items(parts)
-    if origin is Literal or (isinstance(kind, type) and issubclass(kind, Enum)):
-        return "text", ()
-    plain: Mapping[Any, CellKind] = {str: "text", bool: "bool", int: "int", float: "float"}
-    return (plain[kind], ()) if kind in plain else None
+ROWS: Mapping[Name, type[Any]] = {
+    "objects": ObjectRow, "grasps": GraspRow, "trials": TrialRow, "executions": ExecutionRow,
+}  # fmt: skip
+"""The class of each table's rows."""
 
 
-def _form_of_items(parts: tuple[Any, ...]) -> Form | None:
-    """Return how cells hold a tuple: some numbers, or how many texts there are."""
-    inner = _form(parts[0], {})
-    if inner is None or inner[1]:
-        return None
-    if parts[-1] is Ellipsis:
-        return ("int", ()) if inner[0] == "text" else None
-    return inner[0], (len(parts),)
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Rows of all tables that belong together."""
+
+    objects: tuple[ObjectRow, ...] = ()
+    grasps: tuple[GraspRow, ...] = ()
+    trials: tuple[TrialRow, ...] = ()
+    executions: tuple[ExecutionRow, ...] = ()
+
+    def of(self, name: Name) -> tuple[Any, ...]:
+        """Return the rows of a table."""
+        return getattr(self, name)
+
+    def of_unit(self, row: ObjectRow, friction: float) -> "Rows":
+        """Return the rows of one object at one friction."""
+        beginning = id_beginning(row.object_id, friction)
+        own = {
+            name: tuple(each for each in self.of(name) if each.grasp_id.startswith(beginning))
+            for name in NAMES if name != "objects"
+        }  # fmt: skip
+        return Rows((row,), **own)
+
+    def cells(self, name: Name, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
+        """Return the cells of the rows of a table."""
+        return [cells_of(row, columns) for row in self.of(name)]
 
 
-def in_columns(kind: type, told: tuple[str, ...], beginning: str = "") -> Iterator[Figure]:
-    """Yield the figures of a class that cells can hold, but for those that other columns tell.
-
-    They may be null, and their columns may all begin alike. Of texts, the number is held.
-    """
-    for each in figures(kind):
-        form = _form(each.kind, {})
-        if form is not None and each.name not in told:
-            held = int if form[0] == "int" else each.kind
-            yield each._replace(kind=Annotated[held | None, Key(f"{beginning}{each.name}")])
-
-
-def _plain(value: Any) -> Any:
-    """Return a number as a cell: null for one that is not finite."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def cells_of(row: object, columns: tuple[Column, ...]) -> dict[str, Any]:
-    """Return the cells of a row; where it has fewer fingers than a column, the last are null."""
-    found = record_of(row)
-    return {each.name: _filled(found.get(each.name), each) for each in columns}
-
-
-def _filled(value: Any, column: Column) -> Any:
-    if value is None or not column.shape:
-        return _plain(value)
-    missing = np.full(column.shape[1:], None).tolist()
-    return value + [missing] * (column.shape[0] - len(value))
-
-
-def agrees(kind: type, name: str, stated: Any, value: Any) -> bool:
-    """Return whether a cell is what was computed again, as far as its kind asks for it."""
-    value = _plain(value)
-    if stated is None or value is None:
-        return stated is value
-    within = next((mark for mark in rules(types(kind)[name]) if isinstance(mark, Within)), None)
-    if within is None:
-        return stated == value
-    return np.allclose(stated, value, rtol=within.relative, atol=within.absolute)
-
-
-Columns: TypeAlias = dict[str, NDArray[Any]]
-TYPES: Mapping[CellKind, str] = {
-    "text": "string",
-    "bool": "bool_",
-    "int": "int64",
-    "float": "float64",
-}
-MISSING: Mapping[str, float] = {"float": math.nan, "int": -1}
-"""Value that stands for null in arrays, by type of column."""
-GROUP_ROWS = 20_000
-"""Number of rows that are written or read at a time, some tens of megabytes in memory."""
-MOST_ROWS, MOST_GROUP_BYTES = 10_000_000, 2**30
-"""Largest number of rows of a file, and of bytes in a row group, that are read: twenty times what
-is written."""
-PAGES: Mapping[str, Any] = {
-    "compression": "zstd",
-    "write_page_checksum": True,
-    "write_page_index": True,
-}
-FILE_ROWS = 500_000
-"""Number of rows at which a file is closed and the next one begun, about 100 MB of grasps."""
-
-
-def pyarrow() -> Any:
-    """Import pyarrow, the library that reads and writes Parquet."""
-    try:
-        importlib.import_module("pyarrow.parquet")
-        return importlib.import_module("pyarrow")
-    except ImportError as error:
-        raise InputError(
-            "datasets are Parquet files, which need pyarrow: run pip install 'graspproof[dataset]' "
-            "('.[dataset]' in a checkout)"
-        ) from error
-
-
-def parquet_bytes(name: Name, rows: Sequence[Cells], tables: Tables) -> bytes:
-    """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
-    arrow, held = pyarrow(), io.BytesIO()
-    try:
-        table = arrow.Table.from_pylist(list(rows), schema=schema_of(tables[name]))
-    except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
-        raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
-    arrow.parquet.write_table(_in_order(table, name), held, **PAGES)
-    return held.getvalue()
-
-
-def _in_order(table: Any, name: Name) -> Any:
-    """Return a table sorted by its keys, which no two rows may share."""
-    keys = list(KEYS[name])
-    if table.group_by(keys).aggregate([]).num_rows < table.num_rows:
-        raise InputError(
-            f"table {name}: two rows have the same {' and '.join(keys)}; build the dataset again "
-            "into an empty folder"
-        )
-    return table.sort_by([(key, "ascending") for key in keys])
-
-
-def each_batch(path: Path, name: Name, tables: Tables) -> Iterator[Any]:
-    """Yield the rows of a file as Arrow's record batches, without holding all of them in memory."""
-    with _opened(path, name, tables) as file:
-        yield from file.iter_batches(GROUP_ROWS)
-
-
-def joined(paths: Iterable[Path], name: Name, tables: Tables) -> Any:
-    """Read some files of one table as one Arrow table, sorted by its keys."""
-    return _in_order(
-        pyarrow().concat_tables([read_table(each, name, tables) for each in paths]), name
+def groups_asked() -> Iterator[str]:
+    """Yield the names of all groups of columns."""
+    marks = (
+        rule for kind in ROWS.values() for each in types(kind).values() for rule in rules(each)
     )
+    yield from dict.fromkeys(mark.group for mark in marks if isinstance(mark, Asked))
 
 
-def read_table(path: Path, name: Name, tables: Tables) -> Any:
-    """Read a file as an Arrow table and check all of its checksums."""
-    with _opened(path, name, tables) as file:
-        return file.read()
-
-
-@contextmanager
-def _opened(path: Path, name: Name, tables: Tables) -> Generator[Any]:
-    """Open a file of one of the tables; any damage is raised as an `InputError`."""
-    arrow = pyarrow()
-    try:
-        with arrow.parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            came, wanted = file.schema_arrow, schema_of(tables[name])
-            if came.names != wanted.names or came.types != wanted.types:
-                what = "column types" if came.names == wanted.names else "columns"
-                raise InputError(
-                    f"{path}: expected the {what} of the table {name} in this version of "
-                    "graspproof, got others; build the dataset again"
-                )
-            _check_size(path, file.metadata)
-            yield file
-    # ValueError: also for names that are not valid text
-    except (OSError, ValueError, arrow.ArrowException) as error:
-        said = shown(" ".join(str(error).split()))
-        raise InputError(
-            f"{path}: this file is not Parquet, or is damaged ({said}); copy the dataset again"
-        ) from error
-
-
-def _check_size(path: Path, claimed: Any) -> None:
-    """Refuse a file that would not fit into memory, before anything is read."""
-    groups = [claimed.row_group(i) for i in range(claimed.num_row_groups)]
-    rows, largest = claimed.num_rows, max((each.total_byte_size for each in groups), default=0)
-    if not 0 <= rows <= MOST_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
-        raise InputError(
-            f"{path}: the file claims {rows} rows, and {largest} bytes in one group of rows; the "
-            f"limits are {MOST_ROWS} and {MOST_GROUP_BYTES}, so the file is not read"
-        )
-
-
-def read_columns(paths: Sequence[Path], name: Name, tables: Tables) -> Columns:
-    """Read the columns of a table's files, one after another, as arrays (rows, ..).
-
-    Null is NaN in columns of floats, and -1 in columns of whole numbers. Text is an object, with
-    None for null. Truth values are bool where none is null. Otherwise they are 1.0, 0.0 and NaN:
-    floats refuse `~` and `&`, which would give wrong answers for objects without a word.
-    """
-    read = [read_table(path, name, tables) for path in paths]
+def dataset_tables(groups: Mapping[str, int]) -> Tables:
+    """Return the tables of a dataset with their columns; groups of columns have their sizes."""
     return {
-        column.name: _as_array(
-            column, [cell for one in read for cell in one[column.name].to_pylist()]
-        )
-        for column in tables[name]
+        name: columns_of(ROWS[name], groups)
+        for name in NAMES
+        if name != "executions" or EXECUTED in groups
     }
 
 
-def _as_array(column: Column, values: Sequence[Any]) -> NDArray[Any]:
-    if column.kind == "text":
-        return np.array(values, dtype=object)
-    if column.kind == "bool":
-        unknown = any(value is None for value in values)
-        return np.array([math.nan if value is None else value for value in values],
-                        dtype=np.float64 if unknown else np.bool_)  # fmt: skip
-    missing = MISSING[column.kind]
-    empty = np.full(column.shape, missing).tolist()
-    filled = [empty if value is None else value for value in values]
-    found = np.array(filled, dtype=object).reshape(len(values), *column.shape)
-    found[found == None] = missing  # noqa: E711 - elementwise
-    return found.astype(np.int64 if column.kind == "int" else np.float64)
-
-
-@cache
-def schema_of(columns: tuple[Column, ...]) -> Any:
-    """Return columns of a table as an Arrow schema, with units and meanings as metadata."""
-    arrow = pyarrow()
-    found = list[Any]()
-    for column in columns:
-        kind = getattr(arrow, TYPES[column.kind])()
-        for size in reversed(column.shape):
-            kind = arrow.list_(kind, size)
-        about = {"meaning": column.meaning} | ({"unit": column.unit} if column.unit else {})
-        found.append(arrow.field(column.name, kind, metadata=about))
-    return arrow.schema(found)
-
-
-def write_files(
-    folder: Path, split: str, parts: Iterable[Any], about: Mapping[str, str]
-) -> list[tuple[Path, int]]:
-    """Write tables, one after another, into files of a split; list these with their rows.
-
-    Rows are kept back until there are enough for a group of rows, so memory does not grow. At the
-    end no file is open, whatever happens.
-    """
-    found, groups = list[tuple[Path, int]](), _groups(parts, dict(sorted(about.items())))
-    while (first := next(groups, None)) is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f".{split}-{len(found):05}"
-        found.append((path, _write_file(path, chain([first], groups), first.schema)))
-    named = (f"{split}-{place:05}-of-{len(found):05}.parquet" for place in range(len(found)))
-    return [
-        (path.rename(folder / name), rows)
-        for (path, rows), name in zip(found, named, strict=True)
-    ]  # fmt: skip
-
-
-def _groups(parts: Iterable[Any], about: Mapping[str, str]) -> Iterator[Any]:
-    """Yield the rows of tables in groups that are large enough, but for the last."""
-    waiting = list[Any]()
-    for part in parts:
-        waiting += [part.replace_schema_metadata(about)] if part.num_rows else []
-        if sum(each.num_rows for each in waiting) >= GROUP_ROWS:
-            yield pyarrow().concat_tables(waiting)
-            waiting.clear()
-    if waiting:
-        yield pyarrow().concat_tables(waiting)
-
-
-def _write_file(path: Path, groups: Iterable[Any], schema: Any) -> int:
-    """Write groups of rows until the file is full, and return the number of rows."""
-    rows = 0
-    writer = pyarrow().parquet.ParquetWriter
-    with path.open("wb") as stream, writer(stream, schema, **PAGES) as to:
-        for group in groups:
-            to.write_table(group, row_group_size=group.num_rows)
-            rows += group.num_rows
-            if rows >= FILE_ROWS:
-                break
-    return rows
+TABLES = dataset_tables({})
+"""Tables of a dataset without columns on request."""

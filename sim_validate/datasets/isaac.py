@@ -27,10 +27,10 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.closure_scene import arrange
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.settings import FingerSettings
-from sim_validate.datasets.columns import pyarrow
+from sim_validate.datasets.columns import GIVEN, GraspRow, ObjectRow
 from sim_validate.datasets.config import CREDITS, SHORT, Name, SplitName, quoted
 from sim_validate.datasets.open_dataset import Dataset, mesh_path, select
-from sim_validate.datasets.rows import GIVEN, GraspRow, ObjectRow
+from sim_validate.datasets.parquet import pyarrow
 from sim_validate.kit.files import whole_folder
 
 AXES = "xyz"

@@ -40,9 +40,9 @@ from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
 from sim_validate.closure.controls import LEAST_FRICTION, negative_controls, try_control
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
-from sim_validate.datasets.columns import Cells
+from sim_validate.datasets.columns import ExecutionCells, ExecutionRow, GraspRow
 from sim_validate.datasets.config import DatasetConfig, Learning
-from sim_validate.datasets.rows import ExecutionCells, ExecutionRow, GraspRow
+from sim_validate.datasets.parquet import Cells
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute, tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial

@@ -34,7 +34,15 @@ from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from sim_validate.closure.replaying import Recorded, Wanted
-from sim_validate.datasets.columns import Columns, Tables, each_batch, read_columns
+from sim_validate.datasets.columns import (
+    ROWS,
+    GraspRow,
+    ObjectRow,
+    Rows,
+    TrialRow,
+    dataset_tables,
+    groups_asked,
+)
 from sim_validate.datasets.config import (
     KEYS,
     SHORT,
@@ -44,15 +52,7 @@ from sim_validate.datasets.config import (
     SplitName,
     config_from_toml,
 )
-from sim_validate.datasets.rows import (
-    ROWS,
-    GraspRow,
-    ObjectRow,
-    Rows,
-    TrialRow,
-    dataset_tables,
-    groups_asked,
-)
+from sim_validate.datasets.parquet import Columns, Tables, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.kit.files import path_inside, require_inside
 from sim_validate.planning.asked_objects import NAMED, some

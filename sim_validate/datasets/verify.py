@@ -40,7 +40,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import arithmetic
 from grasp_core.values import FINGERS
 from sim_validate.datasets.build import CONTACTS, TWIN
-from sim_validate.datasets.columns import Cells, agrees, pyarrow
+from sim_validate.datasets.columns import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
 from sim_validate.datasets.config import KEYS, NAMES, REFERENCES, SPLITS, Name
 from sim_validate.datasets.learning import RATIOS, contact_cells, hand_named, ratio_of, trial_cells
 from sim_validate.datasets.open_dataset import (
@@ -51,8 +51,8 @@ from sim_validate.datasets.open_dataset import (
     read_left_out,
     select,
 )
-from sim_validate.datasets.rows import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
-from sim_validate.datasets.units import PLANNED, WorkUnit, made_of, provenance, read_given
+from sim_validate.datasets.parquet import Cells, agrees, pyarrow
+from sim_validate.datasets.work_units import PLANNED, WorkUnit, made_of, provenance, read_given
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip

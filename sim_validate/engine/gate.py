@@ -55,8 +55,7 @@ from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.closure_scene import Scene
-from sim_validate.engine.bench import CLOCK_SLACK_S, Bench, Load, Schedule
-from sim_validate.engine.rig import (
+from sim_validate.engine.limits import (
     Rig,
     SimulatedLimit,
     bisected,
@@ -68,6 +67,7 @@ from sim_validate.engine.rig import (
     squeezed,
 )
 from sim_validate.engine.setup import Setup
+from sim_validate.engine.simulate import CLOCK_SLACK_S, Bench, Load, Schedule
 from sim_validate.engine.traces import holds
 
 LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0

@@ -69,7 +69,7 @@ from grasp_core.figures import Shown
 from grasp_core.kinds import Measured
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.closure_scene import Layout, grasp_size
-from sim_validate.engine.bench import Health, Motion, Schedule
+from sim_validate.engine.simulate import Health, Motion, Schedule
 from sim_validate.settings import HoldProtocol
 
 Mask: TypeAlias = NDArray[np.bool_]

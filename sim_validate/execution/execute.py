@@ -38,7 +38,10 @@ from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held_scene import SAMPLE_S, HeldScene, build_held_scene, held_physics
 from scenes.settings import PhysicsSettings
 from sim_validate.engine.setup import MOST_THREADS
-from sim_validate.execution.bench import (
+from sim_validate.execution.gate import require_faithful_execution
+from sim_validate.execution.paths import Drive
+from sim_validate.execution.predictions import Holder, NoSqueezeError, found_enough, planned
+from sim_validate.execution.simulate import (
     FULL,
     IDLE,
     HeldBench,
@@ -49,9 +52,6 @@ from sim_validate.execution.bench import (
     outcome,
     sticking_multiple,
 )
-from sim_validate.execution.gate import require_faithful_execution
-from sim_validate.execution.paths import Drive
-from sim_validate.execution.predictions import Holder, NoSqueezeError, found_enough, planned
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
 from sim_validate.kit.processes import each, processes
@@ -284,7 +284,7 @@ def run_trials(bench: HeldBench, trials: Sequence[Trial]) -> dict[Trial, HeldMot
 def _with_first_slips(
     bench: HeldBench, judged: Mapping[Trial, ExecutionTrial]
 ) -> tuple[ExecutionTrial, ...]:
-    """Measure the first slip of loads that come at once, by contacts that stick (see `bench`)."""
+    """Measure the first slip of loads that come at once, by contacts that stick."""
     known, friction = dict(judged), bench.scene.layout.friction
     rough = {
         replace(trial, drive=replace(trial.drive, friction=STICKING * friction)): trial

@@ -56,8 +56,8 @@ from scenes.mujoco.scene_text import AWAY, TOUCH
 from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
 from sim_validate.engine.gate import DEPTH, Check, measured, near, sized, touch_checks, two_digits
 from sim_validate.execution import paths
-from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.paths import Drive, Table, idle, samples, smoother
+from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
 
 DOWN = np.array(UPRIGHT)
 WEIGHT = GRAVITY_M_PER_S2 * DOWN

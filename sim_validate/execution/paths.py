@@ -26,8 +26,8 @@ from grasp_core.closure.contacts import WRENCH, contact_frames
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.held_scene import SAMPLE_S
 from scenes.mujoco.mjcf_text import quaternion
-from sim_validate.engine import bench
-from sim_validate.engine.bench import smooth
+from sim_validate.engine import simulate
+from sim_validate.engine.simulate import smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ STOP_RISE_S = 0.02
 
 def samples(duration_s: float) -> int:
     """Return the whole number of samples nearest to a duration, at least one."""
-    return bench.samples(duration_s, SAMPLE_S)
+    return simulate.samples(duration_s, SAMPLE_S)
 
 
 def smoother(count: int) -> Array:

@@ -49,8 +49,8 @@ from scenes.mujoco.held_scene import HeldLayout
 from scenes.mujoco.mjcf_text import quaternion, rotations
 from scenes.mujoco.scene_text import TOUCH
 from sim_validate.execution import paths
-from sim_validate.execution.bench import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.paths import Drive, Pose, Table
+from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.verdict import ExecutionControl, Skipped
 from sim_validate.settings import ExecutionSettings, TrialKind
 

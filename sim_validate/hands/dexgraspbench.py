@@ -47,7 +47,7 @@ from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
 from scenes.mujoco.mjcf_text import quaternion, rotations
-from scenes.mujoco.tested import HandServos, Postures
+from scenes.mujoco.published_tests import HandServos, Postures
 
 FREE = 7
 """Numbers of a pose: position and quaternion."""

@@ -69,10 +69,17 @@ from scenes.mujoco.held_scene import HeldScene
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import HoldsWrenches, WrenchVerdict
-from sim_validate.engine.bench import Bench, Load
 from sim_validate.engine.gate import Check, measured, require_faithful, two_digits
-from sim_validate.engine.rig import Analysis, PlannedLoad, closed_on, part, ramped_limits, squeezed
+from sim_validate.engine.limits import (
+    Analysis,
+    PlannedLoad,
+    closed_on,
+    part,
+    ramped_limits,
+    squeezed,
+)
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
+from sim_validate.engine.simulate import Bench, Load
 from sim_validate.engine.traces import LET_GO, HoldVerdict, judge
 from sim_validate.execution.execute import asked_settings, execution_of, result_of
 from sim_validate.execution.predictions import Holder

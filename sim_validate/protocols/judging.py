@@ -32,11 +32,11 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scenes import build_hand_scene
-from scenes.mujoco.tested import TestedObject, TestedScene
-from sim_validate.engine.bench import Bench, Motion, Told, samples
+from scenes.mujoco.published_tests import TestedObject, TestedScene
 from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.rig import Analysis, closed_on
+from sim_validate.engine.limits import Analysis, closed_on
 from sim_validate.engine.setup import Setup
+from sim_validate.engine.simulate import Bench, Motion, Told, samples
 from sim_validate.engine.traces import Outcome, judge, rotation_angles
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures

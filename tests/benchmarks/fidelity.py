@@ -24,8 +24,7 @@ from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.settings import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
-from sim_validate.engine.bench import Bench, Load
-from sim_validate.engine.rig import (
+from sim_validate.engine.limits import (
     bisected_limits,
     part,
     ramped_limits,
@@ -33,6 +32,7 @@ from sim_validate.engine.rig import (
     squeezed,
 )
 from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.simulate import Bench, Load
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.kit.processes import available_cores, each
 from tests.benchmarks.objects import FAMILIES

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from pyarrow import parquet
 
-from sim_validate.datasets.columns import parquet_bytes, read_columns
-from sim_validate.datasets.rows import TABLES
+from sim_validate.datasets.columns import TABLES
+from sim_validate.datasets.parquet import parquet_bytes, read_columns
 from sim_validate.kit.files import arrays_of
 from sim_validate.planning.regions import ARRAYS, regions_of
 from tests.fuzzing.targets import Target

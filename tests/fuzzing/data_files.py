@@ -22,7 +22,7 @@ from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.build import UnitRecord
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.open_dataset import Listed, Manifest, left_out_from
-from sim_validate.datasets.units import given_from_json
+from sim_validate.datasets.work_units import given_from_json
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.hands.reaches import Reaches

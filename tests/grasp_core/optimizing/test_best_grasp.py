@@ -12,7 +12,7 @@ from grasp_core.compiled import compiled
 from grasp_core.optimizing import best_grasp as searching
 from grasp_core.optimizing import search
 from grasp_core.optimizing.ascent import CLIMBED
-from grasp_core.optimizing.grounds import ROOM, exact_maps, grounds_of
+from grasp_core.optimizing.contact_places import ROOM, exact_maps, grounds_of
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.optimizing.grounds import exact_maps, grounds_of
+from grasp_core.optimizing.contact_places import exact_maps, grounds_of
 from grasp_core.optimizing.support_cuts import ROUNDING, read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object

@@ -7,8 +7,8 @@ import pytest
 from grasp_core.errors import InputError
 from grasp_core.quality.motors import Motors
 from scenes.mujoco.hand_scenes import finger_springs
-from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.paths import closing
+from sim_validate.execution.simulate import HeldBench
 from tests.sim_validate.hands.executing import standing
 
 WRITTEN = 2e-8

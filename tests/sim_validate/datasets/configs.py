@@ -3,9 +3,9 @@
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
-from sim_validate.datasets.columns import read_table
 from sim_validate.datasets.config import DatasetConfig, Learning
 from sim_validate.datasets.open_dataset import select
+from sim_validate.datasets.parquet import read_table
 from tests.sim_validate.datasets.engines import Here, silent
 
 CONFIG = DatasetConfig(

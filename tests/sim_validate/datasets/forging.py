@@ -3,8 +3,8 @@
 import dataclasses
 import hashlib
 
-from sim_validate.datasets.columns import parquet_bytes, read_table
 from sim_validate.datasets.open_dataset import listed, read_manifest, write_manifest
+from sim_validate.datasets.parquet import parquet_bytes, read_table
 
 
 def first(where=lambda _: True, **cells):

@@ -11,7 +11,7 @@ import grasp_core as gc
 import sim_validate
 from scenes.example_objects import example_object
 from sim_validate.datasets import build as build_module
-from sim_validate.datasets import columns as parquet
+from sim_validate.datasets import parquet
 from sim_validate.datasets.build import build
 from sim_validate.datasets.config import DatasetConfig, config_from_toml
 from sim_validate.datasets.verify import verify

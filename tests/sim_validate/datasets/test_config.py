@@ -8,7 +8,7 @@ import trimesh
 
 import grasp_core as gc
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
-from sim_validate.datasets.units import body_of, units_of
+from sim_validate.datasets.work_units import body_of, units_of
 
 SETTINGS = {"objects": ["wedge", "dodecahedron"], "frictions": [0.3, 1], "limit": 4, "seed": 7}
 

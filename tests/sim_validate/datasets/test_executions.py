@@ -14,10 +14,10 @@ import grasp_core as gc
 import sim_validate as sv
 from scenes.example_objects import example_object
 from sim_validate.datasets.build import build
+from sim_validate.datasets.columns import GraspRow
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.learning import execution_cells, execution_rows
 from sim_validate.datasets.open_dataset import select
-from sim_validate.datasets.rows import GraspRow
 from sim_validate.datasets.verify import loose_differences, verify
 from sim_validate.execution.verdict import CLEAR_OF_SLIP, ExecutedGrasp
 from tests.sim_validate.datasets.configs import rows_of

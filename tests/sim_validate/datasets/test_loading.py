@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import sim_validate
-from sim_validate.datasets.columns import parquet_bytes, read_columns, read_table
+from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.open_dataset import select
-from sim_validate.datasets.rows import TABLES
+from sim_validate.datasets.parquet import parquet_bytes, read_columns, read_table
 
 pytest.importorskip("pyarrow")
 SPLITS = ("train", "validation", "test")

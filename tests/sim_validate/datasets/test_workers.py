@@ -10,7 +10,7 @@ from grasp_core.processes import local_processes
 from sim_validate.datasets import build as workers
 from sim_validate.datasets.build import Staging, Task, build, do_task, do_unit, drive
 from sim_validate.datasets.config import DatasetConfig
-from sim_validate.datasets.units import WorkerError, provenance, units_of
+from sim_validate.datasets.work_units import WorkerError, provenance, units_of
 from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
 

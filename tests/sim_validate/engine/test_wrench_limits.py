@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from sim_validate.engine.bench import Load
-from sim_validate.engine.rig import OVERLOAD, bisected_limits, part, ramped_limits
+from sim_validate.engine.limits import OVERLOAD, bisected_limits, part, ramped_limits
+from sim_validate.engine.simulate import Load
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
 FAMILIES = ("concurrent", "pencil", "regulus", "free")

@@ -7,8 +7,8 @@ import numpy as np
 import grasp_core as gc
 import scenes
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.predictions import HeldDynamics
+from sim_validate.execution.simulate import HeldBench
 from tests.grasp_core.execution.held import box
 
 MASS = 0.3

@@ -8,9 +8,8 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from sim_validate.engine.bench import Health
+from sim_validate.engine.simulate import Health
 from sim_validate.execution import execute
-from sim_validate.execution.bench import HeldBench, outcome
 from sim_validate.execution.execute import (
     FINE_S,
     Fingertips,
@@ -19,6 +18,7 @@ from sim_validate.execution.execute import (
     run_trials,
 )
 from sim_validate.execution.predictions import HeldDynamics
+from sim_validate.execution.simulate import HeldBench, outcome
 from sim_validate.execution.trials import trials_of
 from sim_validate.execution.verdict import trial_in_words
 from tests.sim_validate.execution.held_rigs import planned

@@ -8,15 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from scenes.mujoco.held_scene import hinged
 from scenes.mujoco.mjcf_text import rotations
-from sim_validate.engine.bench import Health
-from sim_validate.execution.bench import (
+from sim_validate.engine.simulate import Health
+from sim_validate.execution.paths import Table, idle
+from sim_validate.execution.simulate import (
     SLID,
     TOUCHED,
     HeldMotion,
     _first_slip,
     outcome,
 )
-from sim_validate.execution.paths import Table, idle
 from tests.sim_validate.execution.held_rigs import box_scene
 
 COUNT = 400

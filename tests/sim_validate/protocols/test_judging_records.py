@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.errors import InputError
 from scenes.mujoco.mjcf_text import quaternion
-from scenes.mujoco.tested import TestedObject
+from scenes.mujoco.published_tests import TestedObject
 from sim_validate.hands.dexgraspbench import (
     FREE,
     dex_record,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from scenes.mujoco.tested import TestedObject
+from scenes.mujoco.published_tests import TestedObject
 from scenes.settings import FingerSettings
 from sim_validate.protocols.judging import CHUNK, timeline
 from sim_validate.protocols.published import Step, protocol

@@ -8,9 +8,9 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.settings import PhysicsSettings
-from sim_validate.engine.bench import Bench
 from sim_validate.engine.gate import measured_gate, require_faithful, require_touch
 from sim_validate.engine.setup import Setup
+from sim_validate.engine.simulate import Bench
 from tests.sim_validate.rigs import grasps
 
 USUAL, TINY = 0.07, 5e-4

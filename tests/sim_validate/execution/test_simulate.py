@@ -9,8 +9,8 @@ import grasp_core as gc
 import scenes
 from scenes.mujoco.held_scene import SAMPLE_S
 from sim_validate.execution import paths
-from sim_validate.execution.bench import HeldBench
 from sim_validate.execution.paths import Table
+from sim_validate.execution.simulate import HeldBench
 from tests.grasp_core.execution.held import box
 from tests.sim_validate.execution.held_rigs import (
     MASS,

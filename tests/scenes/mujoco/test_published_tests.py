@@ -8,7 +8,7 @@ import pytest
 
 import grasp_core as gc
 from scenes.mujoco.chains import Weld
-from scenes.mujoco.tested import HandServos, TestedObject
+from scenes.mujoco.published_tests import HandServos, TestedObject
 from scenes.settings import FingerSettings, PhysicsSettings
 from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol

@@ -41,10 +41,7 @@ from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict,
 from sim_validate.closure.validate import tested
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import learning
-from sim_validate.datasets.columns import Cells
-from sim_validate.datasets.config import CREDITS, SPLITS, DatasetConfig, SplitName, id_beginning
-from sim_validate.datasets.open_dataset import mesh_path, mesh_text
-from sim_validate.datasets.rows import (
+from sim_validate.datasets.columns import (
     GIVEN,
     VARIED,
     ExecutionRow,
@@ -54,6 +51,9 @@ from sim_validate.datasets.rows import (
     TrialRow,
     VerdictCells,
 )
+from sim_validate.datasets.config import CREDITS, SPLITS, DatasetConfig, SplitName, id_beginning
+from sim_validate.datasets.open_dataset import mesh_path, mesh_text
+from sim_validate.datasets.parquet import Cells
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.planning.asked_objects import is_mesh_file

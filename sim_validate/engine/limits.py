@@ -56,8 +56,8 @@ from grasp_core.quality.wrench_limits import (
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import SQUEEZE, Layout, Scene
 from scenes.settings import HARD, Softness
-from sim_validate.engine.bench import Bench, Load, Motion, Schedule, samples, smooth
 from sim_validate.engine.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
+from sim_validate.engine.simulate import Bench, Load, Motion, Schedule, samples, smooth
 from sim_validate.engine.traces import EarlyEnds, Thresholds, Trace, holds, traces
 from sim_validate.settings import FrictionProtocol
 
