@@ -298,7 +298,7 @@ def rows():
 def kept_by_distance():
     """Read the table on misplaced objects, cell by cell."""
     lines = [*BENCHMARKS.read_text(encoding="utf-8").splitlines(), ""]
-    first = next(place for place, line in enumerate(lines) if line.startswith("| kept, by mm"))
+    first = next(place for place, line in enumerate(lines) if "is kept, by distance" in line)
     end = next(place for place in range(first, len(lines)) if not lines[place].startswith("|"))
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[first:end]]
 
