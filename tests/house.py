@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 57_116,
+    "lines of packages": 57_123,
     "modules of packages": 239,
     "lines of tests": 37_742,
     "lines of docs": 3_900,
@@ -21,6 +21,7 @@ TOTALS = {
 only with a line below that says why."""
 RISES = (
     "lines of packages, 57,054 to 57,106: linear programs whose rows nearly coincide",
+    "lines of packages, 57,116 to 57,123: names of modules that say more are longer",
     "lines of docs, 3,784 to 3,900: sentences that are understood without their neighbours",
     "lines of packages, 57,106 to 57,116: a folder that is gone, and how far contacts may move",
 )
