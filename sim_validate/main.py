@@ -31,7 +31,7 @@ from sim_validate.kit.exit_codes import (
     steady_streams,
 )
 from sim_validate.kit.flag_values import REGISTRY, examples_for, flags_of, with_config
-from sim_validate.kit.processes import interrupts_noted
+from sim_validate.kit.workers import interrupts_noted
 
 Command = (
     flags.Run | flags.Plan | flags.Validate | flags.Execute | flags.Scene | flags.Export

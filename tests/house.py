@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 57_123,
-    "modules of packages": 239,
-    "lines of tests": 37_742,
+    "lines of packages": 57_146,
+    "modules of packages": 240,
+    "lines of tests": 37_739,
     "lines of docs": 3_900,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -22,6 +22,7 @@ only with a line below that says why."""
 RISES = (
     "lines of packages, 57,054 to 57,106: linear programs whose rows nearly coincide",
     "lines of packages, 57,116 to 57,123: names of modules that say more are longer",
+    "lines of packages, 57,123 to 57,146, modules, 239 to 240: proofs of absence have a module",
     "lines of docs, 3,784 to 3,900: sentences that are understood without their neighbours",
     "lines of packages, 57,106 to 57,116: a folder that is gone, and how far contacts may move",
 )

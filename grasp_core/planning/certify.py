@@ -26,7 +26,7 @@ from grasp_core.closure.lines import classify_each
 from grasp_core.cones.spanning import span_angles
 from grasp_core.declared import altered, kept, trusted
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.families.free import Absence
+from grasp_core.families.absence import Absence
 from grasp_core.families.placements import Placement
 from grasp_core.frames import kept_angle
 from grasp_core.kinds import Family, Method

@@ -34,7 +34,7 @@ from sim_validate.engine.setup import (
 from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
 from sim_validate.kit.files import AboutObject
-from sim_validate.kit.processes import each, processes
+from sim_validate.kit.workers import each, processes
 
 Report = Callable[[int, int], None]
 

@@ -10,7 +10,7 @@ from grasp_core.kinds import Seed
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import IfChanged
 from sim_validate.kit.command_flags import PLAIN, FirstOnly, GraspsFile, Jobs, Spoken
-from sim_validate.kit.processes import available_cores
+from sim_validate.kit.workers import available_cores
 from sim_validate.settings import ChosenTrials
 
 MeshFile = Annotated[Path | None, arg(help=(

@@ -40,7 +40,7 @@ from sim_validate.kit.compiling import EVERYTHING, compile_loops
 from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import alone_in, remove_results, write_arrays
-from sim_validate.kit.processes import available_cores
+from sim_validate.kit.workers import available_cores
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import ChosenTrials, Noise
 

@@ -29,7 +29,7 @@ from grasp_core.kinds import Friction, Many
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertips import clashes, fitting_radius
-from sim_validate.engine.limits import Rig, squeezed
+from sim_validate.engine.limits_and_friction import Rig, squeezed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulate import Bench, Load
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace, judge

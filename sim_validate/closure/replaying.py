@@ -25,7 +25,7 @@ from scenes.mujoco.fingertips import clashes
 from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
 from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
-from sim_validate.engine.limits import Analysis, PlannedLoad, Rig, Watched, closed_on
+from sim_validate.engine.limits_and_friction import Analysis, PlannedLoad, Rig, Watched, closed_on
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulate import Load
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge

@@ -51,7 +51,7 @@ from sim_validate.closure.verdict import (
     WrenchVerdict,
 )
 from sim_validate.engine.gate import Gate, measured_gate, require_faithful, require_touch
-from sim_validate.engine.limits import (
+from sim_validate.engine.limits_and_friction import (
     Analysis,
     CriticalFriction,
     PlannedLoad,
@@ -65,7 +65,7 @@ from sim_validate.engine.limits import (
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulate import Bench
 from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
-from sim_validate.kit.processes import each, processes
+from sim_validate.kit.workers import each, processes
 from sim_validate.settings import Noise
 
 

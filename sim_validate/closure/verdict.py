@@ -24,7 +24,7 @@ from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import FingerDrive, Scene
 from sim_validate.closure.controls import ControlVerdict
 from sim_validate.engine.gate import Gate
-from sim_validate.engine.limits import CriticalFriction, SimulatedLimit
+from sim_validate.engine.limits_and_friction import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
 from sim_validate.kit.files import AboutGrasps, AboutObject

@@ -81,7 +81,7 @@ from sim_validate.datasets.work_units import (
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
 from sim_validate.kit.files import alone_in, path_inside, whole_folder
-from sim_validate.kit.processes import Cluster, check_interrupted
+from sim_validate.kit.workers import Cluster, check_interrupted
 
 HASH = re.compile(r"[0-9a-f]{64}")
 OTHERS = "others"

@@ -23,7 +23,7 @@ from sim_validate.datasets.open_dataset import splits_in_words
 from sim_validate.datasets.verify import verify
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.processes import dask_workers, ray_workers
+from sim_validate.kit.workers import dask_workers, ray_workers
 
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:

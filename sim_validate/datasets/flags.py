@@ -10,7 +10,7 @@ from grasp_core.kinds import Count, Seed, Share
 from grasp_core.settings import Settings
 from sim_validate.datasets.config import Content, Learning, PlannedContent, SplitName
 from sim_validate.kit.command_flags import PLAIN, Positive, Spoken
-from sim_validate.kit.processes import available_cores
+from sim_validate.kit.workers import available_cores
 
 
 @dataclass(frozen=True, slots=True, repr=False)

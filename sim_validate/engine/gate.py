@@ -55,7 +55,7 @@ from grasp_core.quality.wrench_limits import WrenchBody, axis_wrenches, limit_of
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
 from scenes.mujoco.closure_scene import Scene
-from sim_validate.engine.limits import (
+from sim_validate.engine.limits_and_friction import (
     Rig,
     SimulatedLimit,
     bisected,

@@ -54,7 +54,7 @@ from sim_validate.execution.simulate import (
 )
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
-from sim_validate.kit.processes import each, processes
+from sim_validate.kit.workers import each, processes
 from sim_validate.settings import ExecutionSettings
 
 FINE_S = 1.25e-4

@@ -37,7 +37,7 @@ from sim_validate.hands.trials import (
     hand_execution_settings,
     validate_hand,
 )
-from sim_validate.kit import processes
+from sim_validate.kit import workers
 from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
@@ -124,7 +124,7 @@ def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporte
         reporter.say("compiling inner loops once, which takes a minute or two")
         compile_loops(REACHING)
     settings = None if job.execution is None else job.execution.used
-    results, count = processes.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
+    results, count = workers.each(job, saved.grasps, jobs=command.jobs), len(saved.grasps)
     return reporter.collected(
         "reaching", results, count, ("reached", lambda each: each.reach.reached),
         partial(Reaches, AboutObject.of(job.body), job.friction, hand, job.asked, settings),

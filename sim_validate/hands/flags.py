@@ -19,7 +19,7 @@ from sim_validate.kit.command_flags import (
     ProtocolName,
     Spoken,
 )
-from sim_validate.kit.processes import available_cores
+from sim_validate.kit.workers import available_cores
 
 HandName = Annotated[
     str, arg(help="The hand: allegro, allegro-urdf, leap, or an MJCF or URDF file.")

@@ -70,7 +70,7 @@ from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import HoldsWrenches, WrenchVerdict
 from sim_validate.engine.gate import Check, measured, require_faithful, two_digits
-from sim_validate.engine.limits import (
+from sim_validate.engine.limits_and_friction import (
     Analysis,
     PlannedLoad,
     closed_on,

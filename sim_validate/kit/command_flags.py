@@ -32,7 +32,7 @@ from grasp_core.planning.settings import PlanSettings
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import Carrying
 from scenes.settings import ScaledScene
-from sim_validate.kit.processes import available_cores
+from sim_validate.kit.workers import available_cores
 from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
 
 Positive = Annotated[float, Range(above=0.0)]

@@ -19,7 +19,7 @@ from grasp_core.figures import table
 from grasp_core.files.json_text import text_of
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
-from sim_validate.kit.processes import check_interrupted
+from sim_validate.kit.workers import check_interrupted
 
 Result = TypeVar("Result")
 File = TypeVar("File", bound=RecordFile)

@@ -35,7 +35,7 @@ from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import ResultFile
-from sim_validate.kit.processes import each
+from sim_validate.kit.workers import each
 
 MOST_EDGES = 10_000
 """Most edges of all pyramids of a grasp, whose hull in six dimensions then takes ten seconds."""

@@ -30,7 +30,7 @@ from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import alone_in, remove_results
-from sim_validate.kit.processes import each
+from sim_validate.kit.workers import each
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 from sim_validate.settings import Certifying
 

@@ -39,7 +39,7 @@ from sim_validate.kit.files import (
     remove_results,
     write_arrays,
 )
-from sim_validate.kit.processes import each
+from sim_validate.kit.workers import each
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import Certifying
 

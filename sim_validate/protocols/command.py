@@ -11,7 +11,7 @@ from sim_validate.closure.command import validate_file
 from sim_validate.engine.setup import Setup
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.command import reach_file
-from sim_validate.kit import command_flags, processes
+from sim_validate.kit import command_flags, workers
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject, remove_results
@@ -55,7 +55,7 @@ def _judged(
     folder = command.out
     if folder:
         remove_results(folder, "judgements")
-    found = processes.each(call, cases, jobs=jobs)
+    found = workers.each(call, cases, jobs=jobs)
     tests = {name: protocol(name) for name in command.protocol}
     collect = partial(Judgements, AboutObject.of(saved.body), saved.friction, tests)
     done = reporter.collected(

@@ -34,7 +34,7 @@ from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.published_tests import TestedObject, TestedScene
 from sim_validate.engine.gate import require_faithful
-from sim_validate.engine.limits import Analysis, closed_on
+from sim_validate.engine.limits_and_friction import Analysis, closed_on
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulate import Bench, Motion, Told, samples
 from sim_validate.engine.traces import Outcome, judge, rotation_angles

@@ -34,7 +34,7 @@ from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import night_style, svg_of
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.kit import files
-from sim_validate.kit.processes import available_cores, each
+from sim_validate.kit.workers import available_cores, each
 from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best import MEASURES, Best, Rated
 from sim_validate.protocols.verdict import Totals

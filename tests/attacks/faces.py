@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
-from grasp_core.families.free import Absence
+from grasp_core.families.absence import Absence
 from grasp_core.geometry import polygons as flat_polygons
 from grasp_core.regions import proof as covers
 from grasp_core.regions.proof import CertifiedRegions

@@ -24,7 +24,7 @@ from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.settings import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
-from sim_validate.engine.limits import (
+from sim_validate.engine.limits_and_friction import (
     bisected_limits,
     part,
     ramped_limits,
@@ -34,7 +34,7 @@ from sim_validate.engine.limits import (
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulate import Bench, Load
 from sim_validate.engine.traces import Outcome, judge
-from sim_validate.kit.processes import available_cores, each
+from sim_validate.kit.workers import available_cores, each
 from tests.benchmarks.objects import FAMILIES
 from tests.grasp_core.long_shapes import MM, with_holes
 

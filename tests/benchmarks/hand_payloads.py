@@ -16,7 +16,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from sim_validate.engine.limits import Analysis, closed_on, ramped_limits
+from sim_validate.engine.limits_and_friction import Analysis, closed_on, ramped_limits
 
 FRICTION, RADIUS_M, APPROACH_M = 0.5, 0.035, 0.03
 LOOSE, HOPEFUL = 0.98, 1.01

@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from sim_validate.kit import processes as engines
+from sim_validate.kit import workers as engines
 from sim_validate.main import main
 from tests.faults.conftest import CLI, KEPT, ROOT, contents
 

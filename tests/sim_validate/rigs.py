@@ -9,7 +9,7 @@ import scenes
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.mujoco.closure_scene import build_scene
-from sim_validate.engine.limits import squeezed
+from sim_validate.engine.limits_and_friction import squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulate import Bench, Load
 

@@ -15,7 +15,7 @@ from scenes.drawing.painting import View
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
 from scenes.example_objects import example_object
 from sim_validate.engine.traces import HoldVerdict, Outcome
-from sim_validate.kit import processes
+from sim_validate.kit import workers
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.flag_values import COMMAND_WORDS, EXAMPLES
 from sim_validate.main import main
@@ -53,7 +53,7 @@ def test_run_writes_grasps_verdicts_and_scenes_tells_and_removes_those_of_before
 
 def test_one_and_two_processes_give_the_same_verdicts(here, monkeypatch):
     """To the last digit: whatever is simulated was planned with digits that solvers agree on."""
-    monkeypatch.setattr(processes, "UNITS_PER_PROCESS", 2)
+    monkeypatch.setattr(workers, "UNITS_PER_PROCESS", 2)
     assert main(["plan", "tetrahedron", "--limit", "4", "--out", "p", "-q"]) == Exit.GOOD
     for jobs in ("1", "2"):
         command = ["validate", "p/grasps.json", "--jobs", jobs, "--out", jobs, "-q"]

@@ -7,14 +7,8 @@ import pytest
 import grasp_core as gc
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.families import free
-from grasp_core.families.free import (
-    Absence,
-    Undecided,
-    close_patch,
-    part_at,
-    place_by_forces,
-    place_free,
-)
+from grasp_core.families.absence import Absence, part_at
+from grasp_core.families.free import Undecided, close_patch, place_by_forces, place_free
 from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion
 from grasp_core.objects.face_pieces import unit_pieces

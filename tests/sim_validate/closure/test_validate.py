@@ -15,7 +15,7 @@ from sim_validate.closure.validate import Job
 from sim_validate.closure.verdict import Verdicts, trace_arrays
 from sim_validate.engine import gate as gate_module
 from sim_validate.engine.gate import measured_gate
-from sim_validate.engine.limits import Rig
+from sim_validate.engine.limits_and_friction import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
 from tests.sim_validate.rigs import grasps

@@ -11,7 +11,7 @@ from grasp_core.processes import local_processes
 from sim_validate.datasets.build import Staging, build, do_unit, drive
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.work_units import units_of
-from sim_validate.kit.processes import dask_workers, ray_workers
+from sim_validate.kit.workers import dask_workers, ray_workers
 from tests.sim_validate.datasets.configs import CONFIG
 from tests.sim_validate.datasets.engines import contents, silent
 

@@ -8,7 +8,7 @@ import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.mujoco.closure_scene import build_scene
-from sim_validate.engine.limits import Rig, forces_just_above, released_friction
+from sim_validate.engine.limits_and_friction import Rig, forces_just_above, released_friction
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulate import Bench
 from sim_validate.settings import FrictionProtocol

@@ -11,7 +11,7 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.closure.controls import control_case, negative_controls
-from sim_validate.engine.limits import Analysis, forces_just_above, part, squeezed
+from sim_validate.engine.limits_and_friction import Analysis, forces_just_above, part, squeezed
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulate import Bench
 from sim_validate.engine.traces import USABLE, WATCHED, EarlyEnds, Thresholds, judge

@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.arrays import to_digits
 from scenes.mujoco.silent_mujoco import unlogged
-from sim_validate.engine.limits import part
+from sim_validate.engine.limits_and_friction import part
 from sim_validate.engine.simulate import CHUNK, Bench, Load, compiled
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol

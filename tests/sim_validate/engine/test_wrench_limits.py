@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim_validate.engine.limits import OVERLOAD, bisected_limits, part, ramped_limits
+from sim_validate.engine.limits_and_friction import OVERLOAD, bisected_limits, part, ramped_limits
 from sim_validate.engine.simulate import Load
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 

@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import pytest
 
 from sim_validate.kit import compiling
-from sim_validate.kit import processes as clusters
+from sim_validate.kit import workers as clusters
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.processes import check_interrupted, each, interrupts_noted
+from sim_validate.kit.workers import check_interrupted, each, interrupts_noted
 from sim_validate.main import main
 from sim_validate.planning import plan as plan_command
 from tests.grasp_core.tasks_to_do import meet
@@ -40,10 +40,10 @@ import os, sys
 import sim_validate as sv
 from scenes import example_object
 import grasp_core as gc
-from sim_validate.kit import processes
+from sim_validate.kit import workers
 
 print("begun")
-processes.UNITS_PER_PROCESS, processes.START_S = 1, 0.0
+workers.UNITS_PER_PROCESS, workers.START_S = 1, 0.0
 body = example_object("tetrahedron")
 plan = gc.plan(body, limit=2)
 os.rmdir(os.getcwd())
