@@ -1,6 +1,6 @@
 """Runs the command `plan`, which finds certified grasps of an object and writes them to a file.
 
-What only --optimize, --regions and --best need is imported where they ask for it.
+Its flags: `command_flags.Plan`. What --optimize, --regions and --best alone need is imported late.
 """
 
 import math
