@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.closure import force_closure as module
+from grasp_core.closure.decision import Answer
 from grasp_core.files.json_text import text_of
 from grasp_core.files.records import from_record, record_of
 from tests.judges import (
@@ -12,6 +14,7 @@ from tests.judges import (
     TETRA_NORMALS,
     random_contacts,
 )
+from tests.tampering.changes import forged
 
 
 def test_face_centres_of_a_tetrahedron_are_closed_at_any_friction():
@@ -124,3 +127,17 @@ def test_the_boundary_itself_is_refuted():
     assert not certificate.closed
     assert certificate.verify()
     assert gc.force_closure(positions, normals, 0.25 * (1.0 + 1e-6)).closed
+
+
+def test_a_certificate_without_contacts_is_refused():
+    found = gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, 0.5)
+    none = {name: np.zeros((0, 3)) for name in ("positions", "normals", "forces")}
+    assert found.verify()
+    assert forged(found, **none, friction=np.zeros(0)).verify() is False
+
+
+def test_a_decision_that_its_forces_do_not_prove_is_no_certificate(monkeypatch):
+    wrong = Answer(0.1, TETRA_NORMALS * np.array([[2.0], [1], [1], [1]]), np.zeros(6), closed=True)
+    monkeypatch.setattr(module, "decide", lambda _: wrong)
+    with pytest.raises(gc.UndecidedError, match=r"neither .* can be proved \(margin 0\.1\)"):
+        gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, 0.5)

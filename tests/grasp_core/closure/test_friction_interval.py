@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.closure.friction_interval import FRICTIONLESS
+from grasp_core.closure import friction_interval
+from grasp_core.closure.friction_interval import FRICTIONLESS, closes, separates
 from scenes.example_objects import example_object
 from tests.grasp_core.bodies import BODIES, moved
 from tests.grasp_core.exact_judges import closed_exactly, open_exactly
@@ -224,3 +225,36 @@ def test_a_critical_friction_of_a_few_ten_millionths_is_zero():
     found = gc.critical_friction_interval(positions, normals)
     assert found.verify()
     assert found.critical_friction == gc.critical_friction(positions, normals) == 0.0
+
+
+SKEW = next((p, n) for p, n, grid in contact_sets(50, seed=21) if not grid and len(p) == 4)
+ON_A_LINE = np.outer(np.arange(4.0), X)
+UNPROVED = {
+    "infinite forces": (np.full((4, 3), math.inf), TETRA_CENTERS, 0.5),
+    "infinite friction": (TETRA_NORMALS, TETRA_CENTERS, math.inf),
+    "contacts on a line": (TETRA_NORMALS, ON_A_LINE, 0.5),
+}
+
+
+@pytest.mark.parametrize("case", UNPROVED)
+def test_forces_of_no_rank_or_size_close_nothing(case):
+    forces, positions, friction = UNPROVED[case]
+    assert closes(TETRA_NORMALS, TETRA_CENTERS, TETRA_NORMALS, 0.5)
+    assert not closes(forces, positions, TETRA_NORMALS, friction)
+
+
+def test_a_twist_that_is_put_to_rest_everywhere_separates_nothing():
+    """A turn about a line, which three contacts lie on but for 1.5e-9, and a shift half as far."""
+    positions, twist = np.array([0.0 * X, X, 0.5 * X + 1.5e-9 * Y]), np.append(-0.75e-9 * Z, X)
+    assert not separates(twist, positions, np.array([Z, Z, -Z]), 1.0)
+
+
+def test_what_has_no_exact_solution_proves_nothing(monkeypatch):
+    dependent = np.ones((2, 6), dtype=np.int64).astype(object)
+    assert friction_interval._solution(dependent, dependent[:, 0]) is None
+    found = gc.critical_friction_interval(*SKEW)
+    assert found.verify()
+    monkeypatch.setattr(friction_interval, "_solution", lambda *_: None)
+    assert not closes(found.forces, *SKEW, found.upper)
+    assert not separates(found.twist, *SKEW, found.lower)
+    assert found.verify() is False
