@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.execution import best_squeeze as module
+from grasp_core.execution.loads import Reactions
 from tests.grasp_core.execution.held import (
     ASIDE,
     HALF,
@@ -128,3 +130,12 @@ def test_nonsense_is_no_certificate():
         {"multipliers": 0.0 * found.multipliers},
     ):  # fmt: skip
         assert not forged(found, **change).verify(), change
+
+
+def test_a_squeeze_that_is_not_found_or_proved_is_an_error(monkeypatch):
+    monkeypatch.setattr(Reactions, "survives", lambda *_: False)
+    with pytest.raises(gc.SolverError, match="proof that the squeeze survives its loads fails"):
+        gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=10.0)
+    monkeypatch.setattr(module, "ROUNDS", 0)
+    with pytest.raises(gc.SolverError, match="no squeeze was found to survive the loads"):
+        gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=10.0)

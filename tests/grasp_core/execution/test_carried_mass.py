@@ -233,6 +233,16 @@ def test_a_search_out_of_rays_ends_after_a_few_steps_with_a_smaller_mass(monkeyp
     assert 0.1 * fine.lower < found.lower < 0.99 * fine.lower
 
 
+def test_a_mass_that_no_forces_hold_in_the_end_is_not_claimed(monkeypatch):
+    hand = next(iter(hands()))
+    monkeypatch.setattr(CarryingHand, "holds", lambda *_: False)
+    found = carried_mass(hand)
+    monkeypatch.undo()
+    assert (found.lower, len(found.forces)) == (0.0, 0)
+    assert found.upper == pytest.approx(carried_mass(hand).upper, rel=PROGRAM)
+    assert found.verify()
+
+
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
 
 

@@ -1,8 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.closure.contacts import grasp_map, normal_and_tangential
+from grasp_core.execution import first_slip as module
+from grasp_core.execution.first_slip import Held
+from tests.grasp_core.execution import held
 from tests.grasp_core.execution.held import loads_of, opposed_grip, planned_grips
 from tests.tampering.changes import forged
 
@@ -93,3 +98,32 @@ def test_a_grip_that_was_not_made_as_one_is_refused():
     grip = opposed_grip(push=5.0)
     with pytest.raises(gc.InputError, match=r"as gc\.grip makes it"):
         gc.first_slip(forged(grip, normals=2.0 * grip.normals), ACROSS)
+
+
+def cupped(stiffness):
+    """Fingers that lean inwards and up, at friction two: a weight only pushes them together."""
+    up = -ACROSS[:3]
+    contacts = [gc.Contact(c.position, np.sqrt(0.5) * (c.normal + up)) for c in held.opposed()]
+    return gc.grip(held.box(), contacts, 2.0, held.pressed(5.0), stiffness=stiffness)
+
+
+def test_a_load_that_only_presses_fingers_on_ends_in_no_slip(monkeypatch):
+    for model in ("finite", "linear"):
+        found = gc.first_slip(cupped(1e8), ACROSS, model=model)
+        assert (found.multiple, found.event, found.contact) == (np.inf, "none", -1)
+    monkeypatch.setattr(module, "MOST_STEPS", 100)
+    with pytest.raises(gc.SolverError, match="load of first slip was not met"):
+        gc.first_slip(cupped(2e3), ACROSS)
+
+
+def test_a_grip_that_no_finger_leaves_gives_way_where_its_stiffness_ends():
+    grip = opposed_grip(push=20.0, friction=50.0, stiffness=1000.0, tip_radius_m=0.0)
+    (load,) = loads_of(grip, 1, np.random.default_rng(0))
+    found = gc.first_slip(grip, load)
+    assert (found.event, found.contact) == ("unstable", -1)
+    there = replace(grip, arms=found.arms, normals=found.normals, squeeze=found.forces)
+    assert there.least_stiffness == pytest.approx(0.0, abs=0.02 * grip.least_stiffness)
+    rest = Held(grip, grip, np.zeros(3), np.eye(3))
+    assert rest.under(0.99 * found.multiple * load).grip.stable
+    with pytest.raises(gc.SolverError, match="no equilibrium of the loaded grip"):
+        rest.under(1.01 * found.multiple * load)

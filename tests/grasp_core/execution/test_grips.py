@@ -67,7 +67,8 @@ def test_two_fingers_have_no_stiffness_about_their_line():
         _ = grip.response
 
 
-def test_a_stiffness_that_is_not_positive_definite_is_refused():
-    wrong = np.diag([1.0, 1.0, -1.0]) * np.ones((4, 1, 1))
+@pytest.mark.parametrize("least", [-1.0, 1e30])
+def test_a_stiffness_that_is_huge_or_not_positive_definite_is_refused(least):
+    wrong = np.diag([1.0, 1.0, least]) * np.ones((4, 1, 1))
     with pytest.raises(gc.InputError, match="stiffness must be pos"):
         gc.grip(box(), opposed(), 0.5, pressed(5.0), stiffness=wrong)

@@ -64,3 +64,8 @@ def test_gravity_of_a_palm_that_does_not_turn_is_the_offset():
     loads = gc.any_direction(0.5, 2.0, gravity=[0.0, 0.0, -G])
     assert loads.offset == pytest.approx([0, 0, -0.5 * G, 0, 0, 0])
     assert loads.axes[:3] == pytest.approx(np.eye(3))
+
+
+def test_a_known_gravity_without_acceleration_is_no_set_of_loads():
+    with pytest.raises(gc.InputError, match="acceleration_m_per_s2 must be above zero where"):
+        gc.any_direction(0.5, gravity=[0.0, 0.0, -G])
