@@ -2,15 +2,16 @@
 
 import itertools
 import threading
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
 from grasp_core.compiled import compiled
+from grasp_core.objects.on_faces import within
+from grasp_core.optimizing import ascent, search
 from grasp_core.optimizing import best_grasp as searching
-from grasp_core.optimizing import search
 from grasp_core.optimizing.ascent import CLIMBED
 from grasp_core.optimizing.contact_places import ROOM, exact_maps, grounds_of
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
@@ -157,6 +158,13 @@ def test_changed_proofs_are_refused(searched):
     quality = found.quality
     higher = forged(quality, lower=1.01 * quality.upper, upper=1.02 * quality.upper)
     assert not forged(found, quality=higher).verify()
+    grounds, wrenches = proof.grounds, found.quality.wrenches
+    none = {field.name: getattr(grounds, field.name)[:0] for field in fields(grounds)}
+    assert not forged(proof, grounds=forged(grounds, **none)).verify()
+    smaller = forged(proof, grounds=forged(grounds, corners=0.1 * grounds.corners))
+    assert searching.are_contacts_of(found.grasp, wrenches, proof)
+    assert not searching.are_contacts_of(found.grasp, wrenches, smaller)
+    assert not searching.are_contacts_of(found.grasp, forged(wrenches, norm="linf"), proof)
 
 
 def test_files_that_are_damaged_are_refused(tmp_path):
@@ -166,6 +174,15 @@ def test_files_that_are_damaged_are_refused(tmp_path):
         path.write_bytes(broken)
         with pytest.raises(gc.InputError, match=r"proof\.npz"):
             read_proof(path)
+
+
+def test_a_file_that_claims_another_bound_is_refused(tmp_path):
+    path = write_proof(tmp_path / "proof.npz", easy().proof)
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    np.savez(path, **arrays | {"bound": 0.9 * arrays["bound"]})
+    with pytest.raises(gc.InputError, match="bound must be the"):
+        read_proof(path)
 
 
 @pytest.mark.parametrize(
@@ -225,6 +242,37 @@ def test_a_search_of_too_many_nodes_ends_with_a_proved_bound(monkeypatch):
     assert found.ended == "undivided"
     assert 0.01 < found.gap < 1.0
     assert found.verify()
+
+
+@pytest.mark.slow
+def test_objects_without_contacts_in_closure_or_with_too_many_faces_are_named(monkeypatch):
+    with pytest.raises(gc.InputError, match=r"1 to 128 convex pieces .* got 200"):
+        gc.best_grasp(example_object("random-200-1"), FRICTION)
+    monkeypatch.setattr(ascent, "MOST_RATED", 0)
+    with pytest.raises(gc.InputError, match="found none of box; raise the friction"):
+        gc.best_grasp(example_object("box"), 1e-3)
+
+
+@pytest.mark.slow
+def test_better_contacts_that_a_search_meets_become_the_best(monkeypatch):
+    """It begins with random contacts that have not climbed."""
+    body, gap = example_object("tetrahedron"), 0.3
+    monkeypatch.setattr(ascent, "climbed", lambda search, on, at: search.measured(on, at))
+    monkeypatch.setattr(ascent, "CLIMBED", 1)
+    found = gc.best_grasp(body, FRICTION, gap=gap)
+    assert found.history[0].quality < 0.9 * found.quality.lower
+    assert found.verify()
+    assert found.gap <= gap
+
+
+def test_contacts_may_be_on_the_pieces_of_faces_that_are_not_convex():
+    body = example_object("l-bracket")
+    grounds = grounds_of(body, 0.05 * body.radius)
+    assert len(grounds.counts) > len(body.faces)
+    for p, polygon in enumerate(grounds.polygons()):
+        face = body.faces[grounds.faces[p]]
+        for corner in grounds.places(p, polygon) * body.radius + body.center_of_mass:
+            assert any(within(corner, piece, face.normal, 1e-9) for piece in face.pieces)
 
 
 def test_a_time_limit_ends_the_search_with_a_proved_bound():

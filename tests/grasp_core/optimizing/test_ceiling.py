@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.optimizing.support_cuts import write_proof
 from scenes.example_objects import example_object
 
 
@@ -79,6 +80,11 @@ def test_the_bound_can_be_checked_again_and_does_not_survive_tampering(bounded):
     # a finger without a piece would refute everything
     alone = {"owners": np.zeros_like(proof.owners), "deeds": np.zeros(1, int)}
     assert not spoiled(**alone, asked=np.zeros(1, int), threshold=1e-6).verify()
+
+
+def test_a_proof_about_four_faces_has_no_file(bounded, tmp_path):
+    with pytest.raises(gc.InputError, match="about four faces, which has no file"):
+        write_proof(tmp_path / "proof.npz", bounded[2].proof)
 
 
 @pytest.mark.slow
