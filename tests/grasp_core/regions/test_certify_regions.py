@@ -10,10 +10,12 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.closure.contacts import contact_frames
-from grasp_core.geometry.polygons import plane_frame
+from grasp_core.geometry.polygons import MOST_CORNERS, plane_frame
 from grasp_core.objects.on_faces import within
+from grasp_core.regions import certify_regions as module
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.growth import Sites, search_cover
+from grasp_core.regions.proof import CertifiedRegions
 from sim_validate.planning.regions import area_of
 from tests.grasp_core.curved import curved_body, inside, met
 
@@ -214,13 +216,29 @@ def test_radii_centres_and_the_open_choice_belong_to_the_proof():
         {"radius": 100.0 * proved.radius}, {"radius": 1.1 * proved.radius}, {"centers": moved},
         {"regions": tuple(wide)}, {"limit": farther},
         {"borders": proved.borders[::-1]}, {"depths": proved.depths + 0.3 * proved.scale},
+        {"borders": tuple(np.repeat(b, MOST_CORNERS, axis=0) for b in proved.borders)},
     ]  # fmt: skip
     if proved.open_choice is not None:
         changes += [
             {"open_choice": None, "open_wrench": None},
+            {"limit": math.inf},
             {"open_choice": proved.centers},
+            {"open_choice": proved.open_choice + 0.01 * proved.scale * proved.normals},
             {"open_wrench": -proved.open_wrench},
         ]
     for change in changes:
         assert not dataclasses.replace(proved, **change).verify()
     assert dataclasses.replace(proved, radius=0.5 * proved.radius).verify()
+
+
+@pytest.mark.slow
+def test_discs_that_polygons_do_not_hold_are_made_smaller(monkeypatch):
+    body, grasp, proved = found("wedge", "concurrent")
+    most = 0.5 * proved.radius / proved.scale
+    monkeypatch.setattr(module, "holds_disc", lambda *disc: disc[-1] <= most)
+    smaller = certify_regions(body, grasp, 0.5, max_cones=FEW)
+    assert smaller.verify()
+    assert 0.49 * proved.radius < smaller.radius <= 0.5 * proved.radius * (1.0 + 1e-12)
+    monkeypatch.setattr(CertifiedRegions, "verify", lambda _: False)
+    with pytest.raises(gc.SolverError, match="its regions failed their own check"):
+        certify_regions(body, grasp, 0.5, max_cones=FEW)
