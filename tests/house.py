@@ -15,7 +15,7 @@ TOTALS = {
     "lines of packages": 57_146,
     "modules of packages": 240,
     "lines of tests": 37_924,
-    "lines of docs": 3_895,
+    "lines of docs": 3_896,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
@@ -24,7 +24,7 @@ RISES = (
     "lines of packages, 57,116 to 57,123: names of modules that say more are longer",
     "lines of packages, 57,123 to 57,146, modules, 239 to 240: proofs of absence have a module",
     "lines of tests, 37,739 to 37,924: branches of proofs and their checks that no test took",
-    "lines of docs, 3,784 to 3,895: sentences that are understood without their neighbours",
+    "lines of docs, 3,784 to 3,896: sentences that are understood without their neighbours",
     "lines of packages, 57,106 to 57,116: a folder that is gone, and how far contacts may move",
 )
 """Sentences such as "lines of tests, 50,000 to 50,400: the oracle of a new theorem"."""
