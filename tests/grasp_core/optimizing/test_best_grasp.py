@@ -161,9 +161,9 @@ def test_changed_proofs_are_refused(searched):
     grounds, wrenches = proof.grounds, found.quality.wrenches
     none = {field.name: getattr(grounds, field.name)[:0] for field in fields(grounds)}
     assert not forged(proof, grounds=forged(grounds, **none)).verify()
-    smaller = forged(proof, grounds=forged(grounds, corners=0.1 * grounds.corners))
+    elsewhere = forged(proof, grounds=forged(grounds, corners=2.0 + grounds.corners))
     assert searching.are_contacts_of(found.grasp, wrenches, proof)
-    assert not searching.are_contacts_of(found.grasp, wrenches, smaller)
+    assert not searching.are_contacts_of(found.grasp, wrenches, elsewhere)
     assert not searching.are_contacts_of(found.grasp, forged(wrenches, norm="linf"), proof)
 
 
