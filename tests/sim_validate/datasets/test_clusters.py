@@ -89,7 +89,8 @@ def test_a_running_dask_cluster_is_used_and_several_threads_are_refused(dataset,
 
 
 @pytest.mark.parametrize("start", [dask_workers, ray_workers])
-def test_an_address_where_nothing_answers_is_said(start):
+def test_an_address_where_nothing_answers_is_said(start, monkeypatch):
+    monkeypatch.setattr("sim_validate.kit.workers.ANSWER_S", 1.0)
     pytest.importorskip("ray" if start is ray_workers else "distributed")
     with pytest.raises(gc.InputError, match=r"no .* answers"), start(1, "127.0.0.1:1"):
         pass
