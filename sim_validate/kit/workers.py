@@ -117,8 +117,12 @@ def check_interrupted() -> None:
 OBJECT_STORE_BYTES = 200 * 2**20
 """Size of the object store of a Ray started here; units and their rows go through files."""
 
-RAY_SETTINGS = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
-"""Settings under which Ray sends no usage statistics, and hides no GPU from other programs here."""
+RAY_SETTINGS = {
+    "RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    "RAY_worker_niceness": "0",
+}  # fmt: skip
+"""Settings under which Ray sends no usage statistics, hides no GPU from other programs here, and
+lets workers run like any process: else units take too long beside busy processes."""
 
 RAY_ENDED = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError")
 ANY_PORT = "127.0.0.1:0"

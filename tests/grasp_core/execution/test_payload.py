@@ -49,7 +49,7 @@ def test_payloads_of_other_motors_are_no_certificate():
 
 
 def test_false_claims_are_no_certificate():
-    """Those of the free mass are tried with that of a hand."""
+    """Claims about the free mass are tried with that of a hand."""
     found = gc.payload(box(), opposed(), 0.4, max_push_n=10.0)
     free = found.free
     for change in (

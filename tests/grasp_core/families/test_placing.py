@@ -58,7 +58,7 @@ def placed(construction, pieces, listed, least=LEAST_RADIUS):
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("friction", [0.18, 0.5])
 def test_discs_are_the_largest_that_plain_rows_allow_and_so_are_their_bounds(case, friction):
-    """Of curved surfaces the rows lose the depths of patches."""
+    """The rows of curved surfaces lose the depths of patches."""
     construction, ends, deepest = CASES[case], {True: 0, False: 0}, 0.0
     plain = programs.pencil if case == "pencil" else programs.concurrent
     for make in BODIES.values():

@@ -73,7 +73,7 @@ def test_without_pillow_the_extra_is_named(scene, tmp_path, monkeypatch):
 
 
 def test_what_points_up_is_drawn_up(tmp_path, monkeypatch):
-    """Of a palm and an object that shift together."""
+    """The motion of a palm and an object that shift together."""
     body, (grasp,) = grasps("wedge", 0.5, 1)
     squeeze = 3.0 * even_forces(grasp.positions, grasp.normals, 0.4)
     grip = gc.grip(body, grasp, 0.5, squeeze)

@@ -42,8 +42,13 @@ def faulty(unit, staging):
     do_unit(unit, staging)
 
 
+def niceness(_):
+    return os.nice(0)
+
+
 def test_every_engine_makes_the_same_bytes(engine, dataset, tmp_path):
     assert engine.workers == 2
+    assert engine.submit(niceness, None).result() == os.nice(0)
     built = build(CONFIG, tmp_path / "ds", engine, silent, TIMEOUT_S)
     assert built.made == 4
     assert contents(tmp_path / "ds") == contents(dataset)
