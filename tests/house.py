@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 57_150,
     "modules of packages": 240,
-    "lines of tests": 37_929,
+    "lines of tests": 37_931,
     "lines of docs": 3_896,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -24,7 +24,7 @@ RISES = (
     "lines of packages, 57,116 to 57,123: names of modules that say more are longer",
     "lines of packages, 57,123 to 57,146, modules, 239 to 240: proofs of absence have a module",
     "lines of packages, 57,146 to 57,150: workers of Ray run at the niceness of the build",
-    "lines of tests, 37,739 to 37,929: branches of proofs and their checks that no test took",
+    "lines of tests, 37,739 to 37,931: branches of proofs and their checks that no test took",
     "lines of docs, 3,784 to 3,896: sentences that are understood without their neighbours",
     "lines of packages, 57,106 to 57,116: a folder that is gone, and how far contacts may move",
 )
