@@ -88,7 +88,7 @@ def test_a_plan_compiles_first_what_is_not_kept_if_two_processes_may(
 
 
 def test_settings_of_ray_are_set_while_it_runs_and_those_of_the_caller_stay(monkeypatch):
-    own, other = clusters.RAY_SETTINGS
+    own, other, *_ = clusters.RAY_SETTINGS
     monkeypatch.delenv(own, raising=False)
     monkeypatch.setenv(other, "mine")
     ray = SimpleNamespace(
