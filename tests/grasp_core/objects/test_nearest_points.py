@@ -6,44 +6,31 @@ import numpy as np
 import pytest
 
 from grasp_core.objects.on_faces import nearest_on_triangles
+from tests.grasp_core.exact_judges import exactly
 
 ROUNDING = 2.0**-52
 
 
-def exact(values):
-    return [Fraction(float(x)) for x in values]
-
-
-def dot(a, b):
-    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
-
-
-def less(a, b):
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
 def squared_distance(triangle, point):
     """The square of a point's distance from a triangle, exactly."""
-    a, b, c = map(exact, triangle)
-    point = exact(point)
-    one, other, away = less(b, a), less(c, a), less(point, a)
-    g11, g12, g22 = dot(one, one), dot(one, other), dot(other, other)
+    (a, b, c), point = exactly(triangle), exactly(point)
+    one, other, away = b - a, c - a, point - a
+    g11, g12, g22 = one @ one, one @ other, other @ other
     det = g11 * g22 - g12 * g12
     if det > 0:
-        v = (dot(away, one) * g22 - dot(away, other) * g12) / det
-        w = (dot(away, other) * g11 - dot(away, one) * g12) / det
+        v = (away @ one * g22 - away @ other * g12) / det
+        w = (away @ other * g11 - away @ one * g12) / det
         if v >= 0 and w >= 0 and v + w <= 1:
-            foot = [v * x + w * y for x, y in zip(one, other, strict=True)]
-            return dot(less(away, foot), less(away, foot))
-    return min(on_edge(p, q, point) for p, q in ((a, b), (b, c), (c, a)))
+            rest = away - v * one - w * other
+            return rest @ rest
+    return min(on_edge(p, q - p, point) for p, q in ((a, b), (b, c), (c, a)))
 
 
-def on_edge(start, end, point):
-    along, away = less(end, start), less(point, start)
-    length = dot(along, along)
-    share = min(max(dot(away, along) / length, Fraction(0)), Fraction(1)) if length else Fraction(0)
-    rest = [x - share * y for x, y in zip(away, along, strict=True)]
-    return dot(rest, rest)
+def on_edge(start, along, point):
+    length = along @ along
+    share = min(max((point - start) @ along / length, Fraction(0)), Fraction(1)) if length else 0
+    rest = point - start - share * along
+    return rest @ rest
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-3, 1e3])
