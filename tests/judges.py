@@ -27,26 +27,21 @@ def pyramid_wrenches(positions, normals, friction, sides, *, outer):
     return np.vstack(rows)
 
 
-def pyramid_margin(positions, normals, friction, sides, *, outer):
-    """Closure margin with pyramids inside (or, with `outer`, around) the friction cones.
+def least_weight(W):
+    """The least weight, as large as can be, of wrenches in combinations that balance.
 
-    The least weight, as large as can be, of the pyramids' edges in combinations that balance and
-    sum to one; positive means closure of the pyramids when their wrenches have rank 6. By the dual
-    program, which has seven variables only: the least z for twists y with w.y + z >= 0 for all
-    wrenches w, where these slacks sum to one.
+    Positive means closure of wrenches of rank 6. Weights sum to one; -inf where none balance. By
+    the dual program, which has seven variables only: the least z for twists y with w.y + z >= 0 for
+    all wrenches w, where these slacks sum to one.
     """
-    W = pyramid_wrenches(positions, normals, friction, sides, outer=outer)
-    leaving = np.linalg.lstsq(W, np.ones(len(W)), rcond=None)[0]
-    if (W @ leaving).min() > 1e-10:
-        return -np.inf  # nothing balances
     answer = linprog(
         np.append(np.zeros(6), 1.0),
         A_ub=-np.hstack([W, np.ones((len(W), 1))]), b_ub=np.zeros(len(W)),
         A_eq=[np.append(W.sum(axis=0), len(W))], b_eq=[1.0],
         bounds=[(None, None)] * 7, method="highs",
     )  # fmt: skip
-    assert answer.status == 0, answer.message
-    return answer.fun
+    assert answer.status in {0, 3}, answer.message
+    return answer.fun if answer.status == 0 else -np.inf
 
 
 def picks_positively_span(axes, half_angle, sides):

@@ -29,10 +29,7 @@ def turned(part):
 
 def load(*parts, **choices):
     """One body of several meshes in one list of triangles."""
-    counts = np.cumsum([0, *(len(points) for points, _ in parts)])
-    faces = [faces + count for (_, faces), count in zip(parts, counts, strict=False)]
-    points = np.concatenate([points for points, _ in parts])
-    return gc.Polyhedron.from_mesh(points, np.concatenate(faces), **choices)
+    return gc.Polyhedron.from_mesh(*trimesh.util.append_faces(*zip(*parts, strict=True)), **choices)
 
 
 def refused(reason, words, *parts, **choices):

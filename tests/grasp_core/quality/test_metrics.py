@@ -2,12 +2,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
 from grasp_core.closure.contacts import contact_frames
-from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS, least_weight, random_contacts
 
 
 def edge_wrenches(positions, normals, friction, edges):
@@ -20,20 +19,6 @@ def edge_wrenches(positions, normals, friction, edges):
     return np.array(rows)
 
 
-def min_weight_by_definition(W):
-    """The program as FRoGGeR states it: weights and their least are the unknowns."""
-    count = len(W)
-    equalities = np.zeros((7, count + 1))
-    equalities[:6, :count], equalities[6, :count] = W.T, 1.0
-    answer = linprog(
-        np.append(np.zeros(count), -1.0),
-        A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]), b_ub=np.zeros(count),
-        A_eq=equalities, b_eq=np.append(np.zeros(6), 1.0),
-        bounds=[(None, None)] * (count + 1), method="highs",
-    )  # fmt: skip
-    return -answer.fun if answer.status == 0 else -math.inf
-
-
 @pytest.mark.parametrize("edges", [4, 8])
 def test_min_weight_is_what_its_definition_says(edges):
     rng = np.random.default_rng(edges)
@@ -42,7 +27,7 @@ def test_min_weight_is_what_its_definition_says(edges):
         positions, normals = random_contacts(rng)
         here = gc.min_weight(positions, normals, 0.5, edges=edges)
         W = edge_wrenches(positions, normals, 0.5, edges)
-        assert here == pytest.approx(min_weight_by_definition(W), abs=1e-9)
+        assert here == pytest.approx(least_weight(W), abs=1e-9)
         signs[here > 0.0] += 1
     assert min(signs.values()) >= 5
 

@@ -8,7 +8,7 @@ import grasp_core as gc
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import RecordedObject, grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
-from tests.damaged import check_refused, optional_keys
+from tests.damaged import check_refused, optional_keys, value_at
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,4 @@ def _scaled_forces(document, factors, *, keep_sum=True):
 
 
 def _set(document, path, value):
-    place = document
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = value
+    value_at(document, path[:-1])[path[-1]] = value

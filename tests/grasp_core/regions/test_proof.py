@@ -11,6 +11,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import EDGES, LEAF, TwistCover
+from tests.grasp_core.exact_judges import exactly
 
 SMALL = 1_000
 
@@ -63,11 +64,11 @@ def test_a_cover_holds_in_rational_arithmetic():
     body = scenes.example_object("wedge")
     (grasp,) = gc.plan(body, 0.5, families=("concurrent",), limit=1).grasps
     small = certify_regions(body, grasp, 0.5, max_cones=100)
-    cover, mu = small.cover, fractions(small.friction)
-    axes, normals = fractions(cover.axes), fractions(small.normals)
-    origin, scale = fractions(small.origin), Fraction(small.scale)
-    corners = [(fractions(region.polygon) - origin) / scale for region in small.regions]
-    codes, forces, checked = iter(cover.codes), iter(fractions(cover.forces)), 0
+    cover, mu = small.cover, exactly(small.friction)
+    axes, normals = exactly(cover.axes), exactly(small.normals)
+    origin, scale = exactly(small.origin), Fraction(small.scale)
+    corners = [(exactly(region.polygon) - origin) / scale for region in small.regions]
+    codes, forces, checked = iter(cover.codes), iter(exactly(cover.forces)), 0
     cones = deque(np.diag([1 - 2 * (s >> j & 1) for j in range(6)]).astype(object)
                   for s in range(64))  # fmt: skip
     while cones:
@@ -83,21 +84,12 @@ def test_a_cover_holds_in_rational_arithmetic():
             assert f @ n >= 0
             assert (across @ across) * (n @ n) <= (friction * (f @ n)) ** 2
         for twist in cone @ axes:
-            power = sum(f @ twist[:3] + min((x * turned(f, twist[3:])).sum() for x in places)
+            power = sum(f @ twist[:3] + min((x * np.cross(f, twist[3:])).sum() for x in places)
                         for f, places in zip(F, corners, strict=True))  # fmt: skip
             assert power > 0
             checked += 1
     assert next(codes, None) is next(forces, None) is None
     assert checked == 6 * len(cover.forces) > 300
-
-
-def fractions(array):
-    return np.vectorize(Fraction, otypes=[object])(array)
-
-
-def turned(f, b):
-    return np.array([f[1] * b[2] - f[2] * b[1], f[2] * b[0] - f[0] * b[2],
-                     f[0] * b[1] - f[1] * b[0]])  # fmt: skip
 
 
 def tampered(proved, **changed):
