@@ -79,6 +79,15 @@ def balancing_weights(vectors):
     return signed / total * np.sign(signed.sum(axis=-1, keepdims=True))
 
 
+def winding(corners, points):
+    """The winding number of a closed mesh (t, 3, 3) about each point, by solid angles."""
+    a, b, c = ((corners[None, :, k] - points[:, None]) for k in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
+    volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
+    spread = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+    return np.arctan2(volume, spread).sum(axis=1) / (2.0 * np.pi)
+
+
 def random_contacts(rng, count=4, spread=0.7):
     """Contacts around the origin whose normals point roughly inwards."""
     positions = rng.normal(size=(count, 3))

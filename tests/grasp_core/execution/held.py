@@ -16,12 +16,12 @@ def box():
     return scenes.example_object("box")
 
 
-def opposed(pairs=2):
+def opposed(pairs=2, half=HALF):
     """Contacts of opposed fingers along x, through the middle, or beside it along y."""
     center = box().center_of_mass
     beside = (-ASIDE, ASIDE) if pairs == 2 else (0.0,)
     return tuple(
-        gc.Contact(center + np.array([side * HALF, y, 0.0]), [-side, 0.0, 0.0])
+        gc.Contact(center + np.array([side * half, y, 0.0]), [-side, 0.0, 0.0])
         for y in beside
         for side in (-1.0, 1.0)
     )

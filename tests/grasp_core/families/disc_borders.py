@@ -7,6 +7,9 @@ import numpy as np
 
 import grasp_core as gc
 
+BORDER = 1e-6
+"""Friction above that of the force cones: contacts on the borders use their very edge."""
+
 
 def on_borders(quad, centers, radii, turns):
     """Contacts at angles on the borders of the faces' discs, (4, 3)."""

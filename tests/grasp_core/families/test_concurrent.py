@@ -11,9 +11,7 @@ from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
 from tests.grasp_core.families.disc_borders import on_borders
 from tests.grasp_core.quadruples import spanning_quadruples
-
-TOLERANCE = 1e-7
-"""Ten times the residual at which a program's answer is accepted, in object radii."""
+from tests.grasp_core.regular_solids import TOLERANCE
 
 
 def placements(name, theta, limit):

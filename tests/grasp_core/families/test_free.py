@@ -13,11 +13,10 @@ from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion
 from grasp_core.objects.face_pieces import unit_pieces
 from scenes.example_objects import example_object
+from tests.grasp_core.regular_solids import TOLERANCE
 from tests.judges import least_weight, pyramid_wrenches
 from tests.tampering.changes import forged
 
-TOLERANCE = 1e-7
-"""Ten times the residual at which a program's answer is accepted, in object radii."""
 FRICTIONS = (0.2, 0.3, 0.5, 0.8)
 OBJECTS = ("random-8-1", "random-12-3", "random-20-7", "random-30-2")
 PER_OBJECT = 8

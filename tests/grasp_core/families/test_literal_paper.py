@@ -17,7 +17,7 @@ from grasp_core.closure.lines import plucker_vectors
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.families.regulus_kernel import LEAST_DEPTH
-from tests.grasp_core.families.disc_borders import descended_margin
+from tests.grasp_core.families.disc_borders import BORDER, descended_margin
 from tests.grasp_core.families.printed_paper import (
     PAIR,
     Discs,
@@ -27,12 +27,8 @@ from tests.grasp_core.families.printed_paper import (
     unit,
 )
 from tests.grasp_core.quadruples import paired_quadruples
+from tests.grasp_core.regular_solids import TOLERANCE
 from tests.judges import balancing_weights
-
-TOLERANCE = 1e-7
-"""Ten times the residual at which a program's answer is accepted, in object radii."""
-BORDER = 1e-6
-"""Friction above that of the force cones: contacts on the borders use their very edge."""
 
 
 def push(normals):

@@ -8,13 +8,14 @@ import grasp_core as gc
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import CELL_A, CELL_B, CONSTRUCTIONS
 from scenes.example_objects import example_object
-from tests.grasp_core.families.disc_borders import descended_margin, extremes, least_margin
+from tests.grasp_core.families.disc_borders import (
+    BORDER,
+    descended_margin,
+    extremes,
+    least_margin,
+)
 from tests.grasp_core.quadruples import paired_quadruples
-
-TOLERANCE = 1e-7
-"""Ten times the residual at which a program's answer is accepted, in object radii."""
-BORDER = 1e-6
-"""Friction above that of the force cones: contacts on the borders use their very edge."""
+from tests.grasp_core.regular_solids import TOLERANCE
 
 
 def pencils(name, theta, limit=None, cells=(CELL_A, CELL_B)):

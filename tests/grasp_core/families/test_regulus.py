@@ -11,9 +11,8 @@ from grasp_core.families.placing import CONSTRUCTIONS, nearly_symmetric
 from grasp_core.families.regulus_kernel import GIVEN_UP, LEAST_DEPTH
 from tests.grasp_core.families import reference_programs as programs
 from tests.grasp_core.quadruples import paired_quadruples
+from tests.grasp_core.regular_solids import TOLERANCE
 
-TOLERANCE = 1e-7
-"""Ten times the residual at which a program's answer is accepted, in object radii."""
 OBJECTS = ("random-30-1", "icosahedron", "dodecahedron", "chamfered-box", "double-wedge-bar")
 
 

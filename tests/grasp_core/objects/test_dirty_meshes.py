@@ -7,6 +7,7 @@ import trimesh
 import grasp_core as gc
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import bumpy_ellipsoid
+from tests.judges import winding
 
 FAR = np.array([1.3, -1.1, 1.0])
 """Two metres away [m]."""
@@ -31,15 +32,6 @@ def ways(points, faces):
     yield points, left[:, ::-1], here
     yield points, np.where(some, faces[:, ::-1], faces), here
     yield (points + FAR).astype(np.float32).astype(np.float64), faces, FAR
-
-
-def winding(corners, points):
-    """The winding number of a closed mesh (t, 3, 3) about each point, by solid angles."""
-    a, b, c = ((corners[None, :, k] - points[:, None]) for k in range(3))
-    la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
-    volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
-    spread = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
-    return np.arctan2(volume, spread).sum(axis=1) / (2.0 * np.pi)
 
 
 @pytest.mark.parametrize(

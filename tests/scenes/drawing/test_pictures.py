@@ -11,7 +11,7 @@ from PIL import Image, ImageFont
 import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import convex_hull
+from grasp_core.geometry.polygons import convex_hull, signed_area
 from scenes.drawing.painting import (
     FORESHORTENED,
     Surface,
@@ -112,13 +112,8 @@ def test_a_curved_body_has_an_outline_and_no_seams(monkeypatch):
     areas = [part for part in painted((surface,), window) if isinstance(part, Area)]
     assert 2 <= len(areas) <= 14  # two sides, at most seven shades each
     flat, _ = window.seen(surface.vertices())
-    covered = sum(abs(signed(loop)) for area in areas for loop in area.loops)
-    assert covered == pytest.approx(2.0 * abs(signed(convex_hull(flat))), rel=0.35)
-
-
-def signed(loop):
-    x, y = loop.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    covered = sum(abs(signed_area(loop)) for area in areas for loop in area.loops)
+    assert covered == pytest.approx(2.0 * abs(signed_area(convex_hull(flat))), rel=0.35)
 
 
 @pytest.mark.parametrize("form", FORMATS)

@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull
 import grasp_core as gc
 import scenes
 from scenes.mujoco.surface import touched_solids
+from tests.judges import winding
 from tests.scenes.meshes import dented_ball
 
 NEAR = 1e-6
@@ -51,17 +52,6 @@ def sides_of(name):
     return [ConvexHull(corners / body_of(name).radius).equations for corners in solids_of(name)]
 
 
-def winding_numbers(body, points):
-    """How often the surface winds around each point: the sum of its triangles' solid angles."""
-    corners = body.vertices[body.triangles] - body.center_of_mass
-    a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
-    x, y, z = (np.linalg.norm(side, axis=2) for side in (a, b, c))
-    volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
-    dot = [np.einsum("pti,pti->pt", *pair) for pair in ((a, b), (b, c), (c, a))]
-    along = x * y * z + dot[0] * z + dot[1] * x + dot[2] * y
-    return np.arctan2(volume, along).sum(axis=1) / (2.0 * np.pi)
-
-
 def points_on(body, count, rng):
     """Points spread over the surface, and the outward normals there."""
     corners = body.vertices[body.triangles] - body.center_of_mass
@@ -85,13 +75,13 @@ def test_no_solid_sticks_out_of_the_object(name):
     """Every mixture of a solid's corners is in the object. Points come from near the base, from
     its edges and from near the apex; all are drawn towards the solid's middle by 1 %."""
     body, rng = body_of(name), np.random.default_rng(1)
-    found = 0
+    surface, found = body.vertices[body.triangles] - body.center_of_mass, 0
     for corners in solids_of(name)[:: 1 + len(solids_of(name)) // 500]:
         weights = np.vstack(
             [rng.dirichlet(np.full(len(corners), 0.3), 8), np.eye(len(corners))[-1:]]
         )
         points = 0.99 * weights @ corners + 0.01 * corners.mean(axis=0)
-        assert winding_numbers(body, points) == pytest.approx(1.0, abs=1e-4)
+        assert winding(surface, points) == pytest.approx(1.0, abs=1e-4)
         found += len(points)
     assert found > 8 * len(body.faces)
 

@@ -9,6 +9,7 @@ import scenes
 from sim_validate.execution import paths
 from sim_validate.execution.predictions import HeldDynamics
 from sim_validate.execution.simulate import HeldBench
+from tests.grasp_core.execution import held
 from tests.grasp_core.execution.held import box
 
 MASS = 0.3
@@ -18,27 +19,19 @@ G = 9.80665
 @cache
 def box_grip(push=5.0, friction=0.5, stiffness=2000.0):
     """Four fingers on the faces of a box, opposed along x, with this push each."""
-    contacts = opposed()
-    squeeze = push * np.array([contact.normal for contact in contacts])
-    return gc.grip(box(), contacts, friction, squeeze, stiffness=stiffness, tip_radius_m=0.005)
+    springs = {"stiffness": stiffness, "tip_radius_m": 0.005}
+    return gc.grip(box(), opposed(), friction, held.pressed(push), **springs)
 
 
-@cache
-def opposed(aside=0.02):
-    """Contacts in the middles of the faces along x, and beside them along y."""
-    center = box().center_of_mass
-    half = box().vertices[:, 0].max() - center[0]
-    return tuple(
-        gc.Contact(center + np.array([side * half, y, 0.0]), [-side, 0.0, 0.0])
-        for y in (-aside, aside)
-        for side in (-1.0, 1.0)
-    )
+def opposed():
+    """Contacts beside the middles of the faces along x."""
+    return held.opposed(half=0.5 * np.ptp(box().vertices[:, 0]))
 
 
 @cache
 def box_scene(push=5.0, friction=0.5, stiffness=2000.0, mass=MASS):
-    held = scenes.HeldSettings(mass_kg=mass)
-    return scenes.build_held_scene(box(), box_grip(push, friction, stiffness), held)
+    settings = scenes.HeldSettings(mass_kg=mass)
+    return scenes.build_held_scene(box(), box_grip(push, friction, stiffness), settings)
 
 
 @cache

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
+from scipy.optimize import brentq
 
 import grasp_core as gc
 import scenes
@@ -37,21 +38,14 @@ def dynamics_of(name, push=8.0):
 
 
 def slip_multiple(rest, change, friction):
-    """The least s at which |t + s b| = mu (n + s a), by halving an interval."""
+    """The least s at which |t + s b| = mu (n + s a)."""
 
-    def holds(s):
+    def room(s):
         f = rest + s * change
-        return (np.linalg.norm(f[:, 1:], axis=1) <= friction * f[:, 0]).all()
+        return (friction * f[:, 0] - np.linalg.norm(f[:, 1:], axis=1)).min()
 
-    low, high = 0.0, 1.0
-    while holds(high):
-        low, high = high, 2.0 * high
-        if high > 1e6:
-            return np.inf
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+    high = next((s for s in 2.0 ** np.arange(20) if room(s) < 0.0), np.inf)
+    return brentq(room, 0.0, high, xtol=1e-15) if high < np.inf else np.inf
 
 
 def integrated(dynamics, drive):
