@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull
 import grasp_core as gc
 from grasp_core.families.absence import Absence
 from grasp_core.geometry import polygons as flat_polygons
+from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.regions import proof as covers
 from grasp_core.regions.proof import CertifiedRegions
 from tests.attacks.searching import Attack, always, power
@@ -156,12 +157,9 @@ def absent(seed):
 def held(seed):
     """Pieces with four contacts that are closed by far, the contacts, and the friction."""
     body, friction, grasps = table.planned(seed)
-    pieces = table.pieces_of(table.PLANNED[seed % 4][0])
     x = (grasps[0].positions - body.center_of_mass) / body.radius
-    own = [max((p for p in pieces if p.face == face), key=lambda p, at=at: p.inset(at))
-           for face, at in zip(grasps[0].faces, x, strict=True)]  # fmt: skip
     assert closed(x, grasps[0].normals, np.full(4, friction)) is True
-    return tuple(own), x, friction
+    return tuple(pieces_under(body, grasps[0])), x, friction
 
 
 def absent_though_held(rng):

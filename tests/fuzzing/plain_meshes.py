@@ -5,6 +5,9 @@ import math
 import re
 import struct
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 Point = tuple[float, float, float]
 Triangle = tuple[Point, Point, Point]
 
@@ -167,47 +170,29 @@ def of_glb(data: bytes) -> list[Triangle]:
 
     def node(number, above):
         given = tree["nodes"][number]
-
-        def place(point):
-            return above(moved(given, point))
-
+        here = above @ matrix_of(given)
         if "mesh" in given:
-            mirrored = spat(*(place(p) for p in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))) < 0
             for each in tree["meshes"][given["mesh"]]["primitives"]:
-                made = primitive(each, place)
+                made = primitive(each, lambda point: tuple((here @ (*point, 1.0))[:3].tolist()))
+                mirrored = np.linalg.det(here[:3, :3]) < 0
                 found.extend([t[::-1] for t in made] if mirrored else made)
         for child in given.get("children", []):
-            node(child, place)
+            node(child, here)
 
     for root in tree["scenes"][tree.get("scene", 0)].get("nodes", []):
-        node(root, lambda point: point)
+        node(root, np.eye(4))
     return found
 
 
-def spat(o, a, b, c):
-    """Six times the signed volume of a tetrahedron."""
-    (x, y, z), (u, v, w), (p, q, r) = (
-        [m - n for m, n in zip(point, o, strict=True)] for point in (a, b, c)
-    )
-    return x * (v * r - w * q) - y * (u * r - w * p) + z * (u * q - v * p)
-
-
-def moved(node, point):
+def matrix_of(node):
+    """Where a node puts what is below it, (4, 4)."""
     if "matrix" in node:
-        m = node["matrix"]
-        return tuple(sum(m[4 * j + i] * (*point, 1)[j] for j in range(4)) for i in range(3))
-    x, y, z = (a * b for a, b in zip(point, node.get("scale", (1, 1, 1)), strict=True))
-    i, j, k, w = node.get("rotation", (0, 0, 0, 1))
-    size = math.hypot(i, j, k, w)
-    i, j, k, w = (each / size for each in (i, j, k, w))
-    # v + 2 w (q x v) + 2 q x (q x v)
-    a, b, c = 2 * (j * z - k * y), 2 * (k * x - i * z), 2 * (i * y - j * x)
-    turned = (
-        x + w * a + j * c - k * b,
-        y + w * b + k * a - i * c,
-        z + w * c + i * b - j * a,
-    )
-    return tuple(a + b for a, b in zip(turned, node.get("translation", (0, 0, 0)), strict=True))
+        return np.reshape(node["matrix"], (4, 4)).T
+    made = np.eye(4)
+    made[:3, :3] = Rotation.from_quat(node.get("rotation", (0, 0, 0, 1))).as_matrix()
+    made[:3, :3] *= node.get("scale", (1, 1, 1))
+    made[:3, 3] = node.get("translation", (0, 0, 0))
+    return made
 
 
 PLAIN = {"obj": of_obj, "stl": of_stl, "off": of_off, "ply": of_ply, "glb": of_glb}

@@ -76,3 +76,10 @@ def moved(rng, positions, normals, size):
     turned = normals @ turn.T
     turned /= np.linalg.norm(turned, axis=1, keepdims=True)
     return size * (positions @ turn.T + rng.normal(size=3)), turned
+
+
+def from_edges(polygon, normal, point):
+    """How far a point is inside of each edge's line; edges go round the normal."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    heights = np.einsum("kj,kj->k", np.cross(normal, edges), point - polygon)
+    return heights / np.linalg.norm(edges, axis=1)

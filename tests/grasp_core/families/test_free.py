@@ -13,6 +13,7 @@ from grasp_core.families.placements import Placement
 from grasp_core.objects.booleans import extrusion
 from grasp_core.objects.face_pieces import unit_pieces
 from scenes.example_objects import example_object
+from tests.grasp_core.bodies import from_edges
 from tests.grasp_core.regular_solids import TOLERANCE
 from tests.judges import least_weight, pyramid_wrenches
 from tests.tampering.changes import forged
@@ -64,13 +65,10 @@ def corners_in_space(piece):
 
 
 def inset(piece, point):
-    """Distance of a point of a face to its nearest edge, by triple products."""
+    """Distance of a point of a face to its nearest edge."""
     corners = corners_in_space(piece)
     assert abs(piece.normal @ (point - corners[0])) < TOLERANCE
-    edges = np.roll(corners, -1, axis=0) - corners
-    inwards = np.cross(piece.normal, edges)
-    heights = np.einsum("kj,kj->k", inwards, point - corners)
-    return (heights / np.linalg.norm(edges, axis=1)).min()
+    return from_edges(corners, piece.normal, point).min()
 
 
 def insets(pieces, points):

@@ -12,6 +12,7 @@ from grasp_core.geometry.polygons import edge_rows, is_convex, signed_area
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import clearest_point, clearing, flat_patches
 from grasp_core.objects.surface import Mesh
+from tests.grasp_core.bodies import from_edges
 from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body
 
 ROUNDING = 1e-9
@@ -34,17 +35,10 @@ def test_patches_keep_the_limits_and_come_largest_first():
         assert 4 <= len(found) <= limits.most
         assert max(face.spread for face in found) <= math.radians(limits.spread_deg) + ROUNDING
         assert max(face.depth for face in found) <= limits.depth * extent
-        rooms = [_room(face) for face in found]
+        rooms = [from_edges(face.polygon, face.normal, face.centroid).min() for face in found]
         assert rooms == sorted(rooms, reverse=True)
         used = np.concatenate([face.facets for face in found])
         assert len(np.unique(used)) == len(used)
-
-
-def _room(face):
-    edges = np.roll(face.polygon, -1, axis=0) - face.polygon
-    inward = np.cross(face.normal, edges)
-    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    return np.einsum("ki,ki->k", inward, face.centroid - face.polygon).min()
 
 
 def test_a_patch_of_one_large_triangle_keeps_the_limits_too():

@@ -17,6 +17,7 @@ from grasp_core.optimizing.contact_places import ROOM, exact_maps, grounds_of
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object
+from tests.grasp_core.bodies import from_edges
 from tests.grasp_core.optimizing.contacts_on_faces import (
     FRICTION,
     best,
@@ -62,22 +63,13 @@ def test_the_grasp_is_on_the_object_clear_of_edges_and_in_force_closure(searched
     grasp = found.grasp
     assert gc.force_closure(grasp, friction=FRICTION).closed
     for face, point in zip(grasp.faces, grasp.positions, strict=True):
-        polygon = body.faces[face].polygon
-        along = np.roll(polygon, -1, axis=0) - polygon
-        apart = np.linalg.norm(np.cross(point - polygon, along), axis=1)
-        inner = apart / np.linalg.norm(along, axis=1)
-        assert abs((point - polygon[0]) @ body.faces[face].normal) < 1e-9 * body.radius
-        assert inner.min() > 0.0
+        polygon, normal = body.faces[face].polygon, body.faces[face].normal
+        inner = from_edges(polygon, normal, point).min()
+        assert abs((point - polygon[0]) @ normal) < 1e-9 * body.radius
+        assert inner > 0.0
         if len(body.faces[face].pieces) == 1:
-            assert inner.min() > min(found.clearance, 0.5 * inner_radius(polygon)) - 1e-9
-
-
-def inner_radius(polygon):
-    """At most the radius of the largest disc, by the distances of the middle from the edges."""
-    middle = polygon.mean(axis=0)
-    along = np.roll(polygon, -1, axis=0) - polygon
-    apart = np.linalg.norm(np.cross(middle - polygon, along), axis=1)
-    return float((apart / np.linalg.norm(along, axis=1)).min())
+            widest = from_edges(polygon, normal, polygon.mean(axis=0)).min()  # at most
+            assert inner > min(found.clearance, 0.5 * widest) - 1e-9
 
 
 def test_the_best_on_a_tetrahedron_meets_the_ceiling_of_its_only_four_faces():

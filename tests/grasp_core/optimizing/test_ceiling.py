@@ -8,6 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.optimizing.support_cuts import write_proof
 from scenes.example_objects import example_object
+from tests.grasp_core.bodies import from_edges
 
 
 @pytest.fixture(
@@ -56,11 +57,9 @@ def test_each_finger_has_its_own_face(bounded):
         assert grounds.faces[p] == found.grasp.faces[finger]
         points = grounds.places(p, polygon) * body.radius + body.center_of_mass
         assert np.abs((points - face.polygon[0]) @ face.normal).max() <= 1e-9 * body.radius
-        along = np.roll(face.polygon, -1, axis=0) - face.polygon
         for point in points:
-            away = np.linalg.norm(np.cross(point - face.polygon, along), axis=1)
-            inner = away / np.linalg.norm(along, axis=1)
-            assert inner.min() == pytest.approx(found.clearances[finger], rel=1e-6)
+            inner = from_edges(face.polygon, face.normal, point).min()
+            assert inner == pytest.approx(found.clearances[finger], rel=1e-6)
 
 
 def test_the_bound_can_be_checked_again_and_does_not_survive_tampering(bounded):

@@ -45,8 +45,7 @@ def test_a_curved_surface_is_judged_everywhere():
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
     body = gc.Polyhedron.from_mesh(mesh.vertices, mesh.faces, faces="patches")
     corners = body.vertices[body.triangles]
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = body.to_trimesh().face_normals
     for _ in range(8):
         chosen = rng.integers(len(corners), size=4)
         shares = rng.dirichlet(np.ones(3), size=4)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import ConvexHull
 
 import grasp_core as gc
@@ -52,15 +53,11 @@ def sides_of(name):
     return [ConvexHull(corners / body_of(name).radius).equations for corners in solids_of(name)]
 
 
-def points_on(body, count, rng):
+def points_on(body, count):
     """Points spread over the surface, and the outward normals there."""
-    corners = body.vertices[body.triangles] - body.center_of_mass
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    chosen = rng.choice(len(areas), count, p=areas / areas.sum())
-    weights = rng.dirichlet(np.ones(3), count)
-    points = np.einsum("pk,pki->pi", weights, corners[chosen])
-    return points, normals[chosen] / areas[chosen, None]
+    mesh = body.to_trimesh()
+    points, chosen = trimesh.sample.sample_surface(mesh, count, seed=2)
+    return points - body.center_of_mass, mesh.face_normals[chosen]
 
 
 def in_solids(name, points):
@@ -90,7 +87,7 @@ def test_no_solid_sticks_out_of_the_object(name):
 def test_the_surface_is_the_outer_side_of_solids(name):
     """Points just below the surface are in a solid, and points just above it in none."""
     body = body_of(name)
-    points, normals = points_on(body, 500, np.random.default_rng(2))
+    points, normals = points_on(body, 500)
     aside = NEAR * body.radius * normals
     assert not in_solids(name, points + aside).any()
     # a pyramid is thinner than this only on a strip along its edges

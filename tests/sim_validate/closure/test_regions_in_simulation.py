@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.objects.face_pieces import unit_pieces
+from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.values import Contact
 from tests.marks import more
 
@@ -98,13 +98,3 @@ def walked(body, grasp, middles, borders):
             dropped = far
             break
     return opened, dropped
-
-
-def pieces_under(body, grasp):
-    """The convex pieces that contacts are on, at unit size."""
-    every = unit_pieces(body)
-    return [
-        max((piece for piece in every if piece.face == face), key=lambda p, at=at: p.inset(at))
-        for face, at in zip(grasp.faces, (grasp.positions - body.center_of_mass) / body.radius,
-                            strict=True)
-    ]  # fmt: skip

@@ -309,9 +309,3 @@ def test_a_config_file_gives_wrenches(analyze):
     asked = [found["wrench"] for found in document["grasps"][0]["wrenches"]]
     assert asked == [[0, 0, -1, 0, 0, 0], [1, 0, 0, 0, 0, 0.1]]
     assert document["edges"] == 6
-
-
-def test_the_page_of_files_shows_one_that_is_read(analyze):
-    page = Path(__file__).parents[3].joinpath("docs", "files.md").read_text()
-    shown = json.loads(re.search(r"```json\n(.*?)```", page, re.DOTALL)[1])
-    assert analyze(shown)[0] == Exit.GOOD
