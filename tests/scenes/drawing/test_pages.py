@@ -6,15 +6,14 @@ import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 import grasp_core as gc
 import scenes
 import sim_validate as sv
 from scenes.drawing import pages
-from scenes.drawing.pages import UNITS
 from sim_validate.main import main
+from tests.scenes.drawing.whole import assert_contacts
 
 SVG = "{http://www.w3.org/2000/svg}"
 EVIL = "<script>alert('&')</script>"
@@ -94,10 +93,6 @@ def test_a_notebook_and_the_command_view_show_the_same_page(plan, tmp_path):
 
 
 def test_the_page_holds_the_contacts(plan):
-    body, grasp = plan.body, plan[0]
-    text = scenes.show(body, grasp).page
+    text = scenes.show(plan.body, plan[0]).page
     (drawing,) = re.findall(r'id="drawing">(.*)</script>', text)
-    shapes = json.loads(drawing)["shapes"]
-    (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
-    points = body.center_of_mass + np.array(contacts) * body.radius / UNITS
-    np.testing.assert_allclose(points, grasp.positions, atol=body.radius / UNITS)
+    assert_contacts(json.loads(drawing)["shapes"], plan.body, plan[0].positions)

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 from PIL import Image
 
+from scenes.drawing.pages import UNITS
 from scenes.drawing.panels import width_of
 
 
@@ -32,6 +33,13 @@ def assert_whole(sheet):
         assert bottom <= sheet.height, words
     for one, two in itertools.combinations(texts, 2):
         assert not overlap(box(one), box(two)), (one.text, two.text)
+
+
+def assert_contacts(shapes, body, positions):
+    """That a page's drawing has its contacts where they are said to be, to a whole unit."""
+    (drawn,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
+    points = body.center_of_mass + np.array(drawn) * body.radius / UNITS
+    np.testing.assert_allclose(points, positions, atol=body.radius / UNITS)
 
 
 def frames_of(path, *places):

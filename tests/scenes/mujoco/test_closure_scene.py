@@ -6,6 +6,7 @@ import grasp_core as gc
 import scenes
 from scenes.mujoco.closure_scene import PAD_TOUCH, SQUEEZE
 from scenes.mujoco.scene_text import TOUCH
+from tests.scenes.mujoco.compiled import compiled, state_of
 
 OBJECTS = ("wedge", "screwdriver")
 SINGLE = 4e-8
@@ -17,7 +18,7 @@ def held(request):
     body = scenes.example_object(request.param)
     grasp = gc.plan(body, 0.5, limit=1, cones="normal").grasps[0]
     scene = scenes.build_scene(body, grasp, 0.5)
-    return body, grasp, scene, mujoco.MjModel.from_xml_string(scene.xml)
+    return body, grasp, scene, compiled(scene)[0]
 
 
 def touching(model, data):
@@ -58,10 +59,7 @@ def test_every_setting_reaches_the_compiled_model(held):
 def test_fingertips_touch_their_pads_exactly_where_the_grasp_says(held):
     body, grasp, *_ = held
     scene = scenes.build_scene(body, grasp, 0.5, surface="pads")
-    model = mujoco.MjModel.from_xml_string(scene.xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
-    mujoco.mj_kinematics(model, data)
+    model, data = compiled(scene, "grasp")
     for finger, contact in enumerate(grasp.contacts):
         tip = data.geom(f"finger{finger}")
         height = scene.layout.drive.radius_m - PAD_TOUCH * scene.layout.grasp_size_m
@@ -84,10 +82,7 @@ def test_all_fingertips_touch_from_the_first_step(name, scale):
     example = scenes.example_object(name)
     body = gc.Polyhedron.from_mesh(scale * example.vertices, example.triangles, name=name)
     scene = scenes.build_scene(body, gc.plan(body, 0.5, limit=1).grasps[0], 0.5)
-    model = mujoco.MjModel.from_xml_string(scene.xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("grasp").id)
-    mujoco.mj_forward(model, data)
+    _, data = compiled(scene, "grasp")
     assert data.ncon == 4
     depth, off = TOUCH * body.radius, SINGLE * body.radius
     assert off < 0.5 * depth
@@ -96,9 +91,7 @@ def test_all_fingertips_touch_from_the_first_step(name, scale):
 
 def test_approach_starts_clear_and_ends_in_a_grasp(held):
     _, _, scene, model = held
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("approach").id)
-    mujoco.mj_forward(model, data)
+    data = state_of(model, "approach")
     assert data.ncon == 0
     mujoco.mj_step(model, data, nstep=1500)
     assert data.ncon == 4
@@ -108,8 +101,7 @@ def test_approach_starts_clear_and_ends_in_a_grasp(held):
 
 def after(model, key, steps):
     """The state some steps after a keyframe, and the largest push of a fingertip [N]."""
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
+    data = state_of(model, key)
     mujoco.mj_step(model, data, nstep=steps)
     forces = np.zeros((data.ncon, 6))
     for number, force in enumerate(forces):
@@ -176,10 +168,8 @@ def test_rigid_fingertips_have_no_joints_and_stand_where_they_are_put(held):
     body, grasp, scene, _ = held
     fingers = scenes.FingerSettings(drive="rigid", indentation=1e-4)
     rigid = scenes.build_scene(body, grasp, 0.5, fingers=fingers)
-    model = mujoco.MjModel.from_xml_string(rigid.xml)
+    model, data = compiled(rigid)
     assert (model.nv, model.nu, model.nkey) == (6, 0, 0)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     depth = 1e-4 * scene.layout.grasp_size_m
     assert data.ncon == 4
     assert all(c.dist == pytest.approx(-depth, abs=SINGLE * body.radius) for c in data.contact)
@@ -193,5 +183,5 @@ def test_coplanar_and_symmetric_contacts_make_scenes_that_load():
             gc.Contact([0.0, s * 0.035, -z], [0.0, -s, 0.0]) for s in (1.0, -1.0)
         ]
         scene = scenes.build_scene(body, contacts, 0.5)
-        model = mujoco.MjModel.from_xml_string(scene.xml)
+        model, _ = compiled(scene)
         assert model.body("object").inertia.min() > 0.0

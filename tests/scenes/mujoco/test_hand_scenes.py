@@ -8,7 +8,10 @@ import grasp_core as gc
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places
-from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+from tests.grasp_core.hands.gripping import FRICTION, scaled
+from tests.scenes.mujoco.compiled import compiled
+from tests.sim_validate.hands.executing import OBJECT, RADIUS
+from tests.sim_validate.hands.executing import stood as standing_hand
 
 WRITTEN = 2e-8
 """Scenes have nine digits of each number; a chain adds up their roundings."""
@@ -19,14 +22,9 @@ DOWN = (0.0, 0.6, -0.8)
 
 def stood(hand, down=None):
     """A scene, its compiled model, and the pose it was made from."""
-    body = scaled("dodecahedron", 0.035)
-    reach = next(each for each in reaches(hand, "dodecahedron", 0.035) if each.reached)
-    held = gc.load_hand(hand).with_torque_limits(0.35, "a test")
+    body, (reach, held) = scaled(OBJECT, RADIUS), standing_hand(hand)
     scene = scenes.build_hand_scene(held, body, reach, FRICTION, down=down)
-    model = mujoco.MjModel.from_xml_string(scene.xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return held, body, reach, scene, model, data
+    return held, body, reach, scene, *compiled(scene)
 
 
 @pytest.mark.parametrize("hand", ["allegro", "leap"])

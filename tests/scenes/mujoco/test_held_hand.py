@@ -9,6 +9,7 @@ from grasp_core.quality.motors import Motors
 from scenes.mujoco.hand_scenes import finger_springs
 from sim_validate.execution.paths import closing
 from sim_validate.execution.simulate import HeldBench
+from tests.scenes.mujoco.compiled import compiled
 from tests.sim_validate.hands.executing import standing
 
 WRITTEN = 2e-8
@@ -20,9 +21,7 @@ HANDS = ("allegro", "leap")
 def test_springs_are_those_of_the_servos_by_the_simulators_own_jacobians(hand):
     """K = k_q (J J')^-1 with the Jacobian of the point of contact that MuJoCo computes."""
     _, _, scene, _ = standing(hand)
-    layout, model = scene.layout, mujoco.MjModel.from_xml_string(scene.xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    layout, (model, data) = scene.layout, compiled(scene)
     for contact, name in enumerate(layout.holder.tip_names):
         J = np.zeros((3, model.nv))
         link = int(model.geom(name).bodyid[0])
@@ -81,9 +80,7 @@ def test_a_finger_that_is_rigid_in_some_direction_is_no_spring():
 def test_balls_above_a_table_bound_the_hand(hand):
     """Support points of all geoms of the compiled hand are no lower than the balls say."""
     _, _, scene, _ = standing(hand)
-    model = mujoco.MjModel.from_xml_string(scene.xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = compiled(scene)
     middles, radii = scene.layout.holder.above_table
     known = {"object", "table"}
     geoms = [g for g in range(model.ngeom) if model.geom(g).name not in known

@@ -12,6 +12,7 @@ import scenes
 from grasp_core.forces.contact_forces import even_forces
 from scenes.mujoco.held_scene import gravity_of, held_physics
 from scenes.mujoco.scene_text import FINGERTIPS, TABLE
+from tests.scenes.mujoco.compiled import compiled, state_of
 
 OBJECTS = ("dodecahedron", "l-bracket")
 MASS = 0.4
@@ -29,19 +30,12 @@ def held(name):
     scene = scenes.build_held_scene(
         body, grip, scenes.HeldSettings(mass_kg=MASS, tip_mass_kg=0.02, damping_ratio=0.7)
     )
-    return body, grip, scene, mujoco.MjModel.from_xml_string(scene.xml)
+    return body, grip, scene, compiled(scene)[0]
 
 
 @pytest.fixture(params=OBJECTS, scope="module")
 def built(request):
     return held(request.param)
-
-
-def rest_of(model):
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
-    return data
 
 
 def test_the_object_has_its_true_mass_and_inertia(built):
@@ -77,7 +71,7 @@ def test_what_touches_what(built):
 
 def test_fingertips_start_on_their_contacts(built):
     body, grip, _, model = built
-    data = rest_of(model)
+    data = state_of(model, 0)
     for finger in range(4):
         center = data.geom(f"finger{finger}").xpos
         assert center + 0.004 * grip.normals[finger] == pytest.approx(
@@ -92,7 +86,7 @@ def test_springs_are_those_of_the_grip(built):
     _, grip, _, model = built
     for finger in range(4):
         measured = np.zeros((3, 3))
-        data = rest_of(model)
+        data = state_of(model, 0)
         data.ctrl[:] = 0.0
         mujoco.mj_forward(model, data)
         turn = data.body(f"finger{finger}").xmat.reshape(3, 3)
@@ -108,7 +102,7 @@ def test_springs_are_those_of_the_grip(built):
 def test_gravity_pulls_the_object_alone(built):
     """Fingers and palm are carried: their joints feel no weight at rest."""
     _, _, scene, model = built
-    data = rest_of(model)
+    data = state_of(model, 0)
     assert scene.layout.gravity == pytest.approx([0, 0, -9.80665])
     weights = data.qfrc_bias - data.qfrc_gravcomp
     assert weights[:3] == pytest.approx(-MASS * scene.layout.gravity)

@@ -13,22 +13,16 @@ from scenes.settings import FingerSettings, PhysicsSettings
 from sim_validate.hands.dexgraspbench import hand_file
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+from tests.scenes.mujoco.compiled import compiled
 
 BODY = scaled("dodecahedron", 0.05)
 GRASP = gc.plan(BODY, FRICTION, limit=1).grasps[0]
 PHYSICS = PhysicsSettings(torsion_m=0.02)
 
 
-def loaded(scene):
-    model = mujoco.MjModel.from_xml_string(scene.xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    return model, data
-
-
 def test_the_object_has_its_mass_and_inertia_and_the_friction_asked_for():
     scene = TestedObject(BODY, 0.7, 0.2, PHYSICS).by_fingertips(GRASP, FingerSettings())
-    model, _ = loaded(scene)
+    model, _ = compiled(scene, 0)
     body = model.body("object")
     assert body.mass[0] == pytest.approx(0.2)
     moments = np.linalg.eigvalsh(BODY.inertia) * 0.2 / BODY.volume
@@ -46,8 +40,7 @@ def test_open_fingertips_touch_nothing_and_closed_ones_push_as_told(name):
     grasp = gc.plan(body, FRICTION, limit=1).grasps[0]
     tested = TestedObject(body, FRICTION, 0.2, PhysicsSettings())
     scene = tested.by_fingertips(grasp, FingerSettings())
-    model, data = loaded(scene)
-    mujoco.mj_forward(model, data)
+    model, data = compiled(scene, 0)
     assert data.ncon == 0
     steps = 200
     for share in np.linspace(0.0, 1.0, steps):
@@ -70,8 +63,7 @@ def test_a_hand_starts_open_and_all_its_links_can_touch_the_object():
     hand = gc.load_hand("allegro").with_torque_limits(0.7, "a test")
     tested = TestedObject(body, 0.6, 0.1, PHYSICS)
     scene = tested.by_hand(hand, tested.postures(hand, reach, 5.0), HandServos(5.0))
-    model, data = loaded(scene)
-    mujoco.mj_forward(model, data)
+    model, data = compiled(scene, 0)
     met = model.geom_bodyid[data.contact.geom]
     assert not (met == model.body("object").id).any()
     solid = model.geom("object").id
@@ -104,7 +96,7 @@ def test_a_weld_gives_way_by_its_closed_form():
     F w (1 - d) / d = k d r, with k = 1 / (d t)^2 and the inverse mass w of a free body."""
     seconds, impedance = 0.02, 0.95
     scene = welded(Weld((seconds, 1.0), (impedance, impedance, 0.001, 0.5, 2.0)))
-    model, data = loaded(scene)
+    model, data = compiled(scene, 0)
     root, force = model.body("root").id, 30.0
     data.xfrc_applied[root, 2] = force
     before = data.qpos[7:10].copy()

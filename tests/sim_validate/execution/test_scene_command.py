@@ -11,6 +11,7 @@ import grasp_core as gc
 import scenes
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from tests.scenes.mujoco.compiled import state_of
 
 SETTLED_S = 2.0
 
@@ -28,9 +29,7 @@ def words(wedge_plan):
 def moved(path):
     """How far the object's centre moves in two seconds of `squeeze` [m], and its turn [rad]."""
     model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("squeeze").id)
-    mujoco.mj_forward(model, data)
+    data = state_of(model, "squeeze")
     place, turn = data.body("object").xipos.copy(), data.body("object").xquat.copy()
     for _ in range(round(SETTLED_S / model.opt.timestep)):
         mujoco.mj_step(model, data)

@@ -13,11 +13,11 @@ from sim_validate.closure.verdict import AGREEMENT
 from sim_validate.hands.trials import KnownHand, hand_setup
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
 from tests.marks import more
+from tests.sim_validate.hands.executing import OBJECT, RADIUS, TORQUE, stood
 
 DOWN = (0.0, 0.6, -0.8)
 CASES = [("allegro", "dodecahedron", 0.035, None), ("leap", "dodecahedron", 0.035, DOWN),
          ("allegro", "l-bracket", 0.04, None)]  # fmt: skip
-TORQUE = 0.35
 
 
 def verdict(hand, name, radius, down, **agenda):
@@ -71,16 +71,14 @@ def test_the_known_hand_is_exact_and_wrong_settings_are_refused():
     [{"cone": "pyramidal"}, *more({"solimp": (0.5, 0.5, 0.001, 0.5, 2.0)}, {"impratio": 1.0})],
 )
 def test_unfaithful_settings_are_refused(change):
-    body, reach = scaled("dodecahedron", 0.035), reaches("allegro", "dodecahedron", 0.035)[0]
-    held = gc.load_hand("allegro").with_torque_limits(TORQUE, "a test")
+    body, (reach, held) = scaled(OBJECT, RADIUS), stood("allegro")
     setup = replace(hand_setup(), physics=replace(PhysicsSettings(), **change))
     with pytest.raises(UnfaithfulError, match="the simulator is not faithful"):
         sv.validate_hand(held, body, reach, FRICTION, setup=setup)
 
 
 def test_what_cannot_be_tested_is_refused():
-    body, reach = scaled("dodecahedron", 0.035), reaches("allegro", "dodecahedron", 0.035)[0]
-    held = gc.load_hand("allegro").with_torque_limits(TORQUE, "a test")
+    body, (reach, held) = scaled(OBJECT, RADIUS), stood("allegro")
     with pytest.raises(InputError, match=r"are not in force closure at 0\.001"):
         sv.validate_hand(held, body, reach, 0.001)
     soft = replace(hand_setup(), physics=PhysicsSettings(torsion_m=0.005))

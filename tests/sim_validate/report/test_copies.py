@@ -3,18 +3,17 @@
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import sim_validate as sv
 from grasp_core.records.grasps_json import load_grasps
-from scenes.drawing.pages import UNITS
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.cards import cards_of
 from sim_validate.report.report import FIRST, write_report
 from sim_validate.report.run_folder import runs_in
+from tests.scenes.drawing.whole import assert_contacts
 from tests.sim_validate.changing import slipped
 from tests.sim_validate.report.test_report import Page
 
@@ -64,7 +63,7 @@ def test_every_grasp_has_a_page_and_every_card_names_its_copies(planned, drawn):
 def test_the_page_of_a_copy_has_its_own_numbers_and_leads_to_the_pictures(planned, drawn):
     report, _ = drawn
     (run,) = runs_in(planned)
-    grasps, radius = run.saved.grasps, run.saved.body.radius
+    grasps = run.saved.grasps
     count = 0
     for card in cards_of(run):
         first = grasps[card.first]
@@ -79,9 +78,7 @@ def test_the_page_of_a_copy_has_its_own_numbers_and_leads_to_the_pictures(planne
             assert not any(tag == "img" for tag, _ in found.tags)
             assert ("mirrored" if place in card.mirrored else "rotated") in " ".join(found.said)
             shapes = json.loads(found.data["drawing"])["shapes"]
-            (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
-            points = run.saved.body.center_of_mass + np.array(contacts) * radius / UNITS
-            np.testing.assert_allclose(points, copy.positions, atol=radius / UNITS)
+            assert_contacts(shapes, run.saved.body, copy.positions)
             count += 1
     assert count == report.grasps - report.drawn > 0
 

@@ -3,11 +3,9 @@
 import json
 import shlex
 
-import numpy as np
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.pages import UNITS
 from scenes.drawing.sheets import FINGERS, HAND
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -20,6 +18,7 @@ from tests.scenes.drawing.standing import (
     small_plan,
     standing,
 )
+from tests.scenes.drawing.whole import assert_contacts
 from tests.sim_validate.changing import at, changed
 from tests.sim_validate.report.test_report import Page
 
@@ -62,10 +61,7 @@ def test_the_page_turns_the_hand_and_has_its_figures(report):
     assert roles.count("hand") > 20
     assert {shape["colour"] for shape in shapes if shape["role"] == "hand"} == {HAND}
     assert all(shape["solid"] for shape in shapes if shape["role"] in {"hand", "fingertip"})
-    body = standing()[0]
-    (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
-    points = body.center_of_mass + np.array(contacts) * body.radius / UNITS
-    np.testing.assert_allclose(points, POSITIONS, atol=body.radius / UNITS)
+    assert_contacts(shapes, standing()[0], POSITIONS)
     assert {"finger", "force cone"} <= set(drawing["hidden"])
     assert not {"hand", "fingertip", "contact"} & set(drawing["hidden"])
     said = " ".join(" ".join(page.said).split())

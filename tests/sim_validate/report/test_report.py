@@ -12,11 +12,11 @@ import pytest
 
 from grasp_core.errors import InputError
 from grasp_core.records.grasps_json import load_grasps
-from scenes.drawing.pages import UNITS
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
+from tests.scenes.drawing.whole import assert_contacts
 from tests.sim_validate.changing import at, changed, changed_verdicts, slipped
 
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
@@ -108,13 +108,10 @@ def test_a_page_says_what_the_files_say(small_run, small_report):
 
 def test_the_drawing_is_that_of_the_grasp(small_run, small_report):
     saved = load_grasps(small_run / "grasps.json")
-    body = saved.body
     for grasp in saved.grasps:
         page = Page((small_report / "grasps" / f"{grasp.id}.html").read_text())
         shapes = json.loads(page.data["drawing"])["shapes"]
-        (contacts,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
-        points = body.center_of_mass + np.array(contacts) * body.radius / UNITS
-        np.testing.assert_allclose(points, grasp.positions, atol=body.radius / UNITS)
+        assert_contacts(shapes, saved.body, grasp.positions)
         assert sum(shape["role"] == "region" for shape in shapes) == 4
     text = (small_report / "object-0.js").read_text()
     drawn = json.loads(text.partition("= ")[2].rstrip(";\n"))
