@@ -1,11 +1,12 @@
 """Parts with a face moved, a hole or a chamfer, and what became of contacts, judged apart.
 
 Nothing here uses how the package carries contacts: solids are made by manifold3d and by solving for
-vertices, and distances are measured on all triangles with plain NumPy.
+vertices, and distances are measured on all triangles by trimesh.
 """
 
 import manifold3d
 import numpy as np
+import trimesh
 
 import grasp_core as gc
 
@@ -87,24 +88,14 @@ def _body_of(solid, name):
 def triangles_of(body):
     """Corners of all triangles, (t, 3, 3), and their unit normals into the part, (t, 3)."""
     corners = body.vertices[body.triangles]
-    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    kept = lengths > 1e-12 * body.radius**2
-    return corners[kept], normals[kept] / lengths[kept, None]
+    normals, kept = trimesh.triangles.normals(corners)
+    return corners[kept], -normals
 
 
-def distances(point, corners, normals):
-    """Distance of a point from each triangle, (t,): from its plane, or from its nearest edge."""
-    heights = np.einsum("ti,ti->t", point - corners[:, 0], normals)
-    feet = point - heights[:, None] * normals
-    after = np.roll(corners, -1, axis=1)
-    sides = np.einsum("tki,ti->tk", np.cross(after - corners, feet[:, None] - corners), normals)
-    inside = (sides <= 0.0).all(axis=1)  # corners are counter-clockwise seen from outside
-    along = after - corners
-    share = np.einsum("tki,tki->tk", point - corners, along)
-    share = np.clip(share / np.einsum("tki,tki->tk", along, along), 0.0, 1.0)
-    from_edges = np.linalg.norm(point - corners - share[..., None] * along, axis=2).min(axis=1)
-    return np.where(inside, np.abs(heights), from_edges)
+def distances(point, corners):
+    """Distance of a point from each triangle, (t,)."""
+    nearest = trimesh.triangles.closest_point(corners, np.tile(point, (len(corners), 1)))
+    return np.linalg.norm(nearest - point, axis=1)
 
 
 def nearest_like(body, point, normal, angle_deg):
@@ -113,11 +104,11 @@ def nearest_like(body, point, normal, angle_deg):
     like = normals @ normal >= np.cos(np.radians(angle_deg) + 1e-9)
     if not like.any():
         return np.inf
-    return float(distances(point, corners[like], normals[like]).min())
+    return float(distances(point, corners[like]).min())
 
 
 def is_on_surface(body, contact):
     """Whether a contact lies on a triangle with its normal, to a billionth of the part's size."""
     corners, normals = triangles_of(body)
-    near = distances(contact.position, corners, normals) <= 1e-9 * body.radius
+    near = distances(contact.position, corners) <= 1e-9 * body.radius
     return bool((np.abs(normals[near] - contact.normal).max(axis=1) <= 1e-7).any())

@@ -138,7 +138,7 @@ def changed(body, grasp, kind, size):
 
 @pytest.mark.parametrize(("name", "kind", "size"), CHANGES)
 def test_carried_contacts_are_nearest_on_the_new_surface_and_judged_as_by_hand(name, kind, size):
-    """Measured on all triangles with plain NumPy: on the surface, its normal, and the nearest."""
+    """Measured on all triangles by trimesh: on the surface, its normal, and the nearest."""
     body, grasps = planned(name, limit=8)
     new = changed(body, grasps[0], kind, size)
     found = gc.transfer(body, new, grasps, FRICTION)

@@ -10,8 +10,6 @@ from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import REACHES
 from sim_validate.main import main
-from tests.grasp_core.hands.gripping import plain_hand
-from tests.hand_models import hand_mjcf
 from tests.three_fingers import THREE_TIPS, three_fingers_file
 
 
@@ -36,11 +34,28 @@ def test_it_writes_poses_that_are_in_force_closure(bracket_plan, tmp_path, capsy
         assert each.used.tolist() == [0, 1, 2, 3]
 
 
+PLAIN_FINGER = """
+<body name="f{n}" pos="0 {y} 0">
+  <joint name="a{n}" axis="0 1 0" range="-1.5 1.5"/>
+  <geom type="box" size="0.006 0.006 0.02" pos="0 0 0.02"/>
+  <body name="g{n}" pos="0 0 0.04">
+    <joint name="b{n}" axis="0 1 0" range="-1.5 1.5"/>
+    <geom type="box" size="0.006 0.006 0.015" pos="0 0 0.015"/>
+    <geom name="tip{n}" type="sphere" size="0.008" pos="0 0 0.03"/>
+  </body>
+</body>"""
+
+
 def test_a_grasp_that_is_not_reached_is_a_negative_answer(bracket_plan, tmp_path, answer):
     """A hand whose fingers all bend the same way cannot enclose anything."""
     path = tmp_path / "plain.xml"
-    path.write_text(hand_mjcf(plain_hand()))
-    tips = ",".join(f"f{i}_tip" for i in range(4))
+    fingers = "".join(PLAIN_FINGER.format(n=n, y=0.04 * n) for n in range(4))
+    path.write_text(
+        '<mujoco><compiler angle="radian"/><worldbody><body name="palm">'
+        f'<geom type="box" size="0.02 0.08 0.01" pos="0 0.06 -0.02"/>{fingers}</body></worldbody>'
+        "</mujoco>"
+    )
+    tips = ",".join(f"tip{n}" for n in range(4))
     asked = ["--hand", path, "--fingertips", tips, "--limit", "1", "--starts", "5"]
     (only,) = answer("reach", bracket_plan, *asked, code=Exit.NEGATIVE)["reaches"]
     assert only["joints_rad"] is None
