@@ -7,6 +7,8 @@ comparison is exact. Symmetries are left out: only proofs with the identity alon
 from fractions import Fraction
 from math import isqrt
 
+import numpy as np
+
 FINE = 36
 """Binary digits of the place of a point on an edge."""
 ROOT = 10**20
@@ -16,7 +18,7 @@ ROOT = 10**20
 def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
     """Whether the tree refutes that any four contacts on the polygons reach the threshold."""
     pieces = [
-        (exact(arrays["normals"][p]), exact(arrays["origins"][p]), exact(arrays["frames"][p].T))
+        [exact(arrays[name][p].T) for name in ("normals", "origins", "frames")]
         for p in range(len(arrays["counts"]))
     ]
     mu, threshold = Fraction(float(arrays["friction"])), Fraction(float(arrays["threshold"]))
@@ -24,8 +26,7 @@ def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
     loads = exact(arrays["loads"]) if measure == "task" else []
     assert len(arrays["maps"]) == 1
     polygons = {
-        p: [tuple(exact(corner)) for corner in arrays["corners"][p][:count]]
-        for p, count in enumerate(arrays["counts"])
+        p: list(exact(arrays["corners"][p][:count])) for p, count in enumerate(arrays["counts"])
     }
     # a node: for each finger its polygons by piece, and whether it is fresh
     waiting = [([dict(polygons) for _ in range(4)], [True] * 4)]
@@ -36,7 +37,7 @@ def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
         places, fresh = waiting.pop()
         if deed < 16:
             y = exact(arrays["twists"][asked])
-            if measure == "ferrari-canny" and sum(a * a for a in y) < 1 - Fraction(1, 10**12):
+            if measure == "ferrari-canny" and y @ y < 1 - Fraction(1, 10**12):
                 return False
             t = threshold * demand(measure, loads, y)
             named = [i for i in range(4) if deed >> i & 1]
@@ -67,15 +68,15 @@ def replays(arrays):  # noqa: C901, PLR0912 - all rules in one place
 def demand(measure, loads, y):
     """How much of the loads a twist asks for, or a little less."""
     if measure == "weight":
-        square = sum(a * a for a in y[:3])
+        square = y[:3] @ y[:3]
         return Fraction(isqrt(square.numerator * ROOT**2 // square.denominator), ROOT)
     if measure == "task":
-        return max(0, *(-dot(load, y) for load in loads))
+        return max(0, *(-loads @ y))
     return 1
 
 
 def exact(numbers):
-    return [Fraction(float(x)) if getattr(x, "ndim", 0) == 0 else exact(x) for x in numbers]
+    return np.vectorize(Fraction, otypes=[object])(np.asarray(numbers, dtype=float))
 
 
 def child(places, fresh, i, polygons):
@@ -85,21 +86,12 @@ def child(places, fresh, i, polygons):
     )
 
 
-def cross(a, b):
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
 def fails(piece, corner, y, mu, t):
     """Whether n.u + mu |tangential u| < t, without square roots."""
     normal, origin, (one, two) = piece
-    x = [o + corner[0] * a + corner[1] * b for o, a, b in zip(origin, one, two, strict=True)]
-    u = [v + r for v, r in zip(y[:3], cross(y[3:], x), strict=True)]
-    rest = t - dot(normal, u)
-    return rest > 0 and mu * mu * (dot(one, u) ** 2 + dot(two, u) ** 2) < rest * rest
+    u = y[:3] + np.cross(y[3:], origin + corner[0] * one + corner[1] * two)
+    rest = t - normal @ u
+    return rest > 0 and mu * mu * ((one @ u) ** 2 + (two @ u) ** 2) < rest * rest
 
 
 def answering(piece, polygon, y, mu, t):
@@ -118,9 +110,8 @@ def answering(piece, polygon, y, mu, t):
 
 def crossing(piece, ends, y, mu, t):
     """A point of an edge that fails, near to where it begins to answer: guessed in floats."""
-    shape = [[list(map(float, row)) for row in piece[2]], *(list(map(float, p)) for p in piece[:2])]
-    rough, (low, high) = (shape[1], shape[2], shape[0]), [tuple(map(float, end)) for end in ends]
-    motion, near, far = list(map(float, y)), 0.0, 1.0
+    rough, (low, high) = [part.astype(float) for part in piece], np.array(ends, dtype=float)
+    motion, near, far = y.astype(float), 0.0, 1.0
     for _ in range(45):
         middle = 0.5 * (near + far)
         if fails(rough, between(low, high, middle), motion, float(mu), float(t)):
@@ -134,7 +125,7 @@ def crossing(piece, ends, y, mu, t):
 
 
 def between(one, two, share):
-    return tuple(a + share * (b - a) for a, b in zip(one, two, strict=True))
+    return one + share * (two - one)
 
 
 def clipped(polygon, a, b, c):
