@@ -8,7 +8,6 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from scenes.mujoco.closure_scene import build_scene
 from sim_validate.engine.limits_and_friction import squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulate import Bench, Load
@@ -29,12 +28,10 @@ def saved_plan(folder, limit=1, friction=0.5):
     return gc.save_grasps(folder / "grasps.json", plan)
 
 
-def rig_of(body, grasp, friction, setup=None, surface="pads"):
+def rig_of(body, grasp, friction):
     """The object in the gentle grasp of its scene."""
-    setup = setup or Setup()
-    scene = build_scene(
-        body, grasp, friction, fingers=setup.fingers, physics=setup.physics, surface=surface
-    )
+    setup = Setup(surface="pads")
+    scene = setup.scene(body, grasp, friction)
     forces = np.einsum("kij,kj->ki", scene.layout.frames, scene.layout.squeeze)
     return squeezed(Bench(scene, threads=setup.threads), setup, forces, friction)
 

@@ -22,6 +22,7 @@ from sim_validate.main import main
 from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.patience import HANGING_S
 
+pytestmark = pytest.mark.usefixtures("here")
 ROOT = Path(__file__).parent.parent.parent
 WORDS = {" ".join(line.split()[: COMMAND_WORDS.get(line.split()[0], 1)]) for line in EXAMPLES}
 
@@ -74,7 +75,6 @@ def test_json_output_is_one_document_and_the_rest_goes_elsewhere(here, answer):
 
 
 @pytest.mark.parametrize(("command", "name"), [("run", "box"), ("plan", "prism")])
-@pytest.mark.usefixtures("here")
 def test_an_object_without_grasps_says_so_in_one_sentence(capsys, command, name):
     paper = ["--families", ",".join(FAMILIES)]
     assert main([command, name, "--cones", "normal", *paper]) == Exit.NONE
@@ -143,7 +143,6 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, answer, capsys):
         assert said in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("here")
 def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
     def always_held(trace, *_):
         return HoldVerdict(Outcome.HELD, "", 0.0, 0.0, 0.0, trace.slips_m.max(axis=0), None)
@@ -153,7 +152,6 @@ def test_a_control_that_holds_makes_the_run_fail(monkeypatch, capsys):
     assert "negative controls were let go (all should)" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("here")
 def test_a_run_without_controls_says_so(monkeypatch, capsys):
     monkeypatch.setattr("sim_validate.closure.validate.negative_controls", lambda *_: ())
     assert main(["run", "tetrahedron", "--jobs", "1", "--no-report"]) == Exit.GOOD
@@ -269,7 +267,6 @@ def test_an_object_is_drawn(here, answer):
     assert 3 <= len(numbers) < len(wedge.faces)
 
 
-@pytest.mark.usefixtures("here")
 def test_planning_flags_reach_the_planner(capsys):
     flags = ["--friction", "0.3", "--complete", "--rank-by", "diverse", "--limit", "5"]
     assert main(["plan", "double-wedge-bar", *flags]) == Exit.GOOD
@@ -279,7 +276,6 @@ def test_planning_flags_reach_the_planner(capsys):
     assert "out of reach" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("here")
 def test_plans_ordered_by_what_grasps_carry_show_it(capsys):
     assert main(["plan", "tetrahedron", "--rank-by", "payload", "--limit", "3"]) == Exit.GOOD
     said = capsys.readouterr().out
@@ -289,7 +285,6 @@ def test_plans_ordered_by_what_grasps_carry_show_it(capsys):
     assert masses[0] == pytest.approx(1.26, abs=5e-3)
 
 
-@pytest.mark.usefixtures("here")
 def test_a_file_of_results_is_no_object(capsys):
     Path("grasps.json").write_text("{}")
     for command in ("inspect", "plan", "run"):

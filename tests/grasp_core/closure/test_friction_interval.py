@@ -203,7 +203,7 @@ def test_grasps_whose_margin_grows_with_a_power_of_the_friction_need_none(name):
 def test_up_to_four_rounds_of_pushes_leave_nothing_to_search():
     """Each new contact is pushed by what is left of the friction of those before it."""
     seen = Counter()
-    for positions, normals, grid in contact_sets(900, seed=24):
+    for positions, normals, grid in contact_sets(900, seed=28):
         if grid and len(positions) == 4 and gc.critical_friction(positions, normals) == 0.0:
             found = gc.critical_friction_interval(positions, normals)
             pushes = np.sort(np.einsum("ki,ki->k", found.forces, normals) / found.forces.max())

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
 from grasp_core.execution.loads import Reactions
@@ -208,15 +209,9 @@ def test_torques_at_the_end_of_a_load_are_within_all_limits():
             free = gc.first_slip(held.grip, load)
             assert finite.multiple <= free.multiple * (1.0 + 1e-6)
             # forces in the object's axes: its turn is that of the contacts' normals
-            turn = turn_between(held.grip.normals, finite.normals)
+            turn = Rotation.align_vectors(finite.normals, held.grip.normals)[0].as_matrix()
             shares = np.abs(motors.torques(finite.forces @ turn)) / motors.limits
             assert shares.max() <= 1.0 + 1e-6
             ends.append(finite.event)
     assert len(ends) == 12
     assert ends.count("torque limit") >= 4
-
-
-def turn_between(before, after):
-    """Rotation that takes unit vectors (k, 3) to others."""
-    U, _, V = np.linalg.svd(after.T @ before)
-    return U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V

@@ -22,7 +22,7 @@ QUICK = ["--trials", "knock"]
 IDS = ("c-0-1-2-7", "p-0-7-1-5")
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def here(wedge_plan, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "grasps.json").write_text(wedge_plan.read_text())
@@ -51,7 +51,6 @@ def test_grasps_that_survive_are_shown_and_written(here, capsys):
     assert found.settings.trials == ("weight", "lift", "knock")
 
 
-@pytest.mark.usefixtures("here")
 def test_a_grasp_that_does_not_survive_is_a_result(capsys):
     words = ["execute", "grasps.json", "--mass-kg", "1.3", "--limit", "1", "--trials", "weight"]
     assert main([*words, "--out", "."]) == Exit.NEGATIVE
@@ -79,7 +78,6 @@ def test_a_grasp_that_does_not_survive_is_a_result(capsys):
     assert trial.predicted_first_slip == pytest.approx(grasp.execution.load_multiple, rel=0.05)
 
 
-@pytest.mark.usefixtures("here")
 def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
     words = ["execute", "grasps.json", "--friction", "0.03", "--mass-kg", "0.3", *QUICK]
     assert main([*words, "--limit", "1", "--out", "."]) == Exit.NEGATIVE
@@ -94,7 +92,6 @@ def test_a_grasp_without_a_squeeze_is_a_result_with_its_reason(capsys):
     assert f"c-0-1-2-7: not executed: {first.reason}" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("here")
 def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
     def kept(*given, **more):
         found = execution_of(*given, **more)
@@ -113,7 +110,6 @@ def test_a_control_that_holds_is_a_fault_of_the_simulator(capsys, monkeypatch):
     assert found.settings.mass_kg == pytest.approx(1000.0 * volume, rel=1e-8)
 
 
-@pytest.mark.usefixtures("here")
 def test_what_was_done_is_kept_where_the_simulator_fails(capsys, monkeypatch):
     def failing(job):
         if job.grasp.id == IDS[1]:

@@ -19,6 +19,7 @@ from sim_validate.report.report import write_report
 from tests.scenes.drawing.whole import assert_contacts
 from tests.sim_validate.changing import at, changed, changed_verdicts, slipped
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
 EVIL = '<script>document.title="taken"</script>"\'&\x1b[31m'
 
 
@@ -153,7 +154,6 @@ def spoiled(found):
     return replace(found, gate=gate, verdicts=(first, *found.verdicts[1:]))
 
 
-@pytest.mark.usefixtures("no_pictures")
 def test_names_are_escaped(copy, tmp_path):
     changed(copy / "grasps.json", at("object", name=EVIL))
     changed_verdicts(copy / "verdicts.json", spoiled)
@@ -171,7 +171,6 @@ def test_names_are_escaped(copy, tmp_path):
     assert "contradicts the analysis" in pages[index].said
 
 
-@pytest.mark.usefixtures("no_pictures")
 def test_without_verdicts_grasps_are_shown(copy, tmp_path):
     (copy / "verdicts.json").unlink()
     (copy / "regions.json").unlink()
@@ -182,7 +181,6 @@ def test_without_verdicts_grasps_are_shown(copy, tmp_path):
     assert 'id="fidelity"' not in report.index.read_text()
 
 
-@pytest.mark.usefixtures("no_pictures")
 def test_an_interrupted_run_is_called_that(copy, tmp_path):
     path = copy / "verdicts.json"
     changed_verdicts(path, lambda found: replace(found[:1], complete=False))
@@ -191,7 +189,6 @@ def test_an_interrupted_run_is_called_that(copy, tmp_path):
     assert "not validated" in said
 
 
-@pytest.mark.usefixtures("no_pictures")
 def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
     last = Verdicts.read(copy / "verdicts.json")[-1].id
 
@@ -207,7 +204,6 @@ def test_of_many_grasps_those_with_bad_news_are_shown(copy, tmp_path):
     assert "1 are shown" in said
 
 
-@pytest.mark.usefixtures("no_pictures")
 def test_several_runs_make_one_report(copy, tmp_path):
     both = tmp_path / "both"
     shutil.copytree(copy, both / "b")
@@ -223,7 +219,6 @@ def test_several_runs_make_one_report(copy, tmp_path):
     assert len(pages_of(both / "report")) == 3
 
 
-@pytest.mark.usefixtures("no_pictures")
 def test_an_earlier_report_stays_until_the_new_one_is_complete(copy, tmp_path):
     told = []
 
@@ -266,7 +261,6 @@ def test_pages_are_not_put_among_other_things(copy, tmp_path, capsys):
     assert (copy / "verdicts.json").is_file()
 
 
-@pytest.mark.usefixtures("no_pictures")
 def test_regions_for_more_friction_are_not_shown(copy, tmp_path):
     changed(copy / "regions.json", at(friction=0.6))
     pages = pages_of(write_report(copy, tmp_path / "out", jobs=1, limit=1).index.parent)
