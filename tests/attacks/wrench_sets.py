@@ -65,12 +65,19 @@ def genuine(seed):
 def balance(seed):
     """Local forces, pushes of sum one, that balance as deep in their cones as any."""
     w, _ = closed_set(seed)
-    k, mu = len(w.friction), w.friction
-    A = np.zeros((7 + 3 * k, 3 * k + 1))
-    A[:6, :-1], A[6, :-1:3] = w.G @ scaled(mu), 1.0
-    A[7:, :-1], A[7::3, -1] = -np.eye(3 * k), 1.0
-    b = np.append(np.zeros(6), np.append(1.0, np.zeros(3 * k)))
-    return scaled(mu) @ conic(np.append(np.zeros(3 * k), -1.0), A, b, 7, 0, k).x[:-1]
+    return scaled(w.friction) @ optimum(w, np.zeros(6), 1.0)[:-1]
+
+
+def optimum(w, load, depth):
+    """Forces with pushes of sum one, and the largest t for which t times the load is balanced.
+
+    Or for which they are t times the depth inside their cones, (3k + 1,).
+    """
+    k = len(w.friction)
+    A, b = np.zeros((7 + 3 * k, 3 * k + 1)), np.zeros(7 + 3 * k)
+    A[:6, :-1], A[:6, -1], A[6, :-1:3], b[6] = w.G @ scaled(w.friction), load, 1.0, 1.0
+    A[7:, :-1], A[7::3, -1] = -np.eye(3 * k), depth
+    return conic(np.append(np.zeros(3 * k), -1.0), A, b, 7, 0, k).x
 
 
 @cache
@@ -210,18 +217,9 @@ def multiples(seed):
     """Loads, and the largest multiple of all of them that the contacts resist, by programs."""
     w, _ = closed_set(seed)
     loads = np.random.default_rng(seed).normal(size=(3, 6))
-    return resisted_loads(w, Measure("task", loads), 0.1), min(map(lambda v: most_of(w, v), loads))
-
-
-def most_of(w, load):
-    """The largest multiple of a load that forces with pushes of sum one resist."""
-    k = len(w.friction)
-    A = np.zeros((7 + 3 * k, 3 * k + 1))
-    A[:6, :-1], A[:6, -1], A[6, :-1:3] = w.G @ scaled(w.friction), load, 1.0
-    A[7:, :-1] = -np.eye(3 * k)
-    b = np.zeros(len(A))
-    b[6] = 1.0
-    return conic(np.append(np.zeros(3 * k), -1.0), A, b, 7, 0, k).x[-1]
+    return resisted_loads(w, Measure("task", loads), 0.1), min(
+        optimum(w, v, 0.0)[-1] for v in loads
+    )
 
 
 def more_resisted(rng):

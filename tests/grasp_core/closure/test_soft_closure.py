@@ -35,6 +35,7 @@ def test_two_opposite_soft_fingers_close_and_hard_ones_never_do():
         assert soft.closed
         assert soft.verify()
         assert soft.margin == pytest.approx(0.25, rel=1e-6)
+    assert gc.critical_friction(*OPPOSITE, torsion_m=0.005) == 0.0
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -79,10 +80,6 @@ def test_two_offset_fingers_need_the_slope_of_the_line_between_them(offset):
     assert gc.critical_friction(x, n) == math.inf
     found = gc.critical_friction(x, n, torsion_m=0.005)
     assert found == pytest.approx(offset / 0.1, rel=1e-7)
-
-
-def test_opposite_soft_fingers_close_at_any_friction():
-    assert gc.critical_friction(*OPPOSITE, torsion_m=0.005) == 0.0
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])

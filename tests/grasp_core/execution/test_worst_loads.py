@@ -53,19 +53,13 @@ def test_multipliers_prove_below_the_worst_scale_and_none_do_above():
         assert not reactions.survives(0.5 * scale, -best)
 
 
-def test_a_weight_in_any_direction_is_a_ball_of_forces():
+def test_a_weight_in_any_direction_is_a_ball_and_a_known_one_the_offset_of_another():
     loads = gc.any_direction(0.5, 2.0)
     assert not loads.offset.any()
     assert loads.axes[:3] == pytest.approx(0.5 * (G + 2.0) * np.eye(3))
     assert not loads.axes[3:].any()
-
-
-def test_gravity_of_a_palm_that_does_not_turn_is_the_offset():
     loads = gc.any_direction(0.5, 2.0, gravity=[0.0, 0.0, -G])
     assert loads.offset == pytest.approx([0, 0, -0.5 * G, 0, 0, 0])
     assert loads.axes[:3] == pytest.approx(np.eye(3))
-
-
-def test_a_known_gravity_without_acceleration_is_no_set_of_loads():
     with pytest.raises(gc.InputError, match="acceleration_m_per_s2 must be above zero where"):
         gc.any_direction(0.5, gravity=[0.0, 0.0, -G])

@@ -14,6 +14,7 @@ from grasp_core.objects.planar_faces import clearest_point, clearing, flat_patch
 from grasp_core.objects.surface import Mesh
 from tests.grasp_core.bodies import from_edges
 from tests.grasp_core.curved import bumpy_ellipsoid, check_patches, curved_body
+from tests.grasp_core.exact_judges import exactly
 
 ROUNDING = 1e-9
 """Relative to the object, of heights and of lines through the edges between triangles."""
@@ -105,10 +106,9 @@ def fence(rng, corners=40, stretch=1.0):
 
 def enters(polygon, segment):
     """Whether a segment has a point strictly inside a convex polygon, in rational arithmetic."""
-    ends = [[Fraction(float(number)) for number in end] for end in segment]
-    corners = [[Fraction(float(number)) for number in corner] for corner in polygon]
+    ends, corners = exactly(segment), exactly(polygon)
     low, high = Fraction(0), Fraction(1)
-    for (x, y), (u, v) in itertools.pairwise([*corners, corners[0]]):
+    for (x, y), (u, v) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         here, there = ((u - x) * (q - y) - (v - y) * (p - x) for p, q in ends)
         if max(here, there) <= 0:
             return False

@@ -30,6 +30,8 @@ def test_min_weight_is_what_its_definition_says(edges):
         assert here == pytest.approx(least_weight(W), abs=1e-9)
         signs[here > 0.0] += 1
     assert min(signs.values()) >= 5
+    one_way = np.tile([0.0, 0, 1], (4, 1))
+    assert gc.min_weight(TETRA_CENTERS, one_way, 0.5, edges=edges) == -math.inf
 
 
 def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
@@ -47,11 +49,6 @@ def test_min_weight_of_generic_contacts_is_positive_only_with_closure():
     assert positive >= 6
 
 
-def test_weights_of_contacts_that_push_one_way_cannot_balance():
-    normals = np.tile([0.0, 0, 1], (4, 1))
-    assert gc.min_weight(TETRA_CENTERS, normals, 0.5) == -math.inf
-
-
 def test_hull_volume_is_that_of_qhull_on_the_edges():
     rng = np.random.default_rng(3)
     for _ in range(4):
@@ -63,7 +60,7 @@ def test_hull_volume_is_that_of_qhull_on_the_edges():
         assert volume == pytest.approx(ConvexHull(W, qhull_options="QJ Pp").volume, rel=1e-6)
 
 
-def test_the_volume_of_seven_pushes_is_that_of_their_simplex():
+def test_the_volume_of_seven_pushes_is_that_of_their_simplex_and_that_of_four_zero():
     rng = np.random.default_rng(4)
     for _ in range(4):
         positions, normals = random_contacts(rng, 7)
@@ -73,9 +70,6 @@ def test_the_volume_of_seven_pushes_is_that_of_their_simplex():
         assert volume == pytest.approx(exact, rel=1e-6)
         longer = gc.hull_volume(positions, normals, 0.0, torque_scale=2.0)
         assert longer == pytest.approx(exact / 2.0**3, rel=1e-6)
-
-
-def test_without_friction_four_contacts_span_no_volume():
     assert gc.hull_volume(TETRA_CENTERS, TETRA_NORMALS, 0.0, torque_scale=1.0) == 0.0
 
 

@@ -22,6 +22,7 @@ from sim_validate.hands.dexgraspbench import (
 from sim_validate.protocols.judging import CHUNK, judge_hand_by, their_verdict, timeline
 from sim_validate.protocols.published import protocol
 from tests.grasp_core.hands.gripping import FRICTION, reaches, scaled
+from tests.scenes.mujoco.compiled import compiled
 
 TEST = protocol("dexgraspbench")
 HAND = gc.load_hand("allegro").with_torque_limits(0.7, "a test")
@@ -126,10 +127,7 @@ def test_a_run_is_what_a_plain_loop_of_steps_gives():
     """An independent driver: the hand on its weld, told by setting the mocap body's pose."""
     made = scene(record())
     run = timeline(TEST, made, TEST.runs[2])
-    model = mujoco.MjModel.from_xml_string(made.xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    farthest = 0.0
+    (model, data), farthest = compiled(made, 0), 0.0
     for sample, (told, wrench) in enumerate(zip(run.commands, run.wrenches, strict=True)):
         data.mocap_pos[0], data.mocap_quat[0], data.ctrl[:] = told[:3], told[3:FREE], told[FREE:]
         data.xfrc_applied[model.body("object").id] = wrench
