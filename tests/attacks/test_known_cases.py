@@ -16,8 +16,7 @@ from grasp_core.quality.wrench_limits import WrenchLimit
 from tests.attacks import contacts, faces, limits, wrench_sets
 from tests.attacks.searching import attacked
 from tests.grasp_core.exact_judges import closed_exactly
-
-TETRA = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 
 def test_a_sliver_in_two_orders_of_its_corners_encloses_nothing():
@@ -77,7 +76,7 @@ def test_one_joint_gives_another_no_slack():
 
 def test_a_far_contact_gives_no_slack():
     """With levers of 1e12, 1e-12 of the longest wrench is a newton."""
-    w = WrenchSet.at(-TETRA / 3.0, TETRA, np.full(4, 0.5))
+    w = WrenchSet.at(TETRA_CENTERS, TETRA_NORMALS, np.full(4, 0.5))
     far = WrenchSet.at(np.array([[1e12, 0, 0]]), np.array([[1.0, 0, 0]]), np.array([0.5]))
     more = WrenchSet(np.hstack([w.G, far.G]), np.full(5, 0.5), "l1")
     forces = np.tile([0.2, 0, 0], 5)

@@ -15,9 +15,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from tests.fuzzing.mutations import changed
-from tests.fuzzing.targets import CORPUS, FoundError, targets
+from tests.fuzzing.targets import CORPUS, MEMORY, FoundError, targets
 
-MEMORY = Path("/dev/shm")  # noqa: S108 - a folder in memory, where there is one
 GRACE_S = 900
 """For imports and the last input, on a busy machine."""
 LIMITS = ("-timeout=10", "-rss_limit_mb=2048", "-print_final_stats=1", "-verbosity=1")

@@ -12,9 +12,7 @@ from sim_validate.datasets.columns import TABLES
 from sim_validate.datasets.parquet import parquet_bytes, read_columns
 from sim_validate.kit.files import arrays_of
 from sim_validate.planning.regions import ARRAYS, regions_of
-from tests.fuzzing.targets import Target
-
-MEMORY = Path("/dev/shm")  # noqa: S108 - a folder in memory, where there is one
+from tests.fuzzing.targets import MEMORY, Target
 
 
 def npz(**arrays: Any) -> bytes:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 CORPUS = Path(__file__).with_name("corpus")
+MEMORY = Path("/dev/shm")  # noqa: S108 - a folder in memory, where there is one
 LONGEST_MESSAGE, MOST_LINES = 1000, 4
 """Of a refusal: it is for people."""
 

@@ -146,7 +146,8 @@ def test_balanced_forces_have_no_torque_just_when_the_lines_are_dependent(constr
     for _ in range(100):
         points, directions = construct(rng)
         directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-        sizes, weights = singular(directions)
+        _, sizes, right = np.linalg.svd(directions.T)
+        weights = right[3]  # of the combination that vanishes
         if sizes[2] < 1e-3 or np.abs(weights).min() < 1e-3:
             continue
         directions, weights = directions * np.sign(weights)[:, None], np.abs(weights)
@@ -158,12 +159,6 @@ def test_balanced_forces_have_no_torque_just_when_the_lines_are_dependent(constr
         assert gc.classify_lines(points, directions) == expected
         tested += 1
     assert tested >= 90
-
-
-def singular(directions):
-    """Singular values of four directions and the weights of their vanishing combination."""
-    _, sizes, right = np.linalg.svd(directions.T)
-    return sizes, right[3]
 
 
 def test_the_frictionless_saddle_balances_though_its_directions_lie_in_a_plane():

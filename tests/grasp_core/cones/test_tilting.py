@@ -7,7 +7,7 @@ import pytest
 from grasp_core.cones.spanning import cones_positively_span
 from grasp_core.cones.tilting import tilted_cones, toward
 from scenes.example_objects import example_object
-from tests.judges import random_rotation
+from tests.judges import TETRA_NORMALS, random_rotation
 
 
 def quadruples(name):
@@ -39,8 +39,7 @@ def test_the_sides_of_a_box_get_nearly_the_widest_cones_there_are():
 
 
 def test_normals_that_span_as_widely_as_any_are_kept():
-    units = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / math.sqrt(3.0)
-    found = tilted_cones(units[None], np.full((1, 4), math.atan(0.8)))
+    found = tilted_cones(TETRA_NORMALS[None], np.full((1, 4), math.atan(0.8)))
     assert math.degrees(found.half_angles[0]) == pytest.approx(19.4712, abs=0.01)
 
 

@@ -65,6 +65,9 @@ def test_the_first_wrench_without_forces_is_named():
 def test_no_wrench_needs_no_forces_and_next_to_none_a_mere_squeeze(objective):
     loose = contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.zeros(6), objective=objective)
     np.testing.assert_allclose(loose, np.zeros((4, 3)), atol=1e-9)
+    none = np.empty((0, 6))
+    found = contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.5, none, objective=objective)
+    assert found.shape == (0, 4, 3)
     loads = np.vstack([np.zeros(6), 1e-12 * np.eye(6)])
     squeezed = contact_forces(
         TETRA_CENTERS, TETRA_NORMALS, 0.5, loads,
@@ -76,10 +79,6 @@ def test_no_wrench_needs_no_forces_and_next_to_none_a_mere_squeeze(objective):
         assert across.max() < 1e-6
         if objective == "least_norm":
             np.testing.assert_allclose(along, 0.5, rtol=1e-6)
-
-
-def test_no_wrenches_get_no_forces():
-    assert contact_forces(TETRA_CENTERS, TETRA_NORMALS, 0.5, np.empty((0, 6))).shape == (0, 4, 3)
 
 
 def test_loads_far_below_the_limit_are_balanced_all_the_same():

@@ -12,17 +12,13 @@ from grasp_core.hands.hand import Fingertip, Hand, Joint, LinkShape
 from tests.grasp_core.hands.gripping import plain_hand
 
 
-@pytest.mark.parametrize("name", ["allegro", "leap"])
-def test_a_built_in_hand_has_four_fingers_and_sixteen_joints(name):
+@pytest.mark.parametrize(("name", "torque_n_m"), [("allegro", None), ("leap", 0.2196)])
+def test_a_built_in_hand_has_sixteen_joints_with_limits_where_a_source_has_them(name, torque_n_m):
     hand = gc.load_hand(name)
     assert hand == gc.load_hand(name)
     assert (len(hand.fingers), len(hand.joints)) == (4, 16)
     assert (hand.ranges[:, 0] < hand.ranges[:, 1]).all()
-
-
-def test_torque_limits_are_stated_only_where_a_source_has_them():
-    assert {joint.torque_limit_n_m for joint in gc.load_hand("allegro").joints} == {None}
-    assert {joint.torque_limit_n_m for joint in gc.load_hand("leap").joints} == {0.2196}
+    assert {joint.torque_limit_n_m for joint in hand.joints} == {torque_n_m}
 
 
 def test_torque_limits_can_be_given_with_their_source():

@@ -12,15 +12,10 @@ from tests.judges import (
     random_contacts,
 )
 from tests.tampering.changes import forged
+from tests.tampering.exact_closure import unit_arms
 
 TETRA = TETRA_CENTERS, TETRA_NORMALS, 0.5
 ALL_NORMS = ("l1", "linf")
-
-
-def middle_and_size(positions):
-    """What the wrenches of the judges are about, and in units of."""
-    center = positions.mean(axis=0)
-    return center, np.linalg.norm(positions - center, axis=1).max()
 
 
 def qhull_distance(points):
@@ -42,7 +37,7 @@ def test_qhull_on_inner_and_outer_pyramids_lies_on_either_side():
     closed = 0
     while closed < 6:
         positions, normals = random_contacts(rng)
-        center, size = middle_and_size(positions)
+        center, size = positions.mean(axis=0), unit_arms(positions)[1]
         found = gc.ferrari_canny(positions, normals, 0.6, center=center, torque_scale=size)
         if found.lower <= 0.0:
             continue

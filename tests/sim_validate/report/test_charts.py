@@ -56,13 +56,11 @@ def trial(wedge):
     )
 
 
-def wrench_set(body, grasp):
-    return WrenchSet.of(grasp, None, FRICTION, center=body.center_of_mass, torque_scale=body.radius)
-
-
 def test_a_shadow_holds_all_wrenches_and_is_touched_by_them(wedge):
     """The set by its definition: random forces in the cones, normal parts of sum at most one."""
-    wrenches = wrench_set(*wedge)
+    body, grasp = wedge
+    about = {"center": body.center_of_mass, "torque_scale": body.radius}
+    wrenches = WrenchSet.of(grasp, None, FRICTION, **about)
     rng = np.random.default_rng(0)
     plane = np.linalg.qr(rng.normal(size=(6, 2)))[0].T
     border = shadow_of(wrenches, plane)
