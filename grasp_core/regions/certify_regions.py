@@ -95,8 +95,8 @@ def certify_regions(
         raise InputError(
             f"grasp {grasp.id} is not in force closure at friction {left:.6g}; raise the friction"
         )
-    unit = _Unit(body, positions)
-    pieces = _pieces(body, grasp, unit, clearance)
+    unit = Unit(body, positions)
+    pieces = pieces_under(body, grasp, unit, clearance)
     # where the surface leans more than the friction angle nothing can be proved
     least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
     if pieces is None or least <= 0.0:
@@ -122,7 +122,7 @@ def certify_regions(
     return found
 
 
-class _Unit:
+class Unit:
     """A unit of length and an origin that make the contacts' longest lever about one.
 
     Both are rounded to few digits, so that places in this unit do not depend on the last digits of
@@ -143,8 +143,8 @@ class _Unit:
         return self.origin + self.scale * points
 
 
-def _pieces(
-    body: Polyhedron, grasp: Grasp, unit: _Unit, clearance: float
+def pieces_under(
+    body: Polyhedron, grasp: Grasp, unit: Unit, clearance: float
 ) -> tuple[FacePiece, ...] | None:
     """Return the pieces that contacts are deepest in, clear of edges; None if one is too narrow."""
     found = list[FacePiece]()
@@ -163,7 +163,7 @@ def _pieces(
 
 
 def _placed(
-    grounds: Grounds, proved: Proved, polygons: list[Array], unit: _Unit
+    grounds: Grounds, proved: Proved, polygons: list[Array], unit: Unit
 ) -> CertifiedRegions:
     """Return polygons as regions in the object's frame, with their proof."""
     trimmed = list[Array]()
@@ -220,7 +220,7 @@ def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> flo
     return low
 
 
-def _open_choice(grounds: Grounds, proved: Proved, unit: _Unit) -> ClosureCertificate | None:
+def _open_choice(grounds: Grounds, proved: Proved, unit: Unit) -> ClosureCertificate | None:
     """Return the proof, in the object's frame, that contacts on the pieces are not closed.
 
     Nothing is claimed about patches, as curved surfaces are not planes.

@@ -140,6 +140,22 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | No
     return TwistCover(axes, codes, np.einsum("kij,mkj->mki", sites.frames, forces)), None
 
 
+def twist_axes(points: Array, frames: Array, friction: Array) -> Array:
+    """Choose six twists as rows that move contacts at similar speeds, tangential ones times mu.
+
+    With these, long objects need no more cones than round ones.
+    """
+    motions = list[Array]()
+    for (x, y, z), F, mu in zip(points, frames, friction, strict=True):
+        turning = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+        weights = np.array([1.0, mu, mu])
+        motions.append(weights[:, None] * (F.T @ np.hstack([np.eye(3), turning])))
+    J = np.vstack(motions)
+    # a triangular factor is the same on all machines, unlike eigenvectors of symmetric contacts
+    factor = np.linalg.cholesky(J.T @ J + DIAGONAL * np.eye(J.shape[1]))
+    return to_digits(np.asarray(np.linalg.inv(factor), dtype=np.float64))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Grounds:
     """The pieces that contacts may stand on, at unit size, with friction and the effort allowed."""
@@ -184,21 +200,6 @@ class Grounds:
                 polygons.append(clip_to_disc(piece.corners, y, radius, SIDES))
         return self.around(ys, polygons, radii)
 
-    def axes(self, ys: Array) -> Array:
-        """Choose six twists as rows that move contacts at similar speeds, tangential ones times mu.
-
-        With these, long objects need no more cones than round ones.
-        """
-        motions = list[Array]()
-        for (x, y, z), F, mu in zip(self.points(ys), self.frames, self.friction, strict=True):
-            turning = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-            weights = np.array([1.0, mu, mu])
-            motions.append(weights[:, None] * (F.T @ np.hstack([np.eye(3), turning])))
-        J = np.vstack(motions)
-        # a triangular factor is the same on all machines, unlike eigenvectors of symmetric contacts
-        factor = np.linalg.cholesky(J.T @ J + DIAGONAL * np.eye(J.shape[1]))
-        return to_digits(np.asarray(np.linalg.inv(factor), dtype=np.float64))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proved:
@@ -226,7 +227,8 @@ class _Search:
     """Radii proved so far, and radii refuted, in a search for the largest discs."""
 
     def __init__(self, grounds: Grounds, ys: Array) -> None:
-        self.grounds, self.ys, self.axes = grounds, ys, grounds.axes(ys)
+        self.grounds, self.ys = grounds, ys
+        self.axes = twist_axes(grounds.points(ys), grounds.frames, grounds.friction)
         holding = max(
             float(np.linalg.norm(piece.corners - y, axis=1).max())
             for piece, y in zip(grounds.pieces, ys, strict=True)

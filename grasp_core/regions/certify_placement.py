@@ -1,0 +1,195 @@
+"""Finds a proved lower bound of the chance that a grasp is closed when it is not placed exactly.
+
+`placement` derives what is proved. The search tries prisms of several lengths, and for each the
+least friction with which a cover is found: little friction leaves more to turns, long prisms leave
+more to translations, and both make a cover harder.
+
+Fingers must meet their own faces first. Where other parts of the object are in front of a face, no
+higher than fingers come from, a finger that is turned by up to T against the face passes beside a
+point at height h within h tan T. For a direction u in the plane, no finger that lands where
+u.y <= min over corners of (u.c - h tan T) meets a triangle with corners c at heights h. The
+landings are faces, cut by such a half-plane for each triangle in front of them.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from grasp_core.arrays import Array, frozen_each
+from grasp_core.closure.contacts import stacked
+from grasp_core.geometry.polygons import clip, tidy
+from grasp_core.kinds import MaxCones, value_of
+from grasp_core.objects.face_pieces import THINNEST, FacePiece
+from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.regions.certify_regions import Unit, pieces_under
+from grasp_core.regions.growth import Sites, search_cover, twist_axes
+from grasp_core.regions.placement import (
+    SIDES,
+    Misplacement,
+    PlacementProbability,
+    bound,
+    chance_of_turning,
+)
+from grasp_core.values import FINGERS, Grasp, four
+
+CONES = 4000
+"""Default for the largest number of cones in one proof."""
+SHIFTS = 5.0
+"""Half-widths E of the prisms, in deviations of a finger: one of four is beyond for 1.5e-5."""
+SLIDES = (4.0, 3.0, 2.2)
+"""Half-lengths S of the prisms that are tried, in deviations of the slides."""
+BEHIND = 3.0
+"""Distance from which fingers come, in half-lengths of the longest prism."""
+HALVINGS = 4
+"""Number of times that the angle between no friction and all of it is halved."""
+ENOUGH = 0.005
+"""Chance of too large turns below which a smaller one is not sought."""
+IN_FRONT = 1e-9
+"""Height above a face from which the surface is in the way of fingers, in object radii."""
+ROUNDED = 1e-9
+"""Chance by which the bound is lowered, since other processors round it otherwise."""
+
+
+def placement_probability(
+    body: Polyhedron,
+    grasp: Grasp,
+    friction: float | tuple[float, float],
+    *,
+    pose_sigma_m: float | Sequence[float] = 0.0,
+    pose_sigma_rad: float | Sequence[float] = 0.0,
+    pose_covariance: ArrayLike | None = None,
+    contact_sigma_m: float = 0.0,
+    max_cones: int = CONES,
+) -> PlacementProbability | None:
+    """Prove a lower bound of the chance that a grasp is closed when it is not placed exactly.
+
+    Args:
+        body: The object.
+        grasp: A grasp on faces of the object.
+        friction: Coulomb coefficient, or the mean and the standard deviation of a Gaussian one.
+        pose_sigma_m: Standard deviation of the object's translation, one or along each axis [m].
+        pose_sigma_rad: Standard deviation of its turn about its centre of mass, one or about each
+            axis [rad].
+        pose_covariance: Covariance of translation and turn, (6, 6) [m, rad], in place of both.
+        contact_sigma_m: Standard deviation of each finger in each direction across its own [m].
+        max_cones: Most cones of one attempt at a proof, at least 64.
+
+    Returns:
+        The bound with its proof; None where other parts of the object hide a contact from its
+        finger, or where no proof is found.
+
+    Raises:
+        InputError: The contacts are not on the faces, or a number is out of its range.
+    """
+    check_on_faces(body, grasp)
+    moved = frozen_each(pose_sigma_m, 3, "pose_sigma_m")
+    turned = frozen_each(pose_sigma_rad, 3, "pose_sigma_rad")
+    mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
+    covariance = np.diag(np.concatenate([moved, turned]) ** 2)
+    off = Misplacement(
+        covariance if pose_covariance is None else pose_covariance, contact_sigma_m, mean, sigma
+    )
+    cones = value_of(MaxCones, max_cones, "max_cones")
+    positions, normals = stacked(grasp.contacts)
+    unit = Unit(body, positions)
+    pieces = pieces_under(body, grasp, unit, 0.0)
+    if pieces is None:
+        return None
+    arms = np.hstack([normals, -np.cross(normals, positions - body.center_of_mass)])
+    slides = np.linalg.norm(arms @ off.root, axis=1)
+    height = BEHIND * SLIDES[0] * float(slides.max()) / unit.scale
+    surface = unit.at(body.vertices)[body.triangles]
+    seen = [
+        _seen(piece, x, surface, height, math.tan(off.turn))
+        for piece, x in zip(pieces, unit.at(positions), strict=True)
+    ]
+    if min(map(len, seen)) == 0:
+        return None
+    landings = [
+        unit.back(piece.origin + corners @ piece.frame.T)
+        for piece, corners in zip(pieces, seen, strict=True)
+    ]
+    lean, depth = (max(each) for each in zip(*((p.spread, p.depth) for p in pieces), strict=True))
+    made = partial(
+        PlacementProbability, off=off, center=body.center_of_mass, positions=positions,
+        normals=normals, landings=four(landings), lean=lean, depth=unit.scale * depth,
+        shift=SHIFTS * off.contact_sigma, origin=unit.origin, scale=unit.scale,
+    )  # fmt: skip
+    best: PlacementProbability | None = None
+    for factor in SLIDES:
+        sites = Sites(
+            unit.at(positions),
+            np.array([np.column_stack([p.normal, p.frame]) for p in pieces]),
+            np.full(FINGERS, mean),
+            np.zeros((FINGERS, 1, 2)),
+            np.full(FINGERS, SHIFTS * off.contact_sigma / math.cos(math.pi / SIDES) / unit.scale),
+            factor * slides / unit.scale + depth / math.cos(off.turn),
+        )
+        for found in _proofs(made, sites, factor * slides, math.atan(mean) - lean, cones):
+            if best is None or found.lower > best.lower:
+                best = found
+        if best is not None and chance_of_turning(best) <= ENOUGH:
+            break
+    return best
+
+
+def _proofs(
+    made: Callable[..., PlacementProbability], sites: Sites, slides: Array, angle: float, cones: int
+) -> Iterator[PlacementProbability]:
+    """Yield proofs with less and less friction, from the tangent of half an angle on."""
+    least, most = 0.0, angle
+    for _ in range(HALVINGS):
+        middle = 0.5 * (least + most)
+        friction = math.tan(middle)
+        here = sites._replace(friction=np.full(FINGERS, friction))
+        cover, _ = search_cover(here, twist_axes(*here[:3]), cones)
+        if cover is None:
+            least = middle
+            continue
+        most = middle
+        found = made(lower=0.0, slides=slides, least_friction=friction, cover=cover)
+        yield replace(found, lower=max(0.0, bound(found) - ROUNDED))
+        if chance_of_turning(found) <= ENOUGH:
+            return
+
+
+def _seen(piece: FacePiece, x: Array, surface: Array, height: float, slope: float) -> Array:
+    """Cut from a piece what triangles (t, 3, 3) in front of it may hide, (c, 2); (0, 2) if x is.
+
+    `height` is that from which fingers come, and `slope` the tangent of their largest angle to the
+    normal.
+    """
+    corners, y = piece.corners, piece.in_plane(x)
+    heights = (x - surface) @ piece.normal
+    ahead = (heights.max(axis=1) > IN_FRONT) & (heights.min(axis=1) < height)
+    flat = (surface[ahead] - piece.origin) @ piece.frame
+    for places, above in zip(flat, heights[ahead], strict=True):
+        at, h = _between(places, above, height)
+        reach = slope * h
+        along = at - np.roll(at, 1, axis=0)
+        across = np.column_stack([-along[:, 1], along[:, 0]])
+        ways = np.vstack([at - y, across, -across])
+        ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), THINNEST)
+        limits = (ways @ at.T - reach).min(axis=1)
+        best = int(np.argmax(limits - ways @ y))
+        if limits[best] <= ways[best] @ y:
+            return np.empty((0, 2))
+        corners = tidy(clip(corners, ways[best : best + 1], limits[best : best + 1]))
+    return corners
+
+
+def _between(places: Array, heights: Array, most: float) -> tuple[Array, Array]:
+    """Return corners of the part of a triangle with heights from 0 to `most`, and their heights."""
+    kept = [(p, h) for p, h in zip(places, heights, strict=True) if 0.0 <= h <= most]
+    for i in range(3):
+        (p, h), (q, k) = (places[i], heights[i]), (places[i - 1], heights[i - 1])
+        for level in (0.0, most):
+            if min(h, k) < level < max(h, k):
+                share = (level - h) / (k - h)
+                kept.append((p + share * (q - p), level))
+    return np.array([p for p, _ in kept]), np.array([h for _, h in kept])

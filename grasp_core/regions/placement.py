@@ -1,0 +1,279 @@
+"""Bounds from below how likely a grasp is closed when object and fingers are not where planned.
+
+Solved: an object is moved by a Gaussian error, a translation t and a turn w about its centre o, and
+each finger by a Gaussian shift e_i across its direction n_i, the planned normal into the object.
+Fingers come along their directions until they meet the object. Friction mu is known, or Gaussian.
+How likely are the contacts in force closure, at least?
+
+Where fingers meet. Let d_i = x_i - o for the planned contacts x_i, and R the turn. Then face i has
+the normal n'_i = R n_i, and the finger meets its plane at
+
+    x_i + e_i + s_i n_i,    s_i = (n_i.d_i - n'_i.(d_i + e_i - t)) / n_i.n'_i.              (1)
+
+However far the object moves, a contact stays on its finger's line. It slides along that line, and
+its normal turns by at most |w|. So a cover (`proof`) over the prisms
+
+    K_i = {x_i + e + s n_i :  |e| <= E, |s| <= S_i}  with normals n_i and friction m          (2)
+
+proves closure for all such motions at once, where each |e_i| <= E and |s_i| <= S_i, and where
+
+    |w| + atan m <= atan mu,                                                                (3)
+
+since a force within atan m of n_i is then within atan mu of n'_i. The polygons of `certify_regions`
+prove less of this: they let the contacts move on their faces independently, while one motion of the
+object moves all of them alike, which hardly changes the wrenches between them.
+
+Series. The finger meets its face where E_k.y <= b_k, with unit edge normals E_k in the plane of the
+face, and with y = R'(d_i + e_i - t + s_i n_i) - d_i. Write a = w x n_i. To second order
+
+    s_i n_i.n'_i = n_i.t - a.d_i          - w x a.d_i / 2 + a.(t - e_i),                    (4)
+    E_k.y = E_k.(e_i - t - w x d_i)       + E_k.(w x (w x d_i) / 2 - w x (e_i - t))
+                                          - (n_i.t - a.d_i) (E_k.a),                         (5)
+
+and |s_i| <= S_i if |s_i n_i.n'_i| + S_i |w|^2 / 2 <= S_i. The parts of R beyond second and third
+order are at most |w|^2 / 2 and |w|^3 / 6. With |w| <= T <= 1 and k = 1 / cos T, all that (4) and
+(5) leave out is then at most |w|^2 times
+
+    |w| |d_i| (2/3 + k (1 + T) / 2) + (|t| + |e_i|) (3/2 + k (1 + T) / 2).                  (6)
+
+Chance. In unit normal variables z, (4) and (5) are sigma g + z'Hz, with g normal; and (6) is part
+of H, once t, w and e_i are bounded by their `REACH`. Let the largest eigenvalue of H be l, or zero
+if that is more, and r the number of positive ones. A limit b is then broken with at most the chance
+that
+
+    sigma g + l (g^2 + q) > b,    q of the chi-square law of r variables,                   (7)
+
+which rises with q, so that the largest values on some intervals of q bound its mean from above.
+
+Of failures with chances p_k, the chance that any happens is at most the sum of p_k less the chances
+that two happen together, summed over the branches of a tree (Hunter, "An upper bound for the
+probability of a union", 1976). Each chance (7) holds that of sigma g > b, and for two of these the
+chance of both is known (Owen, "Tables for computing bivariate normal probabilities", 1956).
+"""
+
+import importlib
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from grasp_core.arrays import Amount, Array, Point, Polygon, Shape
+from grasp_core.declared import Declared
+from grasp_core.errors import InputError
+from grasp_core.geometry.polygons import circle, edge_rows, plane_frame
+from grasp_core.kinds import Friction, NotNegative, Share
+from grasp_core.regions.proof import TwistCover
+from grasp_core.values import FINGERS
+
+ROUNDING = 1e-9
+"""Chance that pays for rounding."""
+REACH = 4.5
+"""Largest motions that count, in their largest deviations: a chance of 1.5e-4 for each of t, w."""
+MOST_TURN = 1.0
+"""Largest turn that may count as closed [rad]."""
+FARTHEST = 8.0
+"""Deviations beyond which two failures are not looked at together."""
+NOTHING, FAR = 1e-9, 100.0
+"""Share of the largest eigenvalue up to which others count as zero; |z|^2 beyond which none looks:
+a chance of 1e-17."""
+SIDES = 16
+"""Corners of the polygons around discs of fingers' shifts."""
+ALIKE = 1.0 - 1e-12
+"""Largest correlation that counts: two functions that are less alike fail together less often."""
+EVEN, TAIL = np.arange(1.0, 32.0) / 32.0, 0.5 ** np.arange(6.0, 40.0)
+ABOVE = np.concatenate([1.0 - EVEN, TAIL, [0.0]])
+"""Chances of values above the ends of the intervals that a law is divided into."""
+MASS = -np.diff(ABOVE, prepend=1.0)
+"""Chances of the intervals."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Misplacement(Declared):
+    """How far object, fingers and friction may be off what was planned: Gaussian errors."""
+
+    covariance: Annotated[Array, Shape(6, 6)]
+    """Covariance of the object's translation and then its turn about its centre [m, rad]."""
+    contact_sigma: Amount
+    """Standard deviation of each finger in each direction across its own [m]."""
+    friction: Friction
+    """Mean of the Coulomb coefficient, which all contacts share."""
+    friction_sigma: NotNegative
+    """Standard deviation of the Coulomb coefficient."""
+
+    def _check_together(self) -> None:
+        values = np.linalg.eigvalsh(self.covariance)
+        if not (self.covariance == self.covariance.T).all() or values[0] < -ROUNDING * values[-1]:
+            raise InputError("covariance must be symmetric and have no negative eigenvalue")
+
+    @property
+    def root(self) -> Array:
+        """A matrix A with A A' = covariance, (6, 6)."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        return vectors * np.sqrt(np.maximum(values, 0.0))
+
+    @property
+    def turn(self) -> float:
+        """Largest turn of the object that may count as closed, T [rad]."""
+        return min(MOST_TURN, REACH * float(np.linalg.norm(self.root[3:], 2)))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PlacementProbability(Declared):
+    """A proved lower bound of the chance that a grasp is closed wherever fingers meet the object.
+
+    Fingers come along the planned normals from `back` behind the planned contacts.
+    """
+
+    lower: Share
+    """The chance of force closure is at least this."""
+    off: Misplacement
+    """The errors that are counted on."""
+    center: Point
+    """Centre of mass, about which the object turns [m]."""
+    positions: Annotated[Array, Shape(FINGERS, 3)]
+    """Planned contacts, (4, 3) [m]."""
+    normals: Annotated[Array, Shape(FINGERS, 3, units=True)]
+    """Planned unit normals into the object, (4, 3)."""
+    landings: tuple[Polygon, Polygon, Polygon, Polygon]
+    """Convex parts of the faces to which nothing is in the way, (k, 3) [m]."""
+    lean: Amount
+    """Largest angle between the true surface and the planes of the landings [rad]."""
+    depth: Amount
+    """Largest distance of the true surface from the planes of the landings [m]."""
+    slides: Annotated[Array, Shape(FINGERS, least=0.0)]
+    """How far contacts may slide along their fingers, S in (2), (4,) [m]."""
+    shift: Amount
+    """How far fingers may be beside their lines, E in (2) [m]."""
+    least_friction: Friction
+    """Friction of the cover, m in (2)."""
+    cover: TwistCover
+    """Proof that all contacts of (2) are closed, with lengths relative to `scale`."""
+    origin: Point
+    """Point about which torques are taken in the proof [m]."""
+    scale: Amount
+    """Length that the proof uses as its unit [m]."""
+
+    def verify(self) -> bool:
+        """Check again that the cover holds, and that the chance of closure is at least `lower`.
+
+        Whoever has the object checks that `landings` are parts of its faces that nothing hides.
+        """
+        if not (self.is_sound() and self.off.is_sound() and self.scale > 0.0):
+            return False
+        with np.errstate(all="ignore"):
+            friction = np.full(FINGERS, self.least_friction)
+            return self.lower <= bound(self) and self.cover.verify(
+                self._prisms(), self.normals, friction
+            )
+
+    def _prisms(self) -> list[Array]:
+        """Return corners of prisms that hold (2), in the unit of the proof, (32, 3) each."""
+        disc = self.shift / math.cos(math.pi / SIDES) * circle(SIDES)
+        found = list[Array]()
+        for x, n, slide in zip(self.positions, self.normals, self.slides, strict=True):
+            rim, step = (
+                x + disc @ plane_frame(n).T,
+                (slide + self.depth / math.cos(self.off.turn)) * n,
+            )
+            found.append((np.vstack([rim + step, rim - step]) - self.origin) / self.scale)
+        return found
+
+
+def bound(it: PlacementProbability) -> float:
+    """Return a number that the chance of closure is not below, by (3) to (7)."""
+    special: Any = importlib.import_module("scipy.special")
+    failing = chance_of_turning(it) + 2.0 * float(special.chdtrc(3, REACH**2)) + ROUNDING
+    if it.off.contact_sigma:
+        failing += FINGERS * math.exp(-0.5 * (it.shift / it.off.contact_sigma) ** 2)
+    return max(0.0, 1.0 - failing - _chance_beyond(*_limits(it), special))
+
+
+def chance_of_turning(it: PlacementProbability) -> float:
+    """Bound the chance that (3) fails from above: by the least friction of each interval."""
+    special: Any = importlib.import_module("scipy.special")
+    mu = it.off.friction + it.off.friction_sigma * special.ndtri(ABOVE)
+    room = np.arctan(np.maximum(mu, 0.0)) - math.atan(it.least_friction) - it.lean
+    turned = float(np.linalg.norm(it.off.root[3:], 2))
+    turning = special.chdtrc(3, (np.minimum(room, MOST_TURN) / turned) ** 2)
+    return float(np.where(room > 0.0, turning, 1.0) @ MASS)
+
+
+def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:
+    """Write (4) and (5) as g.z + z'Hz <= b: g (m, 14), H (m, 8, 8) and b (m,)."""
+    off, T, A = it.off, it.off.turn, it.off.root
+    k = (1.0 + T) / (2.0 * math.cos(T))
+    farthest = REACH * float(np.linalg.norm(A[:3], 2)) + it.shift
+    rows, curved, limits = list[Array](), list[Array](), list[Array]()
+    for i, (x, n, landing, slide) in enumerate(
+        zip(it.positions, it.normals, it.landings, it.slides, strict=True)
+    ):
+        d, frame = x - it.center, plane_frame(n)
+        edges, b = edge_rows((landing - x) @ frame)
+        E = edges @ frame.T
+        # of t, w and e, (.., 9)
+        sliding = np.concatenate([n, -np.cross(n, d), np.zeros(3)])
+        lines = np.hstack([-E, -np.cross(d, E), E])
+        Q = np.zeros((2 + len(E), 9, 9))
+        Q[0, 3:6, 3:6] = 0.5 * (float(n @ d) * np.eye(3) - np.outer(n, d))
+        Q[0, 3:6, :3], Q[0, 3:6, 6:] = _crossing(n), -_crossing(n)
+        Q[1] = -Q[0]
+        Q[2:, 3:6, 3:6] = 0.5 * (E[:, :, None] * d - (E @ d)[:, None, None] * np.eye(3))
+        for row, edge in zip(Q[2:], E, strict=True):
+            row[3:6, :3], row[3:6, 6:] = -_crossing(edge), _crossing(edge)
+        Q[2:, :, 3:6] -= sliding[:, None] * np.cross(n, E)[:, None, :]
+        left = T * float(np.linalg.norm(d)) * (2.0 / 3.0 + k) + farthest * (1.5 + k)  # (6)
+        Q[:2, 3:6, 3:6] += 0.5 * slide * np.eye(3)
+        Q[:, 3:6, 3:6] += left * np.eye(3)
+        B = np.zeros((9, 8))
+        B[:6, :6], B[6:, 6:] = A, off.contact_sigma * frame
+        linear = np.vstack([sliding, -sliding, lines]) @ B
+        own = np.zeros((len(linear), 6 + 2 * FINGERS))
+        own[:, :6], own[:, 6 + 2 * i : 8 + 2 * i] = linear[:, :6], linear[:, 6:]
+        rows.append(own)
+        curved.append(B.T @ (0.5 * (Q + Q.swapaxes(1, 2))) @ B)
+        limits += [np.full(2, slide), b - it.depth * math.tan(T)]
+    return np.vstack(rows), np.vstack(curved), np.concatenate(limits)
+
+
+def _crossing(v: Array) -> Array:
+    """Return the matrix that takes u to v x u, (3, 3)."""
+    return np.cross(v, np.eye(3)).T
+
+
+def _chance_beyond(g: Array, H: Array, b: Array, special: Any) -> float:
+    """Bound the chance that any of g.z + z'Hz <= b fails from above, by (7) and a tree."""
+    sigma, values = np.linalg.norm(g, axis=1), np.linalg.eigvalsh(H)
+    l = np.maximum(values[:, -1:], 0.0)
+    r = np.maximum((values > NOTHING * l).sum(axis=1, keepdims=True), 1)
+    left = b[:, None] - l * (special.chdtri(r, ABOVE[:-1]) + FAR * NOTHING)
+    # sigma g + l g^2 > left beyond one root, and before the other
+    square = sigma[:, None] ** 2 + 4.0 * l * left
+    roots = sigma[:, None] + np.sqrt(np.maximum(square, 0.0))
+    beyond = special.ndtr(-2.0 * left / roots)
+    before = np.where(l > 0.0, special.ndtr(-roots / (2.0 * l)), 0.0)
+    each = np.where(square > 0.0, np.minimum(beyond + before, 1.0), 1.0)
+    chances = each @ MASS[:-1] + MASS[-1]
+    # both of two linear parts, for those that can fail
+    h = b / sigma
+    likely = (h > 0.0) & (h < FARTHEST)
+    h, units = h[likely], g[likely] / sigma[likely, None]
+    alike = np.clip(units @ units.T, -ALIKE, ALIKE)
+    one = (
+        0.5 * special.ndtr(-h)
+        - special.owens_t(h[:, None], (h / h[:, None] - alike) / np.sqrt(1.0 - alike**2)).T
+    )
+    both = np.maximum(one + one.T - ROUNDING / FARTHEST**2, 0.0)
+    return float(chances.sum()) - _heaviest_tree(both)
+
+
+def _heaviest_tree(weights: Array) -> float:
+    """Return the sum of the weights of the heaviest tree between all nodes, (n, n) (Prim)."""
+    total, apart = 0.0, np.arange(len(weights)) > 0
+    reached = weights[0].copy() if len(weights) else np.empty(0)
+    while apart.any():
+        node = int(np.argmax(np.where(apart, reached, -1.0)))
+        total += float(reached[node])
+        apart[node] = False
+        reached = np.maximum(reached, weights[node])
+    return total
