@@ -62,7 +62,10 @@ from grasp_core.quality.wrench_limits import WrenchLimit as WrenchLimit
 from grasp_core.quality.wrench_limits import wrench_limits as wrench_limits
 from grasp_core.records.grasps_json import load_grasps as load_grasps
 from grasp_core.records.grasps_json import save_grasps as save_grasps
+from grasp_core.regions.certify_placement import placement_probability as placement_probability
 from grasp_core.regions.certify_regions import certify_regions as certify_regions
+from grasp_core.regions.placement import Misplacement as Misplacement
+from grasp_core.regions.placement import PlacementProbability as PlacementProbability
 from grasp_core.regions.proof import CertifiedRegions as CertifiedRegions
 from grasp_core.transferring.face_changes import FaceChange as FaceChange
 from grasp_core.transferring.transfer import CarriedContact as CarriedContact

@@ -244,14 +244,15 @@ def _crossing(v: Array) -> Array:
 def _chance_beyond(g: Array, H: Array, b: Array, special: Any) -> float:
     """Bound the chance that any of g.z + z'Hz <= b fails from above, by (7) and a tree."""
     sigma, values = np.linalg.norm(g, axis=1), np.linalg.eigvalsh(H)
-    l = np.maximum(values[:, -1:], 0.0)
-    r = np.maximum((values > NOTHING * l).sum(axis=1, keepdims=True), 1)
-    left = b[:, None] - l * (special.chdtri(r, ABOVE[:-1]) + FAR * NOTHING)
+    top = np.maximum(values[:, -1:], 0.0)
+    r = np.maximum((values > NOTHING * top).sum(axis=1, keepdims=True), 1)
+    left = b[:, None] - top * (special.chdtri(r, ABOVE[:-1]) + FAR * NOTHING)
     # sigma g + l g^2 > left beyond one root, and before the other
-    square = sigma[:, None] ** 2 + 4.0 * l * left
+    square = sigma[:, None] ** 2 + 4.0 * top * left
     roots = sigma[:, None] + np.sqrt(np.maximum(square, 0.0))
-    beyond = special.ndtr(-2.0 * left / roots)
-    before = np.where(l > 0.0, special.ndtr(-roots / (2.0 * l)), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beyond = special.ndtr(-2.0 * left / roots)
+        before = np.where(top > 0.0, special.ndtr(-roots / (2.0 * top)), 0.0)
     each = np.where(square > 0.0, np.minimum(beyond + before, 1.0), 1.0)
     chances = each @ MASS[:-1] + MASS[-1]
     # both of two linear parts, for those that can fail

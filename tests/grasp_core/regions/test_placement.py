@@ -1,0 +1,103 @@
+"""Bounds on the chance of closure against draws of the motions themselves."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import special
+from scipy.spatial.transform import Rotation
+
+import grasp_core as gc
+from grasp_core.geometry.polygons import edge_rows, plane_frame
+from grasp_core.regions.placement import REACH, _chance_beyond, _limits
+from scenes import example_object
+from tests.placements import share_closed
+
+SIZES = ((1e-3, 1.0), (2e-3, 2.0), (4e-3, 4.0))
+"""Deviations of translation [m] and turn [deg]."""
+
+
+def bounds(name, family, shift=0.0, limit=1):
+    """Bounds for grasps of an object, for each of the sizes."""
+    body = example_object(name)
+    for grasp in gc.plan(body, 0.5, families=family, limit=limit).grasps:
+        for metres, degrees in SIZES:
+            found = gc.placement_probability(
+                body, grasp, (0.5, 0.05), pose_sigma_m=metres, pose_sigma_rad=math.radians(degrees),
+                contact_sigma_m=shift,
+            )  # fmt: skip
+            if found is not None:
+                yield body, found
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [("wedge", "concurrent"), ("l-bracket", "pencil"), ("dodecahedron", "regulus")],
+)
+def test_fingers_that_meet_the_object_are_closed_as_often_as_proved(name, family):
+    cases = list(bounds(name, family, shift=5e-4))
+    assert len(cases) == len(SIZES)
+    for body, found in cases:
+        assert found.verify()
+        rate = share_closed(body, found, 2000, seed=3)
+        assert found.lower <= rate + 4.0 * math.sqrt(rate * (1.0 - rate) / 2000) + 1e-3
+    assert cases[0][1].lower > 0.98
+    assert cases[0][1].lower > cases[1][1].lower > cases[2][1].lower
+
+
+def test_series_are_above_the_exact_motions():
+    """Of each draw within the reach, the exact slide and place are at most g.z + z'Hz."""
+    (_, found), *_ = bounds("l-bracket", "concurrent", shift=1e-3)
+    rng, off = np.random.default_rng(0), found.off
+    z = 1.5 * rng.normal(size=(4000, 14))
+    moves = z[:, :6] @ off.root.T
+    R = Rotation.from_rotvec(moves[:, 3:]).as_matrix()
+    g, H, b = _limits(found)
+    row, tested = 0, 0
+    for i, (x, n, landing) in enumerate(
+        zip(found.positions, found.normals, found.landings, strict=True)
+    ):
+        frame, d = plane_frame(n), x - found.center
+        own = z[:, 6 + 2 * i : 8 + 2 * i]
+        e = off.contact_sigma * own @ frame.T
+        turned = R @ n
+        num = n @ d - np.einsum("ni,ni->n", turned, d + e - moves[:, :3])
+        s = num / (turned @ n)
+        y = np.einsum("nji,nj->ni", R, d + e - moves[:, :3] + s[:, None] * n) - d
+        E, _ = edge_rows((landing - x) @ frame)
+        lost = found.slides[i] * (1.0 - turned @ n)
+        exact = [num + lost, lost - num, *(y @ frame @ E.T).T]
+        u = np.hstack([z[:, :6], own])
+        there = (
+            (np.linalg.norm(moves[:, 3:], axis=1) <= off.turn)
+            & (np.linalg.norm(e, axis=1) <= found.shift)
+            & (np.linalg.norm(moves[:, :3], axis=1) <= REACH * np.linalg.norm(off.root[:3], 2))
+        )
+        for values in exact:
+            series = z @ g[row] + np.einsum("ni,ij,nj->n", u, H[row], u)
+            assert (values[there] <= series[there] + 1e-15).all()
+            tested += int(there.sum())
+            row += 1
+    assert row == len(b)
+    assert tested > 10_000
+
+
+def test_the_chance_that_any_limit_is_broken_is_not_below_what_draws_show():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        count = int(rng.integers(2, 12))
+        g = rng.normal(size=(count, 14))
+        g[:, 6:] = 0.0
+        H = np.zeros((count, 8, 8))
+        H[:, :6, :6] = 0.05 * rng.normal(size=(count, 6, 6))
+        H += H.swapaxes(1, 2)
+        b = rng.uniform(1.0, 4.0, size=count) * np.linalg.norm(g, axis=1)
+        z = rng.normal(size=(20_000, 6))
+        values = z @ g[:, :6].T + np.einsum("ni,kij,nj->nk", z, H[:, :6, :6], z)
+        rate = float((values > b).any(axis=1).mean())
+        told = _chance_beyond(g, H, b, special)
+        assert told >= rate - 4.0 * math.sqrt(rate / 20_000) - 1e-4
+        linear = float((z @ g[:, :6].T > b).any(axis=1).mean())
+        alone = _chance_beyond(g, 0.0 * H, b, special)
+        assert alone >= linear - 4.0 * math.sqrt(linear / 20_000) - 1e-4
+        assert alone <= 1.3 * linear + 0.02
