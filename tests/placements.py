@@ -21,14 +21,16 @@ def draws_of(off, normals, count, seed):
 
 
 def met(body, starts, ways):
-    """Return where rays first meet the object, (n, 3), and the normals there; NaN for misses."""
+    """Return where rays first meet the object, (n, 3), and the normals there; NaN for misses.
+
+    Each triangle is tried, after Moeller and Trumbore (1997).
+    """
     corners = body.vertices[body.triangles]
     first, sides = corners[:, 0], corners[:, 1:] - corners[:, :1]
     outward = np.cross(sides[:, 0], sides[:, 1])
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     nearest, found = np.full(len(starts), math.inf), np.full(starts.shape, math.nan)
     for corner, (one, two), out in zip(first, sides, outward, strict=True):
-        # Moeller and Trumbore (1997)
         p = np.cross(ways, two)
         with np.errstate(all="ignore"):
             inverse = 1.0 / (p @ one)
@@ -44,7 +46,7 @@ def met(body, starts, ways):
 
 def share_closed(body, found, count, seed):
     """Return the share of draws in which the contacts that fingers meet are force-closed."""
-    behind = 3.0 * 4.0 / 3.0 * 0.75 * float(found.slides.max())
+    behind = 2.0 * float(found.slides.max())
     moves, turns, shifts, friction = draws_of(found.off, found.normals, count, seed)
     back = turns.inv().as_matrix()
     points, normals = np.empty((count, 4, 3)), np.empty((count, 4, 3))

@@ -12,7 +12,7 @@ landings are faces, cut by such a half-plane for each triangle in front of them.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -35,17 +35,17 @@ from grasp_core.regions.placement import (
     bound,
     chance_of_turning,
 )
+from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS, Grasp, four
 
 CONES = 4000
 """Default for the largest number of cones in one proof."""
-SHIFTS = 5.0
-"""Half-widths E of the prisms, in deviations of a finger: one of four is beyond for 1.5e-5."""
-SLIDES = (4.0, 3.0, 2.2)
-"""Half-lengths S of the prisms that are tried, in deviations of the slides."""
+PRISMS = ((4.5, 4.0), (4.0, 3.2), (3.5, 2.6))
+"""Half-widths E and half-lengths S of the prisms that are tried, in deviations of fingers beside
+their lines and of slides along them."""
 BEHIND = 3.0
 """Distance from which fingers come, in half-lengths of the longest prism."""
-HALVINGS = 4
+HALVINGS = 5
 """Number of times that the angle between no friction and all of it is halved."""
 ENOUGH = 0.005
 """Chance of too large turns below which a smaller one is not sought."""
@@ -102,7 +102,7 @@ def placement_probability(
         return None
     arms = np.hstack([normals, -np.cross(normals, positions - body.center_of_mass)])
     slides = np.linalg.norm(arms @ off.root, axis=1)
-    height = BEHIND * SLIDES[0] * float(slides.max()) / unit.scale
+    height = BEHIND * PRISMS[0][1] * float(slides.max()) / unit.scale
     surface = unit.at(body.vertices)[body.triangles]
     seen = [
         _seen(piece, x, surface, height, math.tan(off.turn))
@@ -118,30 +118,31 @@ def placement_probability(
     made = partial(
         PlacementProbability, off=off, center=body.center_of_mass, positions=positions,
         normals=normals, landings=four(landings), lean=lean, depth=unit.scale * depth,
-        shift=SHIFTS * off.contact_sigma, origin=unit.origin, scale=unit.scale,
+        origin=unit.origin, scale=unit.scale,
     )  # fmt: skip
     best: PlacementProbability | None = None
-    for factor in SLIDES:
+    for wide, long in PRISMS:
+        shift, slide = wide * off.contact_sigma, long * slides
         sites = Sites(
             unit.at(positions),
             np.array([np.column_stack([p.normal, p.frame]) for p in pieces]),
             np.full(FINGERS, mean),
             np.zeros((FINGERS, 1, 2)),
-            np.full(FINGERS, SHIFTS * off.contact_sigma / math.cos(math.pi / SIDES) / unit.scale),
-            factor * slides / unit.scale + depth / math.cos(off.turn),
+            np.full(FINGERS, shift / math.cos(math.pi / SIDES) / unit.scale),
+            slide / unit.scale + depth / math.cos(off.turn),
         )
-        for found in _proofs(made, sites, factor * slides, math.atan(mean) - lean, cones):
+        for friction, cover in _covers(sites, math.atan(mean) - lean, cones):
+            found = made(lower=0.0, slides=slide, shift=shift, least_friction=friction, cover=cover)
+            found = replace(found, lower=max(0.0, bound(found) - ROUNDED))
             if best is None or found.lower > best.lower:
                 best = found
-        if best is not None and chance_of_turning(best) <= ENOUGH:
-            break
+            if chance_of_turning(found) <= ENOUGH:
+                return best
     return best
 
 
-def _proofs(
-    made: Callable[..., PlacementProbability], sites: Sites, slides: Array, angle: float, cones: int
-) -> Iterator[PlacementProbability]:
-    """Yield proofs with less and less friction, from the tangent of half an angle on."""
+def _covers(sites: Sites, angle: float, cones: int) -> Iterator[tuple[float, TwistCover]]:
+    """Yield covers with less and less friction, from the tangent of half an angle on."""
     least, most = 0.0, angle
     for _ in range(HALVINGS):
         middle = 0.5 * (least + most)
@@ -150,12 +151,9 @@ def _proofs(
         cover, _ = search_cover(here, twist_axes(*here[:3]), cones)
         if cover is None:
             least = middle
-            continue
-        most = middle
-        found = made(lower=0.0, slides=slides, least_friction=friction, cover=cover)
-        yield replace(found, lower=max(0.0, bound(found) - ROUNDED))
-        if chance_of_turning(found) <= ENOUGH:
-            return
+        else:
+            most = middle
+            yield friction, cover
 
 
 def _seen(piece: FacePiece, x: Array, surface: Array, height: float, slope: float) -> Array:

@@ -137,9 +137,11 @@ class Unit:
         self.scale = body.radius * coarse(lever, UNIT_DIGITS)
 
     def at(self, points: Array) -> Array:
+        """Write points [m] in this unit."""
         return (points - self.origin) / self.scale
 
     def back(self, points: Array) -> Array:
+        """Write points in this unit in metres."""
         return self.origin + self.scale * points
 
 

@@ -59,6 +59,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from grasp_core.arrays import Amount, Array, Point, Polygon, Shape
+from grasp_core.closure.contacts import unit_size
+from grasp_core.closure.decision import decided_at_once
+from grasp_core.closure.proofs import ContactCones
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, edge_rows, plane_frame
@@ -66,6 +69,8 @@ from grasp_core.kinds import Friction, NotNegative, Share
 from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS
 
+DRAWS = 2000
+"""Number of draws of an estimate."""
 ROUNDING = 1e-9
 """Chance that pays for rounding."""
 REACH = 4.5
@@ -167,6 +172,32 @@ class PlacementProbability(Declared):
                 self._prisms(), self.normals, friction
             )
 
+    @property
+    def estimate(self) -> float:
+        """Share of `DRAWS` draws, always the same, in which contacts on the landings are closed."""
+        rng, n = np.random.default_rng(0), self.normals
+        moves = rng.normal(size=(DRAWS, 6)) @ self.off.root.T
+        shifts = self.off.contact_sigma * rng.normal(size=(DRAWS, FINGERS, 2))
+        mu = self.off.friction + self.off.friction_sigma * rng.normal(size=DRAWS)
+        # (1), in the frame of the fingers
+        turned = np.einsum("mij,kj->mki", _rotations(moves[:, 3:]), n)
+        frames = np.array([plane_frame(each) for each in n])
+        arms = self.positions - self.center + np.einsum("kij,mkj->mki", frames, shifts)
+        behind = np.einsum("ki,ki->k", n, self.positions - self.center)
+        met = behind - np.einsum("mki,mki->mk", turned, arms - moves[:, None, :3])
+        arms += (met / np.einsum("mki,ki->mk", turned, n))[..., None] * n
+        there = (turned @ n.T).diagonal(axis1=1, axis2=2).min(axis=1) > 0.0
+        back = np.einsum("mji,mkj->mki", _rotations(moves[:, 3:]), arms - moves[:, None, :3])
+        for i, landing in enumerate(self.landings):
+            E, b = edge_rows((landing - self.center) @ frames[i])
+            there &= (back[:, i] @ frames[i] @ E.T <= b).all(axis=1)
+        there &= mu > 0.0
+        each = np.repeat(mu[there, None], FINGERS, axis=1)
+        closed, *_ = decided_at_once(
+            ContactCones.at(unit_size(arms[there])[0], turned[there], each)
+        )
+        return float(np.count_nonzero(closed)) / DRAWS
+
     def _prisms(self) -> list[Array]:
         """Return corners of prisms that hold (2), in the unit of the proof, (32, 3) each."""
         disc = self.shift / math.cos(math.pi / SIDES) * circle(SIDES)
@@ -178,6 +209,14 @@ class PlacementProbability(Declared):
             )
             found.append((np.vstack([rim + step, rim - step]) - self.origin) / self.scale)
         return found
+
+
+def _rotations(turns: Array) -> Array:
+    """Return the rotations by vectors, (n, 3) [rad], as matrices, (n, 3, 3) (Rodrigues)."""
+    angles = np.linalg.norm(turns, axis=1)[:, None, None]
+    K = np.cross(turns[:, None], np.eye(3)).swapaxes(1, 2)
+    once, twice = np.sinc(angles / np.pi), 0.5 * np.sinc(0.5 * angles / np.pi) ** 2
+    return np.eye(3) + once * K + twice * (K @ K)
 
 
 def bound(it: PlacementProbability) -> float:
