@@ -194,7 +194,9 @@ Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
 """How grasps are searched for: by one of the paper's three constructions, or free of any family."""
 METHODS: tuple[Method, ...] = get_args(Method)
 ConeKind: TypeAlias = Literal["tilted", "normal"]
-RankBy: TypeAlias = Literal["radius", "friction-margin", "ferrari-canny", "payload", "diverse"]
+RankBy: TypeAlias = Literal[
+    "radius", "friction-margin", "ferrari-canny", "payload", "placement", "diverse"
+]  # fmt: skip
 """What makes one grasp better than another (see `plan`)."""
 OrInfinity = Annotated[float, Null(math.inf)]
 """A number that is infinite where nothing ever happens; null in files."""

@@ -282,3 +282,17 @@ class Certifying(Settings):
     max_cones: MaxCones = 10_000
     """Number of cones that one attempt at a proof may use. More cones take longer and enlarge radii
     by some hundredths, or not at all where they are as large as possible."""
+    off_mm: NotNegative = 0.0
+    """Standard deviation of the object's place along each axis [mm]. With this or another deviation
+    above zero, the chance that each grasp is closed is bounded from below."""
+    off_deg: Annotated[float, Range(least=0.0, most=45.0)] = 0.0
+    """Standard deviation of the object's turn about each axis through its centre of mass [deg]."""
+    finger_mm: NotNegative = 0.0
+    """Standard deviation of each finger in each direction across its own [mm]."""
+    friction_sigma: NotNegative = 0.0
+    """Standard deviation of the friction, which all contacts share."""
+
+    @property
+    def misplacing(self) -> bool:
+        """Whether anything may be off what was planned."""
+        return max(self.off_mm, self.off_deg, self.finger_mm, self.friction_sigma) > 0.0

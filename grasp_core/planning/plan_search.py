@@ -29,12 +29,13 @@ from grasp_core.kinds import METHODS, Family, Method
 from grasp_core.objects.face_pieces import clear_of_edges, with_halves
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, standard
-from grasp_core.planning.certify import Certified, LateFigures
+from grasp_core.planning.certify import Certified, LateFigures, to_grasp
 from grasp_core.planning.method_search import FamilySearch, Gathered, MethodSearch, found_on
 from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
 from grasp_core.processes import Processes
+from grasp_core.regions.certify_placement import placement_probability
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
@@ -311,14 +312,15 @@ def _without_room(on: Standard) -> int:
 
 PUSH_N = 10.0
 """Largest push of a finger under which payloads and first slips are compared [N]."""
+OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
+"""Standard deviations of the object's place and turn at which placements are compared."""
 TIP_RADIUS = 0.1
 """Radius of fingertips whose size is not given, in object radii: that of scenes."""
 
 
-def chosen(
-    body: Polyhedron, lists: Sequence[Sequence[Certified]], request: PlanRequest
-) -> list[Certified]:
+def chosen(search: PlanSearch, lists: Sequence[Sequence[Certified]]) -> list[Certified]:
     """Select the grasps to return, the best first; by radius, families take turns."""
+    request = search.request
     every = _largest_first(chain.from_iterable(lists))
     if request.rank_by == "radius":
         families = [[one for one in every if one.family == family] for family in FAMILIES]
@@ -326,12 +328,13 @@ def chosen(
         return _largest_first(turns[: request.limit])
     if request.rank_by == "diverse":
         return _far_apart(every, request.limit)
-    measure, same = _measure(body, request)
+    measure, same = _measure(search)
     return _in_order(every, [measure(found) for found in every], same)[: request.limit]
 
 
-def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certified], float], float]:
+def _measure(search: PlanSearch) -> tuple[Callable[[Certified], float], float]:
     """Return what makes grasps better the smaller it is, and the share of it that is none."""
+    body, request = search.body, search.request
     if request.rank_by == "friction-margin":
         return lambda found: critical_friction(found.placement.positions, found.normals), SAME_SHARE
     if request.rank_by == "ferrari-canny":
@@ -341,6 +344,17 @@ def _measure(body: Polyhedron, request: PlanRequest) -> tuple[Callable[[Certifie
             return -LateFigures(positions, normals, request.friction).ferrari_canny()[0]
 
         return quality, SAME_SHARE
+
+    if request.rank_by == "placement":
+
+        def failing(found: Certified) -> float:
+            grasp = to_grasp(body, request.friction, found, search.on)
+            proved = placement_probability(
+                body, grasp, request.friction, pose_sigma_m=OFF_M, pose_sigma_rad=OFF_RAD
+            )
+            return 1.0 if proved is None else 1.0 - proved.lower
+
+        return failing, SAME_SHARE
 
     def lightness(found: Certified) -> float:
         points = body.radius * found.placement.positions

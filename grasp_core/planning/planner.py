@@ -65,8 +65,9 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             ones only if the others are too few. By `friction-margin` (the least critical
             friction), `ferrari-canny` (the largest quality), `payload` (the largest mass in any
             orientation under one squeeze with pushes up to 10 N; grasps that no such squeeze holds
-            come last) and `diverse` (each next one is the farthest from those before it) all grasps
-            that are found compete.
+            come last), `placement` (the largest proved chance of closure where the object is off by
+            2 mm and 2 degrees, see `placement_probability`) and `diverse` (each next one is the
+            farthest from those before it) all grasps that are found compete.
         seed: Seed of the free method's restarts.
         max_face_parts: Most parts into which the free method may cut the faces of one quadruple.
         complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
@@ -138,7 +139,7 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
 def _planned(search: PlanSearch) -> Plan:
     """Put together a plan from what a search found, with the best grasps."""
     body, on, request, methods = search.body, search.on, search.request, search.methods
-    best = chosen(body, [each.best for each in methods.values()], request)
+    best = chosen(search, [each.best for each in methods.values()])
     start = time.process_time()
     grasps = tuple(to_grasp(body, request.friction, found, on) for found in best)
     per_grasp = (time.process_time() - start) / max(len(best), 1)

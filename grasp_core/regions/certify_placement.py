@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen_each
+from grasp_core.arrays import Array, frozen, frozen_each
 from grasp_core.closure.contacts import stacked
 from grasp_core.geometry.polygons import clip, tidy
 from grasp_core.kinds import MaxCones, value_of
@@ -91,9 +91,9 @@ def placement_probability(
     turned = frozen_each(pose_sigma_rad, 3, "pose_sigma_rad")
     mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
     covariance = np.diag(np.concatenate([moved, turned]) ** 2)
-    off = Misplacement(
-        covariance if pose_covariance is None else pose_covariance, contact_sigma_m, mean, sigma
-    )
+    if pose_covariance is not None:
+        covariance = frozen(pose_covariance, (6, 6), "pose_covariance")
+    off = Misplacement(covariance, contact_sigma_m, mean, sigma)
     cones = value_of(MaxCones, max_cones, "max_cones")
     positions, normals = stacked(grasp.contacts)
     unit = Unit(body, positions)
@@ -131,8 +131,8 @@ def placement_probability(
             np.full(FINGERS, shift / math.cos(math.pi / SIDES) / unit.scale),
             slide / unit.scale + depth / math.cos(off.turn),
         )
-        for friction, cover in _covers(sites, math.atan(mean) - lean, cones):
-            found = made(lower=0.0, slides=slide, shift=shift, least_friction=friction, cover=cover)
+        for least, cover in _covers(sites, math.atan(mean) - lean, cones):
+            found = made(lower=0.0, slides=slide, shift=shift, least_friction=least, cover=cover)
             found = replace(found, lower=max(0.0, bound(found) - ROUNDED))
             if best is None or found.lower > best.lower:
                 best = found

@@ -231,11 +231,12 @@ def bound(it: PlacementProbability) -> float:
 def chance_of_turning(it: PlacementProbability) -> float:
     """Bound the chance that (3) fails from above: by the least friction of each interval."""
     special: Any = importlib.import_module("scipy.special")
-    mu = it.off.friction + it.off.friction_sigma * special.ndtri(ABOVE)
+    mu = it.off.friction + it.off.friction_sigma * special.ndtri(ABOVE[:-1])
     room = np.arctan(np.maximum(mu, 0.0)) - math.atan(it.least_friction) - it.lean
     turned = float(np.linalg.norm(it.off.root[3:], 2))
-    turning = special.chdtrc(3, (np.minimum(room, MOST_TURN) / turned) ** 2)
-    return float(np.where(room > 0.0, turning, 1.0) @ MASS)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turning = special.chdtrc(3, (np.minimum(room, MOST_TURN) / turned) ** 2)
+    return float(np.where(room > 0.0, turning, 1.0) @ MASS[:-1]) + float(MASS[-1])
 
 
 def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:

@@ -4,6 +4,7 @@ Certified regions of an object's grasps are held by one proof file each, and one
 """
 
 import hashlib
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,9 +23,10 @@ from grasp_core.errors import InputError, SolverError, UndecidedError, about
 from grasp_core.figures import Shown, figures
 from grasp_core.files.records import FLAT, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
-from grasp_core.kinds import Count, Family, NotNegative, number, path_of
+from grasp_core.kinds import Count, Family, NotNegative, Share, number, path_of
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
+from grasp_core.regions.certify_placement import placement_probability
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
@@ -104,15 +106,19 @@ class GraspRegions(Declared):
     """Number of cones of the proof."""
     proof: ProofFile | None = None
     """The file with the proof; None if nothing was proved, or no folder was given."""
+    closed_share: Annotated[Share | None, Shown("closed at least", ".3f")] = None
+    """Proved lower bound of the chance that the grasp is closed when object, fingers and friction
+    are off by the deviations that were asked for; None if none were."""
 
     @classmethod
     def of(
-        cls, grasp: Grasp, proved: CertifiedRegions | str, proof: ProofFile | None
-    ) -> "GraspRegions":
+        cls, grasp: Grasp, proved: CertifiedRegions | str, proof: ProofFile | None,
+        closed_share: float | None = None,
+    ) -> "GraspRegions":  # fmt: skip
         """Record what was proved of a grasp, or the reason why nothing was."""
         named = (grasp.id, contacts_sha256(grasp.contacts), grasp.family, grasp.radius)
         if isinstance(proved, str):
-            return cls(*named, reason=proved)
+            return cls(*named, reason=proved, closed_share=closed_share)
         return cls(
             *named,
             regions=proved.regions,
@@ -124,6 +130,7 @@ class GraspRegions(Declared):
             friction=proved.friction,
             cones=len(proved.cover.forces),
             proof=proof,
+            closed_share=closed_share,
         )
 
     def _check_together(self) -> None:
@@ -289,8 +296,8 @@ def certified(
     proofs = each(partial(_certify, body, friction, asked), grasps, jobs=jobs)
 
     def recorded() -> Iterator[GraspRegions]:
-        for grasp, proved in zip(grasps, proofs, strict=True):
-            yield GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved))
+        for grasp, (proved, share) in zip(grasps, proofs, strict=True):
+            yield GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved), share)
 
     return reporter.collected(
         "certifying", recorded(), len(grasps), ("proved", lambda one: one.regions is not None),
@@ -299,6 +306,20 @@ def certified(
 
 
 def _certify(
+    body: Polyhedron, friction: float, asked: Certifying, grasp: Grasp
+) -> tuple[CertifiedRegions | str, float | None]:
+    """Certify the regions of a grasp, and bound the chance of closure if anything may be off."""
+    share = None
+    if asked.misplacing:
+        bounded = placement_probability(
+            body, grasp, (friction, asked.friction_sigma), pose_sigma_m=asked.off_mm / MILLI,
+            pose_sigma_rad=math.radians(asked.off_deg), contact_sigma_m=asked.finger_mm / MILLI,
+        )  # fmt: skip
+        share = 0.0 if bounded is None else bounded.lower
+    return _certified(body, friction, asked, grasp), share
+
+
+def _certified(
     body: Polyhedron, friction: float, asked: Certifying, grasp: Grasp
 ) -> CertifiedRegions | str:
     left = friction * (1.0 - asked.reserve)
