@@ -64,9 +64,9 @@ from grasp_core.closure.decision import decided_at_once
 from grasp_core.closure.proofs import ContactCones
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
-from grasp_core.geometry.polygons import circle, edge_rows, plane_frame
+from grasp_core.geometry.polygons import circle, convex_polygon, plane_frame
 from grasp_core.kinds import Friction, NotNegative, Share
-from grasp_core.regions.proof import TwistCover
+from grasp_core.regions.proof import PLACED, TwistCover
 from grasp_core.values import FINGERS
 
 DRAWS = 2000
@@ -127,7 +127,8 @@ class Misplacement(Declared):
 class PlacementProbability(Declared):
     """A proved lower bound of the chance that a grasp is closed wherever fingers meet the object.
 
-    Fingers come along the planned normals from `back` behind the planned contacts.
+    Fingers come along the planned normals, from no farther behind the planned contacts than twice
+    their `slides`.
     """
 
     lower: Share
@@ -162,61 +163,63 @@ class PlacementProbability(Declared):
     def verify(self) -> bool:
         """Check again that the cover holds, and that the chance of closure is at least `lower`.
 
-        Whoever has the object checks that `landings` are parts of its faces that nothing hides.
+        Whoever has the object checks that `landings` are parts of its faces that nothing hides, and
+        that `lean` and `depth` are those of these faces.
         """
         if not (self.is_sound() and self.off.is_sound() and self.scale > 0.0):
             return False
         with np.errstate(all="ignore"):
+            if any(self.edges(i) is None for i in range(FINGERS)):
+                return False
             friction = np.full(FINGERS, self.least_friction)
-            return self.lower <= bound(self) and self.cover.verify(
-                self._prisms(), self.normals, friction
-            )
+            proved = self.cover.verify(self._prisms(), self.normals, friction)
+            return proved and self.lower <= bound(self)
+
+    def edges(self, i: int) -> tuple[Array, Array] | None:
+        """Return E, (k, 3), and b [m] of (5) for a landing; None if it is no convex polygon."""
+        frame, arms = plane_frame(self.normals[i]), self.landings[i] - self.positions[i]
+        size = float(np.ptp(self.landings[i], axis=0).max())
+        flat = convex_polygon(arms @ frame / size, PLACED)
+        if flat is None or np.abs(arms @ self.normals[i]).max() > PLACED * size:
+            return None
+        return flat.E @ frame.T, flat.b * size
 
     @property
     def estimate(self) -> float:
         """Share of `DRAWS` draws, always the same, in which contacts on the landings are closed."""
-        rng, n = np.random.default_rng(0), self.normals
+        spatial: Any = importlib.import_module("scipy.spatial.transform")
+        rng, n, d = np.random.default_rng(0), self.normals, self.positions - self.center
         moves = rng.normal(size=(DRAWS, 6)) @ self.off.root.T
-        shifts = self.off.contact_sigma * rng.normal(size=(DRAWS, FINGERS, 2))
         mu = self.off.friction + self.off.friction_sigma * rng.normal(size=DRAWS)
-        # (1), in the frame of the fingers
-        turned = np.einsum("mij,kj->mki", _rotations(moves[:, 3:]), n)
+        R = spatial.Rotation.from_rotvec(moves[:, 3:]).as_matrix()
         frames = np.array([plane_frame(each) for each in n])
-        arms = self.positions - self.center + np.einsum("kij,mkj->mki", frames, shifts)
-        behind = np.einsum("ki,ki->k", n, self.positions - self.center)
-        met = behind - np.einsum("mki,mki->mk", turned, arms - moves[:, None, :3])
-        arms += (met / np.einsum("mki,ki->mk", turned, n))[..., None] * n
-        there = (turned @ n.T).diagonal(axis1=1, axis2=2).min(axis=1) > 0.0
-        back = np.einsum("mji,mkj->mki", _rotations(moves[:, 3:]), arms - moves[:, None, :3])
-        for i, landing in enumerate(self.landings):
-            E, b = edge_rows((landing - self.center) @ frames[i])
-            there &= (back[:, i] @ frames[i] @ E.T <= b).all(axis=1)
-        there &= mu > 0.0
-        each = np.repeat(mu[there, None], FINGERS, axis=1)
-        closed, *_ = decided_at_once(
-            ContactCones.at(unit_size(arms[there])[0], turned[there], each)
-        )
-        return float(np.count_nonzero(closed)) / DRAWS
+        beside = self.off.contact_sigma * rng.normal(size=(DRAWS, FINGERS, 2))
+        arms = d + np.einsum("kij,mkj->mki", frames, beside) - moves[:, None, :3]
+        # (1), before the object has moved
+        turned = np.einsum("mij,kj->mki", R, n)
+        leaning = np.einsum("mki,ki->mk", turned, n)
+        slides = np.einsum("ki,ki->k", n, d) - np.einsum("mki,mki->mk", turned, arms)
+        arms += (slides / leaning)[..., None] * n
+        back = np.einsum("mji,mkj->mki", R, arms) - d
+        there = (leaning > 0.0).all(axis=1) & (mu > 0.0)
+        for i in range(FINGERS):
+            E, b = self.edges(i) or (np.zeros((1, 3)), np.full(1, -1.0))
+            there &= (back[:, i] @ E.T <= b).all(axis=1)
+        if not there.any():
+            return 0.0
+        friction = np.repeat(mu[there, None], FINGERS, axis=1)
+        cones = ContactCones.at(unit_size(arms[there])[0], turned[there], friction)
+        return float(np.count_nonzero(decided_at_once(cones)[0])) / DRAWS
 
     def _prisms(self) -> list[Array]:
         """Return corners of prisms that hold (2), in the unit of the proof, (32, 3) each."""
         disc = self.shift / math.cos(math.pi / SIDES) * circle(SIDES)
+        lengths = self.slides + self.depth / math.cos(self.off.turn)
         found = list[Array]()
-        for x, n, slide in zip(self.positions, self.normals, self.slides, strict=True):
-            rim, step = (
-                x + disc @ plane_frame(n).T,
-                (slide + self.depth / math.cos(self.off.turn)) * n,
-            )
-            found.append((np.vstack([rim + step, rim - step]) - self.origin) / self.scale)
+        for x, n, length in zip(self.positions, self.normals, lengths, strict=True):
+            rim = x + disc @ plane_frame(n).T - self.origin
+            found.append(np.vstack([rim + length * n, rim - length * n]) / self.scale)
         return found
-
-
-def _rotations(turns: Array) -> Array:
-    """Return the rotations by vectors, (n, 3) [rad], as matrices, (n, 3, 3) (Rodrigues)."""
-    angles = np.linalg.norm(turns, axis=1)[:, None, None]
-    K = np.cross(turns[:, None], np.eye(3)).swapaxes(1, 2)
-    once, twice = np.sinc(angles / np.pi), 0.5 * np.sinc(0.5 * angles / np.pi) ** 2
-    return np.eye(3) + once * K + twice * (K @ K)
 
 
 def bound(it: PlacementProbability) -> float:
@@ -245,12 +248,8 @@ def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:
     k = (1.0 + T) / (2.0 * math.cos(T))
     farthest = REACH * float(np.linalg.norm(A[:3], 2)) + it.shift
     rows, curved, limits = list[Array](), list[Array](), list[Array]()
-    for i, (x, n, landing, slide) in enumerate(
-        zip(it.positions, it.normals, it.landings, it.slides, strict=True)
-    ):
-        d, frame = x - it.center, plane_frame(n)
-        edges, b = edge_rows((landing - x) @ frame)
-        E = edges @ frame.T
+    for i, (x, n, slide) in enumerate(zip(it.positions, it.normals, it.slides, strict=True)):
+        d, (E, b) = x - it.center, it.edges(i) or (np.zeros((1, 3)), np.full(1, -1.0))
         # of t, w and e, (.., 9)
         sliding = np.concatenate([n, -np.cross(n, d), np.zeros(3)])
         lines = np.hstack([-E, -np.cross(d, E), E])
@@ -266,7 +265,7 @@ def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:
         Q[:2, 3:6, 3:6] += 0.5 * slide * np.eye(3)
         Q[:, 3:6, 3:6] += left * np.eye(3)
         B = np.zeros((9, 8))
-        B[:6, :6], B[6:, 6:] = A, off.contact_sigma * frame
+        B[:6, :6], B[6:, 6:] = A, off.contact_sigma * plane_frame(n)
         linear = np.vstack([sliding, -sliding, lines]) @ B
         own = np.zeros((len(linear), 6 + 2 * FINGERS))
         own[:, :6], own[:, 6 + 2 * i : 8 + 2 * i] = linear[:, :6], linear[:, 6:]

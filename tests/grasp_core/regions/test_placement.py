@@ -8,7 +8,7 @@ from scipy import special
 from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
-from grasp_core.geometry.polygons import edge_rows, plane_frame
+from grasp_core.geometry.polygons import plane_frame
 from grasp_core.regions.placement import REACH, _chance_beyond, _limits
 from scenes import example_object
 from tests.placements import share_closed
@@ -54,9 +54,7 @@ def test_series_are_above_the_exact_motions():
     R = Rotation.from_rotvec(moves[:, 3:]).as_matrix()
     g, H, b = _limits(found)
     row, tested = 0, 0
-    for i, (x, n, landing) in enumerate(
-        zip(found.positions, found.normals, found.landings, strict=True)
-    ):
+    for i, (x, n) in enumerate(zip(found.positions, found.normals, strict=True)):
         frame, d = plane_frame(n), x - found.center
         own = z[:, 6 + 2 * i : 8 + 2 * i]
         e = off.contact_sigma * own @ frame.T
@@ -64,9 +62,9 @@ def test_series_are_above_the_exact_motions():
         num = n @ d - np.einsum("ni,ni->n", turned, d + e - moves[:, :3])
         s = num / (turned @ n)
         y = np.einsum("nji,nj->ni", R, d + e - moves[:, :3] + s[:, None] * n) - d
-        E, _ = edge_rows((landing - x) @ frame)
+        E, _ = found.edges(i)
         lost = found.slides[i] * (1.0 - turned @ n)
-        exact = [num + lost, lost - num, *(y @ frame @ E.T).T]
+        exact = [num + lost, lost - num, *(y @ E.T).T]
         u = np.hstack([z[:, :6], own])
         there = (
             (np.linalg.norm(moves[:, 3:], axis=1) <= off.turn)
