@@ -15,14 +15,16 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, frozen, frozen_each
 from grasp_core.closure.contacts import stacked
+from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import clip, tidy
-from grasp_core.kinds import MaxCones, value_of
+from grasp_core.kinds import LARGEST, Friction, MaxCones, number, value_of
 from grasp_core.objects.face_pieces import THINNEST, FacePiece
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
@@ -87,13 +89,13 @@ def placement_probability(
         InputError: The contacts are not on the faces, or a number is out of its range.
     """
     check_on_faces(body, grasp)
-    moved = frozen_each(pose_sigma_m, 3, "pose_sigma_m")
-    turned = frozen_each(pose_sigma_rad, 3, "pose_sigma_rad")
     mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
-    covariance = np.diag(np.concatenate([moved, turned]) ** 2)
+    value_of(Friction, mean, "friction")
+    covariance = _covariance(pose_sigma_m, pose_sigma_rad)
     if pose_covariance is not None:
         covariance = frozen(pose_covariance, (6, 6), "pose_covariance")
-    off = Misplacement(covariance, contact_sigma_m, mean, sigma)
+    shift = number(contact_sigma_m, "contact_sigma_m", least=0.0, most=LARGEST)
+    off = Misplacement(covariance, shift, mean, sigma)
     cones = value_of(MaxCones, max_cones, "max_cones")
     positions, normals = stacked(grasp.contacts)
     unit = Unit(body, positions)
@@ -139,6 +141,18 @@ def placement_probability(
             if chance_of_turning(found) <= ENOUGH:
                 return best
     return best
+
+
+def _covariance(pose_sigma_m: Any, pose_sigma_rad: Any) -> Array:
+    """Return the covariance of independent translations and turns along each axis, (6, 6)."""
+    sizes = [
+        frozen_each(given, 3, name)
+        for name, given in (("pose_sigma_m", pose_sigma_m), ("pose_sigma_rad", pose_sigma_rad))
+    ]
+    for name, each in zip(("pose_sigma_m", "pose_sigma_rad"), sizes, strict=True):
+        if (each < 0.0).any():
+            raise InputError(f"{name} must not be negative, got {float(each.min()):.6g}")
+    return np.diag(np.concatenate(sizes) ** 2)
 
 
 def _covers(sites: Sites, angle: float, cones: int) -> Iterator[tuple[float, TwistCover]]:

@@ -163,6 +163,20 @@ CALLS = [
         "clearance": NOT_NEGATIVE | {"larger than the object": 1.0},
         "max_cones": COUNT | {"few": 63},
     }),
+    Call("gc.placement_probability", of_grasp(friction=0.5, max_cones=64, pose_sigma_m=1e-3), {
+        "pose_sigma_m": NOT_NEGATIVE | {"two": [1e-3, 1e-3]},
+        "pose_sigma_rad": NOT_NEGATIVE,
+        "pose_covariance": optional(array(np.eye(6))) | {"negative": -np.eye(6)},
+        "contact_sigma_m": NOT_NEGATIVE,
+        "max_cones": COUNT | {"few": 63},
+    }),
+    Call("gc.Misplacement", lambda: {"covariance": np.eye(6), "contact_sigma": 0.0,
+                                     "friction": 0.5, "friction_sigma": 0.0}, {
+        "covariance": array(np.eye(6)) | {"negative": -np.eye(6)},
+        "contact_sigma": NOT_NEGATIVE,
+        "friction": POSITIVE,
+        "friction_sigma": NOT_NEGATIVE,
+    }),
     Call("gc.load_polyhedron", lambda: {"path": mesh_file()}, {
         "unit": WORD,
         "scale": POSITIVE,

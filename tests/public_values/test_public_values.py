@@ -19,7 +19,8 @@ BY_NAME = {call.name: call for call in CALLS}
 MADE_BY_FUNCTIONS = {
     "gc": "BestGrasp BestSqueeze CarriedContact CarriedGrasp CertifiedRegions ClosureCertificate "
     "FaceChange FerrariCanny FirstSlip FreeMass FrictionInterval GraspFigures Grip Hand "
-    "HandPayload HandReach Improvement Payload Plan QualityCeiling Transfer WrenchLimit",
+    "HandPayload HandReach Improvement Payload PlacementProbability Plan QualityCeiling Transfer "
+    "WrenchLimit",
     "scenes": "HandScene HeldScene Layout Scene Sheet Turntable",
     "sv": "ExecutedGrasp Execution ExecutionTrial Executions HandVerdict Judgement "
     "PublishedProtocol Verdict Verdicts",
@@ -28,6 +29,7 @@ MADE_BY_FUNCTIONS = {
 NAMED_OTHERWISE = {
     ("gc.Polyhedron.from_mesh", "vertices"): "vert|object",
     ("gc.Polyhedron.from_mesh", "triangles"): "triangle",
+    ("gc.placement_probability", "pose_covariance"): "covariance",
     ("scenes.example_object", "name"): "name|object",
     ("scenes.write_picture", "path"): "path|picture's name",
 }

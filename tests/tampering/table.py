@@ -26,6 +26,7 @@ from tests.tampering import (
     exact_closure,
     hand_payloads,
     on_planes,
+    placements,
     squeezes,
     wrench_bounds,
 )
@@ -133,6 +134,18 @@ def regions(seed):
     return certify_regions(
         body, grasps[seed // len(PLANNED) % len(grasps)], friction, max_cones=200,
         recenter=seed % 3 == 1, clearance=0.02 * body.radius * (seed % 2),
+    )  # fmt: skip
+
+
+@cache
+def placement(seed):
+    """Small and large errors, of the object, the fingers and the friction."""
+    body, friction, grasps = planned(seed)
+    rng = np.random.default_rng(seed)
+    return gc.placement_probability(
+        body, grasps[seed // len(PLANNED) % len(grasps)], (friction, 0.05 * rng.integers(2)),
+        pose_sigma_m=rng.choice([0.0, 1e-3, 3e-3]), pose_sigma_rad=rng.choice([0.01, 0.05]),
+        contact_sigma_m=5e-4 * rng.integers(2),
     )  # fmt: skip
 
 
@@ -296,6 +309,7 @@ TABLE = {
     "TwistCover": Row(
         cover, lambda c, rng: on_planes.all_closed(c.regions, c.normals, c.friction, rng), 0.5
     ),
+    "PlacementProbability": Row(placement, placements.placement, 0.7),
     "WrenchLimit": Row(wrench_limit, lambda c, _: wrench_bounds.wrench_limit(c)),
     "a closure certificate with torsion": Row(
         partial(closure, contacts=soft), lambda c, _: exact_closure.closure(c), 2.0
