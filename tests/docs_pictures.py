@@ -201,6 +201,29 @@ def misplaced():
     return Sheet(600.0, 350.0, "share kept", (*marks, *names, *below))
 
 
+def placement():
+    """Proved chance of closure of an icosahedron's grasps, by how far the object is off."""
+    body, sizes = scenes.example_object("icosahedron"), np.arange(0.5, 6.1, 0.5)
+    panel = Panel(70.0, 28.0, 500.0, 240.0, Scale(0.0, 6.0), Scale(0.0, 1.02))
+    marks = [*panel.frame(np.arange(7.0), (0.0, 0.25, 0.5, 0.75, 1.0), ".2f")]
+    methods = ("concurrent", "pencil", "regulus", "free")
+    for method, colour in zip(methods, FINGERS, strict=True):
+        grasp = gc.plan(body, FRICTION, families=method, limit=1).grasps[0]
+        chances = []
+        for size in sizes:
+            off = {"pose_sigma_m": 1e-3 * size, "pose_sigma_rad": math.radians(size)}
+            found = gc.placement_probability(body, grasp, (FRICTION, 0.05), **off)
+            chances.append(0.0 if found is None else found.lower)
+        places = panel.at(sizes, np.array(chances))
+        marks += [panel.curve(sizes, np.array(chances), colour), Dots(places, colour, 3.5)]
+    key = [Entry(name, colour) for name, colour in zip(methods, FINGERS, strict=True)]
+    below, _ = keyed(key, 70.0, 325.0, 500.0)
+    names = panel.named(
+        "object off its planned place", "standard deviation [mm and degrees]", "closed at least"
+    )
+    return Sheet(600.0, 350.0, "closed at least", (*marks, *names, *below))
+
+
 def trials():
     """How far an object moves in the hand over time, in the hardest trial of each kind."""
     body = scenes.example_object("box")
@@ -307,7 +330,7 @@ PICTURES: dict[str, Callable[[], Sheet]] = {
     make.__name__: make
     for make in (
         families, certificate, grasp, hand, regions, wrenches, margins, motion, fidelity, misplaced,
-        trials, changed, rows,
+        placement, trials, changed, rows,
     )
 }  # fmt: skip
 

@@ -35,12 +35,12 @@ def apart(figure, picture):
     return np.abs(squares).max()
 
 
-SIMULATED = {"fidelity", "trials"}
+LONGEST = {"fidelity", "placement", "trials"}
 
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name in SIMULATED)) for name in PICTURES],
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in LONGEST)) for name in PICTURES],
 )
 def test_a_picture_is_the_one_that_is_kept(name):
     figure = PICTURES[name]()
