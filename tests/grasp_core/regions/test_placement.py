@@ -11,7 +11,7 @@ import grasp_core as gc
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.regions.placement import REACH, _chance_beyond, _limits
 from scenes import example_object
-from tests.placements import share_closed
+from tests.placements import met, share_closed
 
 SIZES = ((1e-3, 1.0), (2e-3, 2.0), (4e-3, 4.0))
 """Deviations of translation [m] and turn [deg]."""
@@ -99,3 +99,41 @@ def test_the_chance_that_any_limit_is_broken_is_not_below_what_draws_show():
         alone = _chance_beyond(g, 0.0 * H, b, special)
         assert alone >= linear - 4.0 * math.sqrt(linear / 20_000) - 1e-4
         assert alone <= 1.3 * linear + 0.02
+
+
+def shaded(body, grasp):
+    """Whether parts of the object are in front of a face that a finger stands on."""
+    heights = np.einsum("kvi,ki->kv", grasp.positions[:, None] - body.vertices, grasp.normals)
+    return heights.max() > 1e-6 * body.radius
+
+
+@pytest.mark.parametrize("name", ["l-bracket", "cross"])
+def test_nothing_is_in_the_way_of_fingers_to_the_landings(name):
+    """Rays to points of landings, turned by up to T, meet the object first there."""
+    rng, body, areas = np.random.default_rng(0), example_object(name), []
+    grasps = [each for each in gc.plan(body, 0.5, limit=120).grasps if shaded(body, each)]
+    for grasp in grasps[:: max(len(grasps) // 8, 1)]:
+        found = gc.placement_probability(
+            body, grasp, 0.5, pose_sigma_m=0.01 * body.radius, pose_sigma_rad=0.03, max_cones=300
+        )
+        if found is None:
+            continue
+        away = 3.0 * float(found.slides.max())
+        for face, n, landing in zip(grasp.faces, found.normals, found.landings, strict=True):
+            points = rng.dirichlet(np.full(len(landing), 0.3), size=100) @ landing
+            points += 1e-6 * (landing.mean(axis=0) - points)
+            aside = plane_frame(n) @ rng.normal(size=(2, 100))
+            aside *= rng.uniform(size=100) / np.linalg.norm(aside, axis=0)
+            ways = n + math.tan(found.off.turn) * aside.T
+            ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+            starts = points - away * rng.uniform(0.01, 1.0, size=(100, 1)) * ways
+            hits, _ = met(body, starts, ways)
+            assert np.abs(hits - points).max() <= 1e-7 * body.radius
+            areas.append(area(landing) / max(map(area, body.faces[face].pieces)))
+    assert len(areas) >= 16
+    assert min(areas) < 0.95
+
+
+def area(polygon):
+    sides = polygon[1:] - polygon[0]
+    return np.linalg.norm(np.cross(sides[:-1], sides[1:]).sum(axis=0))

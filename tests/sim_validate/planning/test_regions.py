@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+import grasp_core as gc
 import sim_validate as sv
 from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.regions.proof import TwistCover
@@ -158,3 +159,20 @@ def test_regions_can_be_asked_to_stay_clear_of_edges(folder, answer):
     assert (
         answer(*asked, "--edge-clearance-m", "0.05", code=Exit.NEGATIVE)["summary"]["proved"] == 0
     )
+
+
+def test_the_chance_of_closure_is_proved_where_errors_are_named(folder, capsys):
+    asked = ["regions", str(folder / "grasps.json"), "--limit", "1", "--max-cones", "300", "--json"]
+    off = ["--off-mm", "2", "--off-deg", "1", "--finger-mm", "0.5", "--friction-sigma", "0.05"]
+    assert main([*asked, *off]) == Exit.GOOD
+    (told,) = json.loads(capsys.readouterr().out)["grasps"]
+    saved = grasps_from_json((folder / "grasps.json").read_text())
+    found = gc.placement_probability(
+        saved.body, saved.grasps[0], (0.5, 0.05), pose_sigma_m=2e-3,
+        pose_sigma_rad=np.radians(1.0), contact_sigma_m=5e-4,
+    )  # fmt: skip
+    assert found.verify()
+    assert told["closed_share"] == pytest.approx(found.lower, abs=1e-9)
+    assert 0.9 < found.lower <= found.estimate
+    kept = json.loads((folder / "regions.json").read_text())["grasps"]
+    assert [each["closed_share"] for each in kept] == [None, None, None]
