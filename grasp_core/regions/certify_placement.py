@@ -7,22 +7,22 @@ more to translations, and both make a cover harder.
 Fingers must meet their own faces first. Where other parts of the object are in front of a face, no
 higher than fingers come from, a finger that is turned by up to T against the face passes beside a
 point at height h within h tan T. For a direction u in the plane, no finger that lands where
-u.y <= min over corners of (u.c - h tan T) meets a triangle with corners c at heights h. The
-landings are faces, cut by such a half-plane for each triangle in front of them.
+u.y <= min over corners of (u.c - h tan T) meets a triangle with corners c at heights h; nor does
+one where u.y <= min u.c - H tan T, if fingers come from height H. The landings are faces, cut by
+such a half-plane for each triangle in front of them.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Array, frozen, frozen_each
+from grasp_core.arrays import Array, Shape, frozen, frozen_each
 from grasp_core.closure.contacts import stacked
-from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import clip, tidy
 from grasp_core.kinds import LARGEST, Friction, MaxCones, number, value_of
 from grasp_core.objects.face_pieces import THINNEST, FacePiece
@@ -55,6 +55,9 @@ IN_FRONT = 1e-9
 """Height above a face from which the surface is in the way of fingers, in object radii."""
 ROUNDED = 1e-9
 """Chance by which the bound is lowered, since other processors round it otherwise."""
+
+Deviations = Annotated[Array, Shape(3, least=0.0)]
+"""Standard deviations along or about each axis."""
 
 
 def placement_probability(
@@ -91,7 +94,11 @@ def placement_probability(
     check_on_faces(body, grasp)
     mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
     value_of(Friction, mean, "friction")
-    covariance = _covariance(pose_sigma_m, pose_sigma_rad)
+    axes = [
+        value_of(Deviations, frozen_each(each, 3, name), name)
+        for name, each in (("pose_sigma_m", pose_sigma_m), ("pose_sigma_rad", pose_sigma_rad))
+    ]
+    covariance = np.diag(np.concatenate(axes) ** 2)
     if pose_covariance is not None:
         covariance = frozen(pose_covariance, (6, 6), "pose_covariance")
     shift = number(contact_sigma_m, "contact_sigma_m", least=0.0, most=LARGEST)
@@ -143,18 +150,6 @@ def placement_probability(
     return best
 
 
-def _covariance(pose_sigma_m: Any, pose_sigma_rad: Any) -> Array:
-    """Return the covariance of independent translations and turns along each axis, (6, 6)."""
-    sizes = [
-        frozen_each(given, 3, name)
-        for name, given in (("pose_sigma_m", pose_sigma_m), ("pose_sigma_rad", pose_sigma_rad))
-    ]
-    for name, each in zip(("pose_sigma_m", "pose_sigma_rad"), sizes, strict=True):
-        if (each < 0.0).any():
-            raise InputError(f"{name} must not be negative, got {float(each.min()):.6g}")
-    return np.diag(np.concatenate(sizes) ** 2)
-
-
 def _covers(sites: Sites, angle: float, cones: int) -> Iterator[tuple[float, TwistCover]]:
     """Yield covers with less and less friction, from the tangent of half an angle on."""
     least, most = 0.0, angle
@@ -180,28 +175,15 @@ def _seen(piece: FacePiece, x: Array, surface: Array, height: float, slope: floa
     heights = (x - surface) @ piece.normal
     ahead = (heights.max(axis=1) > IN_FRONT) & (heights.min(axis=1) < height)
     flat = (surface[ahead] - piece.origin) @ piece.frame
-    for places, above in zip(flat, heights[ahead], strict=True):
-        at, h = _between(places, above, height)
-        reach = slope * h
-        along = at - np.roll(at, 1, axis=0)
-        across = np.column_stack([-along[:, 1], along[:, 0]])
+    for at, above in zip(flat, heights[ahead], strict=True):
+        sides = at - np.roll(at, 1, axis=0)
+        across = np.column_stack([-sides[:, 1], sides[:, 0]])
         ways = np.vstack([at - y, across, -across])
         ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), THINNEST)
-        limits = (ways @ at.T - reach).min(axis=1)
+        along = ways @ at.T
+        limits = np.maximum((along - slope * above).min(1), along.min(1) - slope * height)
         best = int(np.argmax(limits - ways @ y))
         if limits[best] <= ways[best] @ y:
             return np.empty((0, 2))
         corners = tidy(clip(corners, ways[best : best + 1], limits[best : best + 1]))
     return corners
-
-
-def _between(places: Array, heights: Array, most: float) -> tuple[Array, Array]:
-    """Return corners of the part of a triangle with heights from 0 to `most`, and their heights."""
-    kept = [(p, h) for p, h in zip(places, heights, strict=True) if 0.0 <= h <= most]
-    for i in range(3):
-        (p, h), (q, k) = (places[i], heights[i]), (places[i - 1], heights[i - 1])
-        for level in (0.0, most):
-            if min(h, k) < level < max(h, k):
-                share = (level - h) / (k - h)
-                kept.append((p + share * (q - p), level))
-    return np.array([p for p, _ in kept]), np.array([h for _, h in kept])

@@ -37,18 +37,14 @@ order are at most |w|^2 / 2 and |w|^3 / 6. With |w| <= T <= 1 and k = 1 / cos T,
     |w| |d_i| (2/3 + k (1 + T) / 2) + (|t| + |e_i|) (3/2 + k (1 + T) / 2).                  (6)
 
 Chance. In unit normal variables z, (4) and (5) are sigma g + z'Hz, with g normal; and (6) is part
-of H, once t, w and e_i are bounded by their `REACH`. Let the largest eigenvalue of H be l, or zero
-if that is more, and r the number of positive ones. A limit b is then broken with at most the chance
-that
+of H, once t, w and e_i are bounded by their `REACH`. Where w = 0 nothing is left of z'Hz, so at
+most three eigenvalues of H are positive, as many as w has coordinates. Let l be the largest, or
+zero if that is more. A limit b is then broken with at most the chance that
 
-    sigma g + l (g^2 + q) > b,    q of the chi-square law of r variables,                   (7)
+    sigma g + l (g^2 + q) > b,    q of the chi-square law of 3 variables,                    (7)
 
 which rises with q, so that the largest values on some intervals of q bound its mean from above.
-
-Of failures with chances p_k, the chance that any happens is at most the sum of p_k less the chances
-that two happen together, summed over the branches of a tree (Hunter, "An upper bound for the
-probability of a union", 1976). Each chance (7) holds that of sigma g > b, and for two of these the
-chance of both is known (Owen, "Tables for computing bivariate normal probabilities", 1956).
+What is bounded in the end is the sum of the chances of all failures.
 """
 
 import importlib
@@ -77,17 +73,9 @@ REACH = 4.5
 """Largest motions that count, in their largest deviations: a chance of 1.5e-4 for each of t, w."""
 MOST_TURN = 1.0
 """Largest turn that may count as closed [rad]."""
-FARTHEST = 8.0
-"""Deviations beyond which two failures are not looked at together."""
-NOTHING, FAR = 1e-9, 100.0
-"""Share of the largest eigenvalue up to which others count as zero; |z|^2 beyond which none looks:
-a chance of 1e-17."""
 SIDES = 16
 """Corners of the polygons around discs of fingers' shifts."""
-ALIKE = 1.0 - 1e-12
-"""Largest correlation that counts: two functions that are less alike fail together less often."""
-EVEN, TAIL = np.arange(1.0, 32.0) / 32.0, 0.5 ** np.arange(6.0, 40.0)
-ABOVE = np.concatenate([1.0 - EVEN, TAIL, [0.0]])
+ABOVE = np.append(np.exp2(np.arange(-1.0, -320.0, -1.0) / 8.0), 0.0)
 """Chances of values above the ends of the intervals that a law is divided into."""
 MASS = -np.diff(ABOVE, prepend=1.0)
 """Chances of the intervals."""
@@ -228,7 +216,8 @@ def bound(it: PlacementProbability) -> float:
     failing = chance_of_turning(it) + 2.0 * float(special.chdtrc(3, REACH**2)) + ROUNDING
     if it.off.contact_sigma:
         failing += FINGERS * math.exp(-0.5 * (it.shift / it.off.contact_sigma) ** 2)
-    return max(0.0, 1.0 - failing - _chance_beyond(*_limits(it), special))
+    failing += float(_chances_beyond(*_limits(it), special).sum())
+    return max(0.0, 1.0 - failing)
 
 
 def chance_of_turning(it: PlacementProbability) -> float:
@@ -243,16 +232,15 @@ def chance_of_turning(it: PlacementProbability) -> float:
 
 
 def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:
-    """Write (4) and (5) as g.z + z'Hz <= b: g (m, 14), H (m, 8, 8) and b (m,)."""
-    off, T, A = it.off, it.off.turn, it.off.root
+    """Write (4) and (5) as g.z + z'Hz <= b: g (m, 8), H (m, 8, 8) and b (m,)."""
+    off, T = it.off, it.off.turn
     k = (1.0 + T) / (2.0 * math.cos(T))
-    farthest = REACH * float(np.linalg.norm(A[:3], 2)) + it.shift
-    rows, curved, limits = list[Array](), list[Array](), list[Array]()
+    farthest = REACH * float(np.linalg.norm(off.root[:3], 2)) + it.shift
+    linear, curved, limits = list[Array](), list[Array](), list[Array]()
     for i, (x, n, slide) in enumerate(zip(it.positions, it.normals, it.slides, strict=True)):
         d, (E, b) = x - it.center, it.edges(i) or (np.zeros((1, 3)), np.full(1, -1.0))
         # of t, w and e, (.., 9)
         sliding = np.concatenate([n, -np.cross(n, d), np.zeros(3)])
-        lines = np.hstack([-E, -np.cross(d, E), E])
         Q = np.zeros((2 + len(E), 9, 9))
         Q[0, 3:6, 3:6] = 0.5 * (float(n @ d) * np.eye(3) - np.outer(n, d))
         Q[0, 3:6, :3], Q[0, 3:6, 6:] = _crossing(n), -_crossing(n)
@@ -265,14 +253,11 @@ def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:
         Q[:2, 3:6, 3:6] += 0.5 * slide * np.eye(3)
         Q[:, 3:6, 3:6] += left * np.eye(3)
         B = np.zeros((9, 8))
-        B[:6, :6], B[6:, 6:] = A, off.contact_sigma * plane_frame(n)
-        linear = np.vstack([sliding, -sliding, lines]) @ B
-        own = np.zeros((len(linear), 6 + 2 * FINGERS))
-        own[:, :6], own[:, 6 + 2 * i : 8 + 2 * i] = linear[:, :6], linear[:, 6:]
-        rows.append(own)
+        B[:6, :6], B[6:, 6:] = off.root, off.contact_sigma * plane_frame(n)
+        linear += [sliding @ B, -sliding @ B, np.hstack([-E, -np.cross(d, E), E]) @ B]
         curved.append(B.T @ (0.5 * (Q + Q.swapaxes(1, 2))) @ B)
         limits += [np.full(2, slide), b - it.depth * math.tan(T)]
-    return np.vstack(rows), np.vstack(curved), np.concatenate(limits)
+    return np.vstack(linear), np.vstack(curved), np.concatenate(limits)
 
 
 def _crossing(v: Array) -> Array:
@@ -280,40 +265,16 @@ def _crossing(v: Array) -> Array:
     return np.cross(v, np.eye(3)).T
 
 
-def _chance_beyond(g: Array, H: Array, b: Array, special: Any) -> float:
-    """Bound the chance that any of g.z + z'Hz <= b fails from above, by (7) and a tree."""
-    sigma, values = np.linalg.norm(g, axis=1), np.linalg.eigvalsh(H)
-    top = np.maximum(values[:, -1:], 0.0)
-    r = np.maximum((values > NOTHING * top).sum(axis=1, keepdims=True), 1)
-    left = b[:, None] - top * (special.chdtri(r, ABOVE[:-1]) + FAR * NOTHING)
+def _chances_beyond(g: Array, H: Array, b: Array, special: Any) -> Array:
+    """Bound the chances that g.z + z'Hz <= b fails, one for each row, from above by (7)."""
+    sigma = np.linalg.norm(g, axis=1)[:, None]
+    top = np.maximum(np.linalg.eigvalsh(H)[:, -1:], 0.0)
+    left = b[:, None] - top * special.chdtri(3, ABOVE[:-1])
     # sigma g + l g^2 > left beyond one root, and before the other
-    square = sigma[:, None] ** 2 + 4.0 * top * left
-    roots = sigma[:, None] + np.sqrt(np.maximum(square, 0.0))
+    square = sigma**2 + 4.0 * top * left
+    roots = sigma + np.sqrt(np.maximum(square, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = special.ndtr(-2.0 * left / roots)
         before = np.where(top > 0.0, special.ndtr(-roots / (2.0 * top)), 0.0)
     each = np.where(square > 0.0, np.minimum(beyond + before, 1.0), 1.0)
-    chances = each @ MASS[:-1] + MASS[-1]
-    # both of two linear parts, for those that can fail
-    h = b / sigma
-    likely = (h > 0.0) & (h < FARTHEST)
-    h, units = h[likely], g[likely] / sigma[likely, None]
-    alike = np.clip(units @ units.T, -ALIKE, ALIKE)
-    one = (
-        0.5 * special.ndtr(-h)
-        - special.owens_t(h[:, None], (h / h[:, None] - alike) / np.sqrt(1.0 - alike**2)).T
-    )
-    both = np.maximum(one + one.T - ROUNDING / FARTHEST**2, 0.0)
-    return float(chances.sum()) - _heaviest_tree(both)
-
-
-def _heaviest_tree(weights: Array) -> float:
-    """Return the sum of the weights of the heaviest tree between all nodes, (n, n) (Prim)."""
-    total, apart = 0.0, np.arange(len(weights)) > 0
-    reached = weights[0].copy() if len(weights) else np.empty(0)
-    while apart.any():
-        node = int(np.argmax(np.where(apart, reached, -1.0)))
-        total += float(reached[node])
-        apart[node] = False
-        reached = np.maximum(reached, weights[node])
-    return total
+    return each @ MASS[:-1] + MASS[-1]
