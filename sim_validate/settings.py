@@ -167,6 +167,7 @@ TrialKind: TypeAlias = Literal["weight", "lift", "shake", "stop", "knock", "misp
 or stops the palm, strikes the object, or closes fingers on an object that is not where it should
 be."""
 KINDS: tuple[TrialKind, ...] = get_args(TrialKind)
+OffBy: TypeAlias = Literal["exactly", "deviation"]
 KNOCK_M_PER_S = 1.0 / 6.0
 """Speed that the usual knock gives a free object [m/s], 0.05 N s for 0.3 kg. So its load grows with
 the mass, as those of all other trials do, and a screw is not shot away."""
@@ -210,6 +211,9 @@ class ChosenExecution(Holding):
     knock_n_s: NotNegative | None = None
     """Impulse of a knock [N s], 0 for no knocks. If not given, the one that gives a free object of
     that mass 1/6 m/s: 0.05 N s for 0.3 kg."""
+    off_by: OffBy = "exactly"
+    """Whether a misplaced object is off by exactly the next two, in random directions, or by normal
+    errors along and about each axis with these standard deviations, as in `regions`."""
     off_mm: NotNegative = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
     off_deg: Annotated[float, Range(least=0.0, most=180.0)] = 2.0

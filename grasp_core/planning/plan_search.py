@@ -35,7 +35,7 @@ from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kep
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
 from grasp_core.processes import Processes
-from grasp_core.regions.certify_placement import placement_probability
+from grasp_core.regions.certify_placement import OFF_M, OFF_RAD, placement_probability
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
@@ -312,8 +312,6 @@ def _without_room(on: Standard) -> int:
 
 PUSH_N = 10.0
 """Largest push of a finger under which payloads and first slips are compared [N]."""
-OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
-"""Standard deviations of the object's place and turn at which placements are compared."""
 TIP_RADIUS = 0.1
 """Radius of fingertips whose size is not given, in object radii: that of scenes."""
 

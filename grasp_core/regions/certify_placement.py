@@ -40,6 +40,8 @@ from grasp_core.regions.placement import (
 from grasp_core.regions.proof import TwistCover
 from grasp_core.values import FINGERS, Grasp, four
 
+OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
+"""Standard deviations of place and turn that rankings and datasets count on."""
 CONES = 4000
 """Default for the largest number of cones in one proof."""
 PRISMS = ((4.5, 4.0), (4.0, 3.2), (3.5, 2.6))

@@ -17,7 +17,7 @@ from grasp_core.declared import Declared, rules, types
 from grasp_core.errors import InputError
 from grasp_core.figures import Kept, keeps
 from grasp_core.files.records import FLAT
-from grasp_core.kinds import Family, Friction, Number, Range, Seed
+from grasp_core.kinds import Family, Friction, Number, Range, Seed, Share
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
@@ -207,6 +207,9 @@ class GraspRow(Declared):
     """Half-angle below which cones positively span."""
     smallest_singular_value: Annotated[Known, Asked("closure"), Within(ROUNDING, ROUNDING)] = None
     """Least singular value of the grasp map."""
+    closed_share: Annotated[Share | None, Asked("placement")] = None
+    """Proved lower bound of the chance of force closure where the object is off by 2 mm and 2
+    degrees (standard deviations); null where the grasp is not in force closure."""
     witness_forces_n: Annotated[Points | None, Asked("closure")] = None
     """Balanced forces on the object, normal parts sum to one."""
 

@@ -61,7 +61,7 @@ EXECUTION = "execution"
 LEARNING = "learning"
 """Names of the tables in a settings file."""
 HandName: TypeAlias = Literal["", "allegro", "allegro-urdf", "leap"]
-Figure: TypeAlias = Literal["closure", "least_squeeze"]
+Figure: TypeAlias = Literal["closure", "least_squeeze", "placement"]
 """A group of figures that each grasp has on request."""
 CONTROLS = 5
 """Number of kinds of synthetic negative controls that a grasp has at most."""

@@ -36,6 +36,7 @@ from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat
 from grasp_core.quality.metrics import smallest_singular_value
+from grasp_core.regions.certify_placement import OFF_M, OFF_RAD, placement_probability
 from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
 from sim_validate.closure.controls import LEAST_FRICTION, negative_controls, try_control
 from sim_validate.closure.validate import validate
@@ -149,6 +150,18 @@ def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Co
             points, center=body.center_of_mass, torque_scale=body.radius
         )
     return {"span_angle_rad": angle, "smallest_singular_value": smallest}
+
+
+def placement_cells(
+    config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float
+) -> Cells:
+    """Return the proved chance of closure of a misplaced grasp, if it is asked for."""
+    if "placement" not in config.asked.figures:
+        return {}
+    proved = placement_probability(
+        body, grasp, friction, pose_sigma_m=OFF_M, pose_sigma_rad=OFF_RAD
+    )
+    return {"closed_share": 0.0 if proved is None else proved.lower}
 
 
 def hand_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:

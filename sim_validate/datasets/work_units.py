@@ -435,6 +435,7 @@ class Making:
         body, verdict, proved = tried.body, tried.verdict, tried.proved
         cells = {**self._about(tried.contacts), **cells, **tried.cells}
         if isinstance(proved, Grasp):
+            cells |= learning.placement_cells(self.config, body, proved, cells["friction"])
             cells |= learning.hand_cells(self.config, body, proved, cells["friction"])
         closed = isinstance(verdict, Verdict)
         trials = verdict.wrenches if closed else verdict.tried

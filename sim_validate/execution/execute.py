@@ -344,6 +344,7 @@ def _judged(
         predicted_loss=predicted[1],
         simulated_first_slip=found.first_slip,
         step_s=bench.step_s,
+        starts_closed=trial.starts_closed,
     )
 
 

@@ -1,10 +1,11 @@
 """Which trials an execution consists of, what each applies, and where object and fingertips are.
 
 In `misplaced` the object is moved by a stated distance and turned by a stated angle, both in
-directions drawn by a seed. Each fingertip comes along its normal until it touches, as far behind
-its planned place as the object can have moved; one that meets nothing stops as far beyond it. From
-there the squeeze is commanded as planned. A fingertip advances by its distance from the surface
-less its radius, so it never passes the first point that it meets (sphere tracing, Hart 1996).
+directions drawn by a seed, or by errors that are drawn too. Each fingertip comes along its normal
+until it touches, as far behind its planned place as the object can have moved; one that meets
+nothing stops as far beyond it. From there the squeeze is commanded as planned. A fingertip advances
+by its distance from the surface less its radius, so it never passes the first point that it meets
+(sphere tracing, Hart 1996).
 
 In `lift` the object rests on a table, on a face of its convex hull that carries its centre of mass:
 the centre, dropped onto the face, lies inside. An object that is thrown and settles without sliding
@@ -35,7 +36,9 @@ from typing import Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, to_digits
-from grasp_core.closure.contacts import grasp_map
+from grasp_core.closure.contacts import grasp_map, unit_size
+from grasp_core.closure.decision import decide
+from grasp_core.closure.proofs import ContactCones
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.first_slip import first_slip
 from grasp_core.execution.grips import Grip
@@ -52,7 +55,7 @@ from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Pose, Table
 from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.verdict import ExecutionControl, Skipped
-from sim_validate.settings import ExecutionSettings, TrialKind
+from sim_validate.settings import ExecutionSettings, OffBy, TrialKind
 
 MET = 1e-7
 """Distance from the surface at which a fingertip has met it, in object radii."""
@@ -62,18 +65,21 @@ ROOM = 1.5
 """Distance from which fingertips come, relative to how far points of the object can have moved."""
 
 
-def misplacements(layout: HeldLayout, off_m: float, off_rad: float, count: int, seed: int) -> tuple[
-    Pose, ...
-]:  # fmt: skip
-    """Draw poses of the object that are off by a distance and an angle, in random directions."""
-    rng = np.random.default_rng(seed)
-    ways = rng.normal(size=(count, 2, 3))
-    ways /= np.linalg.norm(ways, axis=2, keepdims=True)
+def errors(count: int, seed: int, off_by: OffBy) -> Array:
+    """Draw errors of place and turn, (count, 2, 3), of length one or of deviation one."""
+    drawn = np.random.default_rng(seed).normal(size=(count, 2, 3))
+    return drawn if off_by == "deviation" else drawn / np.linalg.norm(drawn, axis=2, keepdims=True)
+
+
+def misplacements(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[Pose, ...]:
+    """Return poses of the object that is off by translations and turns, (count, 3) each."""
     poses = list[Pose]()
-    for way, axis in ways:
-        turn = np.concatenate([[math.cos(0.5 * off_rad)], math.sin(0.5 * off_rad) * axis])
+    for way, turning in zip(off_m, off_rad, strict=True):
+        angle = float(np.linalg.norm(turning))
+        axis = turning / (angle or 1.0)
+        turn = np.concatenate([[math.cos(0.5 * angle)], math.sin(0.5 * angle) * axis])
         turned = rotations(to_digits(turn / np.linalg.norm(turn))[None])[0]
-        poses.append(Pose(to_digits(off_m * way, layout.radius_m), quaternion(turned)))
+        poses.append(Pose(to_digits(way, layout.radius_m), quaternion(turned)))
     return tuple(poses)
 
 
@@ -106,6 +112,21 @@ def met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: floa
         gone = np.where(open_, np.minimum(gone + gaps, 2.0 * room), gone)
     back = (to_digits(gone, layout.radius_m) - room)[..., None] * layout.frames[:, :, 0]
     return np.einsum("kij,pki->pkj", layout.axes, back)
+
+
+def closed_there(layout: HeldLayout, pose: Pose, tips: Array) -> bool | None:
+    """Decide whether fingertips that stop as `met` says hold a moved object in force closure.
+
+    None where it is too close to decide.
+    """
+    centers = layout.tip_centers + np.einsum("kij,kj->ki", layout.axes, tips) - pose.moved
+    centers = centers @ rotations(pose.quaternion[None])[0]
+    contacts = nearest_on_surface(layout.vertices, layout.triangles, centers)
+    normals, gaps = contacts - centers, np.linalg.norm(contacts - centers, axis=1)
+    if (gaps > layout.tip_radius_m + MET * layout.radius_m).any():
+        return False
+    arms, _, _ = unit_size(contacts[None])
+    return decide(ContactCones.at(arms[0], normals / gaps[:, None], layout.friction)).closed
 
 
 def _near(layout: HeldLayout, middles: Array, room: float) -> Indices:
@@ -195,6 +216,8 @@ class Trial:
     """Whether the load keeps turning, so that small slips add up."""
     expected: Drive | None = None
     """What the prediction is for, if not for the drive itself."""
+    starts_closed: bool | None = None
+    """Whether fingertips first meet a misplaced object in force closure."""
 
 
 def trials_of(
@@ -257,13 +280,18 @@ def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     off_m, off_rad = settings.off_mm / 1000.0, math.radians(settings.off_deg)
-    poses = misplacements(layout, off_m, off_rad, settings.misplacements, settings.seed)
-    reached = met(layout, poses, off_m, off_rad)
+    off = errors(settings.misplacements, settings.seed, settings.off_by)
+    poses = misplacements(layout, off_m * off[:, 0], off_rad * off[:, 1])
+    farthest, widest = np.linalg.norm(off, axis=2).max(axis=0)
+    reached = met(layout, poses, float(farthest) * off_m, float(widest) * off_rad)
     closing, weight = paths.closing(), paths.weighed(layout.gravity)
     for place, (pose, tips) in enumerate(zip(poses, reached, strict=True)):
         drive = replace(closing.then(weight), pose=pose, reached=tips)
         name = f"misplaced {place}"
-        yield Trial("misplaced", name, drive, len(closing) - 1, apart=True, expected=weight)
+        yield Trial(
+            "misplaced", name, drive, len(closing) - 1, apart=True, expected=weight,
+            starts_closed=closed_there(layout, pose, tips),
+        )  # fmt: skip
 
 
 def _side(sign: float, axis: int) -> str:

@@ -77,6 +77,9 @@ class ExecutionTrial(Declared):
     step_s: Quantity
     """Length of the shortest steps that the simulator took: a loss with steps of the usual length
     counts only if short steps find it as well [s]."""
+    starts_closed: bool | None = None
+    """Whether fingers first meet a misplaced object in force closure, before they squeeze; null for
+    other trials, and where it is too close to decide."""
 
     def _check_together(self) -> None:
         unknown = [math.isinf(each) for each in (self.slip_m, self.displacement_m, self.turn_rad)]

@@ -25,7 +25,7 @@ LEARNED = DatasetConfig(
     ),
     learning=Learning(
         friction_below=1, friction_near=1, friction_above=1, moved_out=1, mass_near=1, synthetic=1,
-        figures=("closure", "least_squeeze"), seeds=(7,), hand="leap",
+        figures=("closure", "least_squeeze", "placement"), seeds=(7,), hand="leap",
     ),
 )  # fmt: skip
 """Two objects with rows of every kind."""

@@ -1,5 +1,6 @@
 """Figures and kinds of varied grasps are what they say, and forged ones are named."""
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -52,6 +53,19 @@ def test_closure_figures_are_those_of_the_contacts(grasps):
         about = {"center": body.center_of_mass, "torque_scale": body.radius}
         assert row["smallest_singular_value"] == gc.smallest_singular_value(contacts, **about)
         assert row["span_angle_rad"] == gc.span_angle(stacked(contacts)[1])
+
+
+def test_proved_chances_of_closure_are_those_of_the_grasps(grasps):
+    assert {row["closed_share"] is None for row in grasps} == {True, False}
+    for row in grasps:
+        assert (row["closed_share"] is not None) == row["force_closed"]
+        if row["kind"] == "planned":
+            body = BODIES[row["object_id"]]
+            (grasp,) = gc.plan(body, row["friction"], families="concurrent", limit=1).grasps
+            found = gc.placement_probability(
+                body, grasp, row["friction"], pose_sigma_m=2e-3, pose_sigma_rad=math.radians(2.0)
+            )
+            assert row["closed_share"] == found.lower > 0.5
 
 
 def test_witness_forces_balance_within_the_cones(grasps):

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
+import grasp_core as gc
 from grasp_core.execution.grips import unsqueezed
 from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.held_scene import held_layout
 from scenes.mujoco.scene_text import TOUCH
 from scenes.settings import HeldSettings
-from sim_validate.execution.trials import ROOM, met, misplacements
+from sim_validate.execution.trials import ROOM, closed_there, errors, met, misplacements
 from tests.sim_validate.execution.held_rigs import planned
 
 OFF_M, OFF_RAD = 0.002, np.radians(3.0)
@@ -45,16 +47,21 @@ def tip_paths(layout, pose, reached, count=200):
     return (way - pose.moved) @ turn_of(pose.quaternion)
 
 
+def drawn(layout, count, seed):
+    off = errors(count, seed, "exactly")
+    return misplacements(layout, OFF_M * off[:, 0], OFF_RAD * off[:, 1])
+
+
 @pytest.fixture(scope="module", params=["box", "l-bracket"])
 def misplaced(request):
     layout = layout_of(request.param)
-    poses = misplacements(layout, OFF_M, OFF_RAD, 12, 0)
+    poses = drawn(layout, 12, 0)
     return layout, poses, met(layout, poses, OFF_M, OFF_RAD)
 
 
 def test_objects_are_off_by_what_is_stated():
     layout = layout_of("box")
-    poses = misplacements(layout, OFF_M, OFF_RAD, 200, 5)
+    poses = drawn(layout, 200, 5)
     shifts = np.array([pose.moved for pose in poses])
     assert np.linalg.norm(shifts, axis=1) == pytest.approx(OFF_M, rel=1e-6)
     turns = np.array([turn_of(pose.quaternion) for pose in poses])
@@ -81,7 +88,34 @@ def test_fingertips_touch_where_they_stop_and_nowhere_before(misplaced):
 
 def test_a_finger_that_meets_nothing_stops_beyond_its_place():
     layout = layout_of("box")
-    (pose,) = misplacements(layout, 10.0 * layout.radius_m, 0.0, 1, 0)
+    off = np.array([[10.0 * layout.radius_m, 0.0, 0.0]])
+    (pose,) = misplacements(layout, off, np.zeros((1, 3)))
     reached = met(layout, (pose,), OFF_M, 0.0)
     moved = np.einsum("kij,pkj->pki", layout.axes, reached)[0]
     assert moved == pytest.approx(ROOM * OFF_M * layout.frames[:, :, 0], abs=1e-12)
+    assert closed_there(layout, pose, reached[0]) is False
+
+
+def test_errors_have_the_stated_deviations():
+    off = errors(2000, 1, "deviation")
+    assert off.std(axis=0) == pytest.approx(1.0, abs=0.06)
+    layout = layout_of("box")
+    poses = misplacements(layout, OFF_M * off[:20, 0], OFF_RAD * off[:20, 1])
+    for pose, (way, turn) in zip(poses, off, strict=False):
+        assert pose.moved == pytest.approx(OFF_M * way, abs=1e-9)
+        exact = Rotation.from_rotvec(OFF_RAD * turn).as_matrix()
+        assert turn_of(pose.quaternion) == pytest.approx(exact, abs=1e-7)
+
+
+def test_starts_are_closed_where_fingers_meet_closed_contacts(misplaced):
+    """Trimesh says what each fingertip touches, and the public test decides."""
+    layout, poses, reached = misplaced
+    corners = layout.vertices[layout.triangles]
+    for pose, own in zip(poses, reached, strict=True):
+        contacts = []
+        for center in tip_paths(layout, pose, own)[-1]:
+            near = trimesh.triangles.closest_point(corners, np.tile(center, (len(corners), 1)))
+            point = near[np.linalg.norm(near - center, axis=1).argmin()]
+            contacts.append(gc.Contact(point, (point - center) / np.linalg.norm(point - center)))
+        closed = gc.force_closure(contacts, friction=0.5).closed
+        assert closed_there(layout, pose, own) is closed
