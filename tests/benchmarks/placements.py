@@ -37,7 +37,7 @@ SIZES = (0.5, 1.0, 2.0)
 FINGER_M = 5e-4
 HIGH, NEAR = 0.9, 0.1
 """Rates from which a bound should be near, and how near."""
-STARTS = (4.0, 8.0)
+STARTS = (3.0, 5.0)
 """Standard deviations of translation [mm] and turn [deg] of executions."""
 MASS_KG = 0.1
 FIGURES = ("proved bound", "estimate", "disc radius", "Ferrari-Canny", "critical friction")
