@@ -54,7 +54,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from grasp_core.arrays import Amount, Array, Point, Polygon, Shape
+from grasp_core.arrays import Amount, Array, Point, Polygon, Shape, cross
 from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.decision import decided_at_once
 from grasp_core.closure.proofs import ContactCones
@@ -75,7 +75,7 @@ MOST_TURN = 1.0
 """Largest turn that may count as closed [rad]."""
 SIDES = 16
 """Corners of the polygons around discs of fingers' shifts."""
-ABOVE = np.append(np.exp2(np.arange(-1.0, -320.0, -1.0) / 8.0), 0.0)
+ABOVE = np.append(np.exp2(np.arange(-1.0, -160.0, -1.0) / 4.0), 0.0)
 """Chances of values above the ends of the intervals that a law is divided into."""
 MASS = -np.diff(ABOVE, prepend=1.0)
 """Chances of the intervals."""
@@ -240,29 +240,28 @@ def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:
     for i, (x, n, slide) in enumerate(zip(it.positions, it.normals, it.slides, strict=True)):
         d, (E, b) = x - it.center, it.edges(i) or (np.zeros((1, 3)), np.full(1, -1.0))
         # of t, w and e, (.., 9)
-        sliding = np.concatenate([n, -np.cross(n, d), np.zeros(3)])
+        sliding = np.concatenate([n, -cross(n, d), np.zeros(3)])
         Q = np.zeros((2 + len(E), 9, 9))
         Q[0, 3:6, 3:6] = 0.5 * (float(n @ d) * np.eye(3) - np.outer(n, d))
         Q[0, 3:6, :3], Q[0, 3:6, 6:] = _crossing(n), -_crossing(n)
         Q[1] = -Q[0]
         Q[2:, 3:6, 3:6] = 0.5 * (E[:, :, None] * d - (E @ d)[:, None, None] * np.eye(3))
-        for row, edge in zip(Q[2:], E, strict=True):
-            row[3:6, :3], row[3:6, 6:] = -_crossing(edge), _crossing(edge)
-        Q[2:, :, 3:6] -= sliding[:, None] * np.cross(n, E)[:, None, :]
+        Q[2:, 3:6, :3], Q[2:, 3:6, 6:] = -_crossing(E), _crossing(E)
+        Q[2:, :, 3:6] -= sliding[:, None] * cross(n, E)[:, None, :]
         left = T * float(np.linalg.norm(d)) * (2.0 / 3.0 + k) + farthest * (1.5 + k)  # (6)
         Q[:2, 3:6, 3:6] += 0.5 * slide * np.eye(3)
         Q[:, 3:6, 3:6] += left * np.eye(3)
         B = np.zeros((9, 8))
         B[:6, :6], B[6:, 6:] = off.root, off.contact_sigma * plane_frame(n)
-        linear += [sliding @ B, -sliding @ B, np.hstack([-E, -np.cross(d, E), E]) @ B]
+        linear += [sliding @ B, -sliding @ B, np.hstack([-E, -cross(d, E), E]) @ B]
         curved.append(B.T @ (0.5 * (Q + Q.swapaxes(1, 2))) @ B)
         limits += [np.full(2, slide), b - it.depth * math.tan(T)]
     return np.vstack(linear), np.vstack(curved), np.concatenate(limits)
 
 
 def _crossing(v: Array) -> Array:
-    """Return the matrix that takes u to v x u, (3, 3)."""
-    return np.cross(v, np.eye(3)).T
+    """Return the matrices that take u to v x u, (..., 3, 3)."""
+    return cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)
 
 
 def _chances_beyond(g: Array, H: Array, b: Array, special: Any) -> Array:
