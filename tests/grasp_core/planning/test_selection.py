@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,21 @@ def test_the_strongest_of_all_are_kept_in_order(small):
     values = [payloads[grasp.id] for grasp in strongest]
     best = sorted(payloads.values(), reverse=True)[:10]
     np.testing.assert_allclose(values, best, rtol=3e-4, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_those_with_the_largest_proved_chance_of_closure_are_kept_in_order(small):
+    off = {"pose_sigma_m": 2e-3, "pose_sigma_rad": math.radians(2.0)}
+
+    def chance(grasp):
+        found = gc.placement_probability(small, grasp, 0.5, **off)
+        return 0.0 if found is None else found.lower
+
+    every = gc.plan(small, 0.5).grasps
+    kept = gc.plan(small, 0.5, limit=3, rank_by="placement").grasps
+    best = sorted(map(chance, every), reverse=True)[:3]
+    np.testing.assert_allclose([chance(grasp) for grasp in kept], best, rtol=1e-5)
+    assert len(every) > 6
 
 
 def test_grasps_that_no_squeeze_holds_come_last(small, monkeypatch):
