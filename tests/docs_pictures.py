@@ -207,7 +207,7 @@ def placement():
     panel = Panel(70.0, 28.0, 500.0, 240.0, Scale(0.0, 6.0), Scale(0.0, 1.02))
     marks = [*panel.frame(np.arange(7.0), (0.0, 0.25, 0.5, 0.75, 1.0), ".2f")]
     methods = ("concurrent", "pencil", "regulus", "free")
-    for method, colour in zip(methods, FINGERS, strict=True):
+    for method, colour, dot in zip(methods, FINGERS, (6.0, 3.5, 3.5, 3.5), strict=True):
         grasp = gc.plan(body, FRICTION, families=method, limit=1).grasps[0]
         chances = []
         for size in sizes:
@@ -215,7 +215,7 @@ def placement():
             found = gc.placement_probability(body, grasp, (FRICTION, 0.05), **off)
             chances.append(0.0 if found is None else found.lower)
         places = panel.at(sizes, np.array(chances))
-        marks += [panel.curve(sizes, np.array(chances), colour), Dots(places, colour, 3.5)]
+        marks += [panel.curve(sizes, np.array(chances), colour), Dots(places, colour, dot)]
     key = [Entry(name, colour) for name, colour in zip(methods, FINGERS, strict=True)]
     below, _ = keyed(key, 70.0, 325.0, 500.0)
     names = panel.named(
