@@ -112,13 +112,12 @@ class GraspRegions(Declared):
 
     @classmethod
     def of(
-        cls, grasp: Grasp, proved: CertifiedRegions | str, proof: ProofFile | None,
-        closed_share: float | None = None,
-    ) -> "GraspRegions":  # fmt: skip
+        cls, grasp: Grasp, proved: CertifiedRegions | str, proof: ProofFile | None
+    ) -> "GraspRegions":
         """Record what was proved of a grasp, or the reason why nothing was."""
         named = (grasp.id, contacts_sha256(grasp.contacts), grasp.family, grasp.radius)
         if isinstance(proved, str):
-            return cls(*named, reason=proved, closed_share=closed_share)
+            return cls(*named, reason=proved)
         return cls(
             *named,
             regions=proved.regions,
@@ -130,7 +129,6 @@ class GraspRegions(Declared):
             friction=proved.friction,
             cones=len(proved.cover.forces),
             proof=proof,
-            closed_share=closed_share,
         )
 
     def _check_together(self) -> None:
@@ -297,7 +295,8 @@ def certified(
 
     def recorded() -> Iterator[GraspRegions]:
         for grasp, (proved, share) in zip(grasps, proofs, strict=True):
-            yield GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved), share)
+            found = GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved))
+            yield replace(found, closed_share=share)
 
     return reporter.collected(
         "certifying", recorded(), len(grasps), ("proved", lambda one: one.regions is not None),
