@@ -35,7 +35,6 @@ from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kep
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
 from grasp_core.processes import Processes
-from grasp_core.regions.certify_placement import OFF_M, OFF_RAD, placement_probability
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
@@ -344,15 +343,14 @@ def _measure(search: PlanSearch) -> tuple[Callable[[Certified], float], float]:
         return quality, SAME_SHARE
 
     if request.rank_by == "placement":
+        # slow to import, and other rankings have no use for it
+        from grasp_core.regions.certify_placement import usual_chance
 
-        def failing(found: Certified) -> float:
+        def risk(found: Certified) -> float:
             grasp = to_grasp(body, request.friction, found, search.on)
-            proved = placement_probability(
-                body, grasp, request.friction, pose_sigma_m=OFF_M, pose_sigma_rad=OFF_RAD
-            )
-            return 1.0 if proved is None else 1.0 - proved.lower
+            return 1.0 - usual_chance(body, grasp, request.friction)
 
-        return failing, SAME_SHARE
+        return risk, SAME_SHARE
 
     def lightness(found: Certified) -> float:
         points = body.radius * found.placement.positions

@@ -152,6 +152,18 @@ def placement_probability(
     return best
 
 
+def usual_chance(body: Polyhedron, grasp: Grasp, friction: float) -> float:
+    """Return the proved chance of closure if the object is off as rankings assume, 0 without one.
+
+    Raises:
+        InputError: The contacts are not on the faces.
+    """
+    proved = placement_probability(
+        body, grasp, friction, pose_sigma_m=OFF_M, pose_sigma_rad=OFF_RAD
+    )
+    return 0.0 if proved is None else proved.lower
+
+
 def _covers(sites: Sites, angle: float, cones: int) -> Iterator[tuple[float, TwistCover]]:
     """Yield covers with less and less friction, from the tangent of half an angle on."""
     least, most = 0.0, angle

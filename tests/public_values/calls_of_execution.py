@@ -148,6 +148,7 @@ CALLS = [
         "stop_m_per_s2": POSITIVE | {"for ages": 1e-6},
         "stop_from_m_per_s": POSITIVE | {"for ages": 1e6},
         "knock_n_s": optional(NOT_NEGATIVE),
+        "off_by": WORD,
         "off_mm": NOT_NEGATIVE,
         "off_deg": NOT_NEGATIVE | {"a whole turn": 360.0},
         "misplacements": AT_LEAST_ONE,
