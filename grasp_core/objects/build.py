@@ -62,6 +62,8 @@ MARGIN = 8.0
 may be off by the root of three, and a plane through three of them as far from a fourth by more."""
 COARSEST = 1e-3
 """Largest distance from a plane, over the extent, that rounding explains and shapes do not."""
+FLATTEST = 0.1
+"""Largest flatness over the extent: with much more, faces are one whose normals differ by far."""
 DEFAULT_LIMITS, DEFAULT_CHOICES = MeshLimits(), MeshChoices()
 
 
@@ -74,6 +76,11 @@ def build(
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     off = single_rounding(points) if rounding is None else rounding
     blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
+    if blur > FLATTEST * extent:
+        raise InputError(
+            f"flatness_m must be at most {FLATTEST:g} of the object's extent, which is "
+            f"{extent:.6g} m, got {blur:.6g}"
+        )
     found = sound_surface(Mesh(points, corners), blur, choices, known)
     slack = planar_slack(extent, blur)
     groups = _planar_groups(found, slack, blur, choices)

@@ -115,6 +115,8 @@ def test_a_given_flatness_decides_which_faces_are_one(tmp_path):
     strict = read("stl %g", rounded, tmp_path, offset=2.0, flatness_m=0.0)
     assert len(strict.faces) > 8
     assert strict.surface.flatness_m == 0.0
+    with pytest.raises(gc.InputError, match=r"at most 0\.1 of the object's extent"):
+        read("stl %g", rounded, tmp_path, offset=2.0, flatness_m=1.0)
     assert len(read("stl %g", rounded, tmp_path, offset=2.0).faces) == 8
 
 
