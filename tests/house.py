@@ -14,7 +14,7 @@ PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
     "lines of packages": 57_740,
     "modules of packages": 242,
-    "lines of tests": 37_927,
+    "lines of tests": 37_937,
     "lines of docs": 3_904,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -28,6 +28,7 @@ RISES = (
     " the object, the fingers and friction are off",
     "lines of packages, 57,733 to 57,740: a flatness as wide as the object",
     "lines of docs, 3,896 to 3,904: the same chance, and how well it was measured to hold",
+    "lines of tests, 37,927 to 37,937: a proof of closure without a landing",
     "lines of tests, 37,739 to 37,931: branches of proofs and their checks that no test took",
     "lines of docs, 3,784 to 3,896: sentences that are understood without their neighbours",
     "lines of packages, 57,106 to 57,116: a folder that is gone, and how far contacts may move",

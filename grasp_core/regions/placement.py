@@ -166,7 +166,7 @@ class PlacementProbability(Declared):
     def edges(self, i: int) -> tuple[Array, Array] | None:
         """Return E, (k, 3), and b [m] of (5) for a landing; None if it is no convex polygon."""
         frame, arms = plane_frame(self.normals[i]), self.landings[i] - self.positions[i]
-        size = float(np.ptp(self.landings[i], axis=0).max())
+        size = float(np.abs(arms).max(initial=0.0))  # of no corners too
         flat = convex_polygon(arms @ frame / size, PLACED)
         if flat is None or np.abs(arms @ self.normals[i]).max() > PLACED * size:
             return None

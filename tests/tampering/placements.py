@@ -31,7 +31,7 @@ def closed_share(it, rng):
     """Share of draws in which fingers meet the moved landings, and contacts there are closed."""
     moves = rng.multivariate_normal(np.zeros(6), it.off.covariance, size=COUNT, method="eigh")
     R = Rotation.from_rotvec(moves[:, 3:]).as_matrix()
-    mu = rng.normal(it.off.friction, it.off.friction_sigma, size=COUNT)
+    mu = it.off.friction + it.off.friction_sigma * rng.normal(size=COUNT)
     points, normals = np.empty((COUNT, 4, 3)), np.empty((COUNT, 4, 3))
     there = mu > 0.0
     for i, (x, n) in enumerate(zip(it.positions, it.normals, strict=True)):

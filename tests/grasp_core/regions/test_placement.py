@@ -1,6 +1,7 @@
 """Bounds on the chance of closure against draws of the motions themselves."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,6 +97,14 @@ def test_chances_that_limits_are_broken_are_not_below_what_draws_show():
         exact = special.ndtr(-b / np.linalg.norm(g, axis=1))
         assert (alone >= exact).all()
         assert np.allclose(alone, exact, rtol=1e-9, atol=1e-11)
+
+
+def test_a_proof_without_a_landing_is_refused():
+    (_, found), *_ = bounds("wedge", "concurrent")
+    for landing in (np.empty((0, 3)), np.zeros((3, 3)), found.landings[0][::-1]):
+        changed = replace(found, landings=(landing, *found.landings[1:]))
+        assert not changed.verify()
+        assert changed.estimate == 0.0
 
 
 def shaded(body, grasp):
