@@ -8,7 +8,8 @@ Fingers must meet their own faces first. Where other parts of the object are in 
 higher than fingers come from, a finger that is turned by up to T against the face passes beside a
 point at height h within h tan T. For a direction u in the plane, no finger that lands where
 u.y <= min over corners of (u.c - h tan T) meets a triangle with corners c at heights h; nor does
-one where u.y <= min u.c - H tan T, if fingers come from height H. The landings are faces, cut by
+one where u.y <= min u.c - H tan T, if fingers come from height H. Corners behind the plane only
+make the first sum, linear in the point, larger. The landings are faces, cut by
 such a half-plane for each triangle in front of them.
 """
 
@@ -22,11 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Shape, frozen, frozen_each
-from grasp_core.closure.contacts import stacked
 from grasp_core.geometry.polygons import clip, tidy
 from grasp_core.kinds import LARGEST, Friction, MaxCones, number, value_of
 from grasp_core.objects.face_pieces import THINNEST, FacePiece
 from grasp_core.objects.on_faces import check_on_faces
+from grasp_core.objects.planar_faces import planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_regions import Unit, pieces_under
 from grasp_core.regions.growth import Sites, search_cover, twist_axes
@@ -88,7 +89,7 @@ def placement_probability(
 
     Returns:
         The bound with its proof; None where other parts of the object hide a contact from its
-        finger, or where no proof is found.
+        finger, where the surface is curved, or where no proof is found.
 
     Raises:
         InputError: The contacts are not on the faces, or a number is out of its range.
@@ -106,18 +107,25 @@ def placement_probability(
     shift = number(contact_sigma_m, "contact_sigma_m", least=0.0, most=LARGEST)
     off = Misplacement(covariance, shift, mean, sigma)
     cones = value_of(MaxCones, max_cones, "max_cones")
-    positions, normals = stacked(grasp.contacts)
-    unit = Unit(body, positions)
+    unit = Unit(body, grasp.positions)
     pieces = pieces_under(body, grasp, unit, 0.0)
-    if pieces is None:
+    if pieces is None or body.patches is not None:
         return None
-    arms = np.hstack([normals, -np.cross(normals, positions - body.center_of_mass)])
-    slides = np.linalg.norm(arms @ off.root, axis=1)
+    # contacts may be off their faces by rounding
+    feet = [piece.in_plane(x) for piece, x in zip(pieces, unit.at(grasp.positions), strict=True)]
+    feet = [p.origin + p.frame @ y for p, y in zip(pieces, feet, strict=True)]
+    positions, normals = unit.back(np.array(feet)), np.array([p.normal for p in pieces])
+    d = positions - body.center_of_mass
+    slides = np.linalg.norm(np.hstack([normals, -np.cross(normals, d)]) @ off.root, axis=1)
+    turned = float(np.linalg.norm(off.root[3:], 2))
+    slides = np.hypot(slides, turned**2 * np.linalg.norm(d, axis=1))  # of second order too
     height = BEHIND * PRISMS[0][1] * float(slides.max()) / unit.scale
     surface = unit.at(body.vertices)[body.triangles]
+    slack = planar_slack(float(np.ptp(body.vertices, axis=0).max()), body.surface.flatness_m)
+    slack /= unit.scale
     seen = [
-        _seen(piece, x, surface, height, math.tan(off.turn))
-        for piece, x in zip(pieces, unit.at(positions), strict=True)
+        _seen(piece, x, surface, slack, height, math.tan(off.turn))
+        for piece, x in zip(pieces, feet, strict=True)
     ]
     if min(map(len, seen)) == 0:
         return None
@@ -125,7 +133,7 @@ def placement_probability(
         unit.back(piece.origin + corners @ piece.frame.T)
         for piece, corners in zip(pieces, seen, strict=True)
     ]
-    lean, depth = (max(each) for each in zip(*((p.spread, p.depth) for p in pieces), strict=True))
+    lean, depth = max(p.spread for p in pieces), max(p.depth for p in pieces) + slack
     made = partial(
         PlacementProbability, off=off, center=body.center_of_mass, positions=positions,
         normals=normals, landings=four(landings), lean=lean, depth=unit.scale * depth,
@@ -179,15 +187,18 @@ def _covers(sites: Sites, angle: float, cones: int) -> Iterator[tuple[float, Twi
             yield friction, cover
 
 
-def _seen(piece: FacePiece, x: Array, surface: Array, height: float, slope: float) -> Array:
+def _seen(
+    piece: FacePiece, x: Array, surface: Array, slack: float, height: float, slope: float
+) -> Array:
     """Cut from a piece what triangles (t, 3, 3) in front of it may hide, (c, 2); (0, 2) if x is.
 
-    `height` is that from which fingers come, and `slope` the tangent of their largest angle to the
-    normal.
+    Triangles within `slack` of the plane are the face itself. `height` is that from which fingers
+    come, and `slope` the tangent of their largest angle to the normal.
     """
     corners, y = piece.corners, piece.in_plane(x)
     heights = (x - surface) @ piece.normal
     ahead = (heights.max(axis=1) > IN_FRONT) & (heights.min(axis=1) < height)
+    ahead &= np.abs(heights).max(axis=1) > slack
     flat = (surface[ahead] - piece.origin) @ piece.frame
     for at, above in zip(flat, heights[ahead], strict=True):
         sides = at - np.roll(at, 1, axis=0)

@@ -19,9 +19,11 @@ proves closure for all such motions at once, where each |e_i| <= E and |s_i| <= 
 
     |w| + atan m <= atan mu,                                                                (3)
 
-since a force within atan m of n_i is then within atan mu of n'_i. The polygons of `certify_regions`
-prove less of this: they let the contacts move on their faces independently, while one motion of the
-object moves all of them alike, which hardly changes the wrenches between them.
+since a force within atan m of n_i is then within atan mu of n'_i. Where the true surface leans by
+up to a `lean` against its plane, that is added to |w|; where it is up to a `depth` off its plane,
+fingers meet it within depth / cos T along their lines and depth tan T beside them. The polygons of
+`certify_regions` prove less of this: they let the contacts move on their faces independently, while
+one motion of the object moves all of them alike, which hardly changes the wrenches between them.
 
 Series. The finger meets its face where E_k.y <= b_k, with unit edge normals E_k in the plane of the
 face, and with y = R'(d_i + e_i - t + s_i n_i) - d_i. Write a = w x n_i. To second order
@@ -30,16 +32,18 @@ face, and with y = R'(d_i + e_i - t + s_i n_i) - d_i. Write a = w x n_i. To seco
     E_k.y = E_k.(e_i - t - w x d_i)       + E_k.(w x (w x d_i) / 2 - w x (e_i - t))
                                           - (n_i.t - a.d_i) (E_k.a),                         (5)
 
-and |s_i| <= S_i if |s_i n_i.n'_i| + S_i |w|^2 / 2 <= S_i. The parts of R beyond second and third
-order are at most |w|^2 / 2 and |w|^3 / 6. With |w| <= T <= 1 and k = 1 / cos T, all that (4) and
-(5) leave out is then at most |w|^2 times
+and |s_i| <= S_i if |s_i n_i.n'_i| + S_i |w|^2 / 2 <= S_i, since n_i.n'_i >= 1 - |w|^2 / 2. What R
+has from second order on is at most |w|^2 / 2, and from third order on |w|^3 / 6. With |w| <= T <= 1
+and k = 1 / cos T, all that (4) and (5) leave out is then at most |w|^2 times
 
     |w| |d_i| (2/3 + k (1 + T) / 2) + (|t| + |e_i|) (3/2 + k (1 + T) / 2).                  (6)
 
 Chance. In unit normal variables z, (4) and (5) are sigma g + z'Hz, with g normal; and (6) is part
 of H, once t, w and e_i are bounded by their `REACH`. Where w = 0 nothing is left of z'Hz, so at
-most three eigenvalues of H are positive, as many as w has coordinates. Let l be the largest, or
-zero if that is more. A limit b is then broken with at most the chance that
+most three eigenvalues of H are positive, as w has three coordinates. Let l be the largest, or zero
+if that is more. Then z'Hz is at most l times the squared length of z in the space of three vectors
+and the gradient of g: g^2, and at most three more coordinates, which do not depend on g. So a limit
+b is broken with at most the chance that
 
     sigma g + l (g^2 + q) > b,    q of the chi-square law of 3 variables,                    (7)
 
@@ -115,8 +119,9 @@ class Misplacement(Declared):
 class PlacementProbability(Declared):
     """A proved lower bound of the chance that a grasp is closed wherever fingers meet the object.
 
-    Fingers come along the planned normals, from no farther behind the planned contacts than twice
-    their `slides`.
+    Fingers come along the planned normals, from at least their `slides` and at most twice the
+    largest behind the planned contacts. The object does not move before all have come, and its
+    errors, those of fingers and of friction do not depend on each other.
     """
 
     lower: Share
@@ -151,8 +156,9 @@ class PlacementProbability(Declared):
     def verify(self) -> bool:
         """Check again that the cover holds, and that the chance of closure is at least `lower`.
 
-        Whoever has the object checks that `landings` are parts of its faces that nothing hides, and
-        that `lean` and `depth` are those of these faces.
+        Whoever has the object checks that `landings` are parts of faces with these `normals`, that
+        no finger within `off.turn` of a normal meets another part first, that `lean` and `depth`
+        are those of these faces, and that the object turns about `center`.
         """
         if not (self.is_sound() and self.off.is_sound() and self.scale > 0.0):
             return False
@@ -215,7 +221,7 @@ def bound(it: PlacementProbability) -> float:
     special: Any = importlib.import_module("scipy.special")
     failing = chance_of_turning(it) + 2.0 * float(special.chdtrc(3, REACH**2)) + ROUNDING
     if it.off.contact_sigma:
-        failing += FINGERS * math.exp(-0.5 * (it.shift / it.off.contact_sigma) ** 2)
+        failing += FINGERS * float(np.exp(-0.5 * np.square(it.shift / it.off.contact_sigma)))
     failing += float(_chances_beyond(*_limits(it), special).sum())
     return max(0.0, 1.0 - failing)
 
@@ -275,5 +281,6 @@ def _chances_beyond(g: Array, H: Array, b: Array, special: Any) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = special.ndtr(-2.0 * left / roots)
         before = np.where(top > 0.0, special.ndtr(-roots / (2.0 * top)), 0.0)
-    each = np.where(square > 0.0, np.minimum(beyond + before, 1.0), 1.0)
+    known = np.where((sigma == 0.0) & (top == 0.0) & (left >= 0.0), 0.0, 1.0)
+    each = np.where(square > 0.0, np.minimum(beyond + before, 1.0), known)
     return each @ MASS[:-1] + MASS[-1]

@@ -107,6 +107,33 @@ def test_a_proof_without_a_landing_is_refused():
         assert changed.estimate == 0.0
 
 
+def test_faces_off_their_planes_by_rounding_are_not_in_the_way_of_fingers():
+    """As in a file of single precision."""
+    box = example_object("box")
+    turn = Rotation.from_rotvec([0.3, -0.7, 0.4]).as_matrix()
+    points = (box.vertices @ turn.T).astype(np.float32).astype(float)
+    body = gc.Polyhedron.from_mesh(points, box.triangles)
+    off = {"pose_sigma_m": 1e-3, "pose_sigma_rad": 0.0175}
+    exact, rounded = (
+        gc.placement_probability(each, gc.plan(each, 0.5, limit=1).grasps[0], 0.5, **off).lower
+        for each in (box, body)
+    )
+    assert rounded == pytest.approx(exact, abs=1e-3)
+    assert exact > 0.99
+
+
+@pytest.mark.parametrize(
+    "off",
+    [{}, {"contact_sigma_m": 5e-4}, {"pose_sigma_m": (0.0, 0.0, 1e-4)},
+     {"pose_sigma_rad": (0.0, 0.0, 1e-3)}],
+)  # fmt: skip
+def test_errors_that_move_no_contact_along_its_finger_are_harmless(off):
+    body = example_object("box")
+    found = gc.placement_probability(body, gc.plan(body, 0.5, limit=1).grasps[0], 0.5, **off)
+    assert found.lower > 0.9
+    assert found.verify()
+
+
 def shaded(body, grasp):
     """Whether parts of the object are in front of a face that a finger stands on."""
     heights = np.einsum("kvi,ki->kv", grasp.positions[:, None] - body.vertices, grasp.normals)
