@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 57_758,
+    "lines of packages": 57_764,
     "modules of packages": 242,
-    "lines of tests": 37_964,
+    "lines of tests": 37_965,
     "lines of docs": 3_904,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -24,11 +24,11 @@ RISES = (
     "lines of packages, 57,116 to 57,123: names of modules that say more are longer",
     "lines of packages, 57,123 to 57,146, modules, 239 to 240: proofs of absence have a module",
     "lines of packages, 57,146 to 57,150: workers of Ray run at the niceness of the build",
-    "lines of packages, 57,150 to 57,751, modules, 240 to 242: a proved chance of closure where"
+    "lines of packages, 57,150 to 57,757, modules, 240 to 242: a proved chance of closure where"
     " the object, the fingers and friction are off",
-    "lines of packages, 57,751 to 57,758: a flatness as wide as the object",
+    "lines of packages, 57,757 to 57,764: a flatness as wide as the object",
     "lines of docs, 3,896 to 3,904: the same chance, and how well it was measured to hold",
-    "lines of tests, 37,927 to 37,964: forged landings, rounded faces, and harmless errors",
+    "lines of tests, 37,927 to 37,965: forged landings, rounded faces, and harmless errors",
     "lines of tests, 37,739 to 37,931: branches of proofs and their checks that no test took",
     "lines of docs, 3,784 to 3,896: sentences that are understood without their neighbours",
     "lines of packages, 57,106 to 57,116: a folder that is gone, and how far contacts may move",

@@ -95,8 +95,6 @@ def placement_probability(
         InputError: The contacts are not on the faces, or a number is out of its range.
     """
     check_on_faces(body, grasp)
-    mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
-    value_of(Friction, mean, "friction")
     axes = [
         value_of(Deviations, frozen_each(each, 3, name), name)
         for name, each in (("pose_sigma_m", pose_sigma_m), ("pose_sigma_rad", pose_sigma_rad))
@@ -104,9 +102,17 @@ def placement_probability(
     covariance = np.diag(np.concatenate(axes) ** 2)
     if pose_covariance is not None:
         covariance = frozen(pose_covariance, (6, 6), "pose_covariance")
+    mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
+    value_of(Friction, mean, "friction")
     shift = number(contact_sigma_m, "contact_sigma_m", least=0.0, most=LARGEST)
     off = Misplacement(covariance, shift, mean, sigma)
-    cones = value_of(MaxCones, max_cones, "max_cones")
+    return _searched(body, grasp, off, value_of(MaxCones, max_cones, "max_cones"))
+
+
+def _searched(
+    body: Polyhedron, grasp: Grasp, off: Misplacement, cones: int
+) -> PlacementProbability | None:
+    """Return the best bound of all prisms and frictions that are tried, if a proof is found."""
     unit = Unit(body, grasp.positions)
     pieces = pieces_under(body, grasp, unit, 0.0)
     if pieces is None or body.patches is not None:
@@ -145,12 +151,12 @@ def placement_probability(
         sites = Sites(
             unit.at(positions),
             np.array([np.column_stack([p.normal, p.frame]) for p in pieces]),
-            np.full(FINGERS, mean),
+            np.full(FINGERS, off.friction),
             np.zeros((FINGERS, 1, 2)),
             np.full(FINGERS, shift / math.cos(math.pi / SIDES) / unit.scale),
             slide / unit.scale + depth / math.cos(off.turn),
         )
-        for least, cover in _covers(sites, math.atan(mean) - lean, cones):
+        for least, cover in _covers(sites, math.atan(off.friction) - lean, cones):
             found = made(lower=0.0, slides=slide, shift=shift, least_friction=least, cover=cover)
             found = replace(found, lower=max(0.0, bound(found) - ROUNDED))
             if best is None or found.lower > best.lower:

@@ -47,7 +47,7 @@ def test_fingers_that_meet_the_object_are_closed_as_often_as_proved(name, family
 
 
 def test_series_are_above_the_exact_motions():
-    """Of each draw within the reach, the exact slide and place are at most g.z + z'Hz."""
+    """The exact slide and place of each draw within the reach are at most g.z + z'Hz."""
     (_, found), *_ = bounds("l-bracket", "concurrent", shift=1e-3)
     rng, off = np.random.default_rng(0), found.off
     z = 1.5 * rng.normal(size=(4000, 14))
@@ -108,7 +108,7 @@ def test_a_proof_without_a_landing_is_refused():
 
 
 def test_faces_off_their_planes_by_rounding_are_not_in_the_way_of_fingers():
-    """As in a file of single precision."""
+    """The object is one as a file of single precision holds it."""
     box = example_object("box")
     turn = Rotation.from_rotvec([0.3, -0.7, 0.4]).as_matrix()
     points = (box.vertices @ turn.T).astype(np.float32).astype(float)

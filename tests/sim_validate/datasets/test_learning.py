@@ -57,6 +57,7 @@ def test_closure_figures_are_those_of_the_contacts(grasps):
 
 def test_proved_chances_of_closure_are_those_of_the_grasps(grasps):
     assert {row["closed_share"] is None for row in grasps} == {True, False}
+    assert {row["kind"] for row in grasps} >= {"planned", "friction_above"}
     for row in grasps:
         assert (row["closed_share"] is not None) == row["force_closed"]
         if row["kind"] == "planned":
