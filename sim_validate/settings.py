@@ -212,8 +212,8 @@ class ChosenExecution(Holding):
     """Impulse of a knock [N s], 0 for no knocks. If not given, the one that gives a free object of
     that mass 1/6 m/s: 0.05 N s for 0.3 kg."""
     off_by: OffBy = "exactly"
-    """Whether a misplaced object is off by exactly the next two, in random directions, or by normal
-    errors along and about each axis with these standard deviations, as in `regions`."""
+    """Whether a misplaced object is off by exactly `off_mm` and `off_deg`, in random directions, or
+    by normal errors along and about each axis with these standard deviations, as in `regions`."""
     off_mm: NotNegative = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
     off_deg: Annotated[float, Range(least=0.0, most=180.0)] = 2.0
