@@ -18,7 +18,7 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import islice
@@ -34,6 +34,8 @@ LENGTH = struct.Struct("<Q")
 """How many bytes of a message follow."""
 AHEAD = 8
 """Number of tasks per process that are handed out before the first of them is done."""
+LOOK_S = 0.1
+"""Time between two looks whether to stop, while another process works [s]."""
 COLLECTED_AFTER = 50_000
 """New objects after which unused circles are looked for: nearly all results are freed when sent."""
 
@@ -77,8 +79,12 @@ class Processes:
     def in_order(
         self, function: Callable[[Task], Result], tasks: Iterable[Task], *,
         here: Callable[[Task], Result] | None = None, ahead: int = AHEAD,
+        stop: Callable[[], bool] | None = None,
     ) -> Generator[Result]:  # fmt: skip
-        """Yield the result of each task, in order; this process helps, by `here` if given."""
+        """Yield the result of each task, in order; this process helps, by `here` if given.
+
+        Results that are not ready when `stop` says so are dropped.
+        """
         coming, line, mine = iter(tasks), deque[_Asked](), here or function
         try:
             while True:
@@ -90,6 +96,10 @@ class Processes:
                 while not first.future.done() and (other := self._unclaimed()):
                     _do(mine, other.task, other.future)
                     self._done_here += 1
+                while stop is not None and not first.future.done():
+                    if stop():
+                        return
+                    wait([first.future], LOOK_S)
                 try:
                     result = first.future.result()
                 except ProcessEndedError:

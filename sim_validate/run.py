@@ -7,6 +7,7 @@ from grasp_core.errors import GraspError
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import plan_to_json
+from grasp_core.stopping import Stop
 from sim_validate.closure.command import prepared, simulate_grasps
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Agenda, Setup
@@ -21,8 +22,16 @@ from sim_validate.kit.files import (
     remove_results,
     require_report_folder,
 )
+from sim_validate.kit.workers import interrupts_end
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
-from sim_validate.planning.plan import plan_object, say_counts, show_gains, with_regions
+from sim_validate.planning.plan import (
+    plan_object,
+    ready,
+    say_counts,
+    say_ended,
+    show_gains,
+    with_regions,
+)
 from sim_validate.report.command import shown_report
 
 RESULTS = Path("graspproof-out")
@@ -59,40 +68,51 @@ def _run_in(
     trials: tuple[Setup, Agenda],
     reporter: Reporter,
 ) -> int:
-    (setup, agenda), jobs = trials, command.testing.jobs
+    (setup, agenda), jobs, planning = trials, command.testing.jobs, command.planning
     execution = execution_of_run(command, body)
-    found = plan_object(body, command.planning, jobs, reporter)
-    remove_results(folder)
-    found = with_regions(body, found, command.planning, folder, jobs, reporter)
-    write_text(folder / "grasps.json", plan_to_json(body, found))
+    ready(jobs, reporter)
+    stop, later = Stop(seconds=planning.time_limit_s), 1 + command.execute
+    with interrupts_end(stop):
+        found = plan_object(body, planning, jobs, stop, planning.regions + later, reporter)
+        remove_results(folder)
+        proving = stop.part(1 + later)
+        found = with_regions(body, found, planning, folder, jobs, proving, reporter)
+        write_text(folder / "grasps.json", plan_to_json(body, found))
     say_counts(body, found, reporter)
+    early = say_ended(found, reporter)
     if found.absence:
         reporter.say(found.absence)
         reporter.document({"absence": found.absence, "out": str(folder)})
-        return Exit.NONE
+        return early or Exit.NONE
     if found.moves:
         show_gains(found.moves, reporter)
+    if stop.asked:
+        return Exit.INTERRUPTED
     for grasp in found.grasps:
         scene = setup.scene(body, grasp, found.friction)
         write_text(folder / "scenes" / f"{grasp.id}.xml", scene.xml)
     code, verdicts = simulate_grasps(
-        found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter
+        found, setup, agenda, jobs=jobs, folder=folder, reporter=reporter, stop=stop.part(later)
     )
     reporter.say(f"results in {folder}/: grasps.json, verdicts.json, scenes/")
+    complete = verdicts.complete
     try:
         document = verdicts.document()
         if execution is not None:
             survival, executions = execute_grasps(
-                found, execution, jobs=jobs, folder=folder, reporter=reporter
+                found, execution, jobs=jobs, folder=folder, reporter=reporter, stop=stop
             )
             document["executions"] = executions.document()
-            code = max(code, survival)
+            code, complete = max(code, survival), complete and executions.complete
         reporter.document(document)
     except GraspError:  # the other results are complete, so that pages can show them
         _report(command, folder, reporter)
         raise
     _report(command, folder, reporter)
-    return code
+    if not complete:
+        reporter.warn("the time limit ended the trials: not all grasps have results")
+        early = Exit.PARTIAL
+    return max(code, early)
 
 
 def _report(command: command_flags.Run, folder: Path, reporter: Reporter) -> None:

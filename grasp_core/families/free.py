@@ -50,7 +50,7 @@ is that of Omata's virtual fingers (1991), the rest is this project's.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 
@@ -68,6 +68,7 @@ from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.qp import least_distance
 from grasp_core.solvers.ties import graded
+from grasp_core.stopping import never
 from grasp_core.values import FINGERS, four
 
 SMALLER = 0.5
@@ -256,14 +257,15 @@ def place_free(
     cells: int = 1,
     restarts: int = RESTARTS,
     whole: ClosureCertificate | None = None,
+    stop: Callable[[], bool] = never,
 ) -> Placement | Absence | Undecided:
-    """Find a grasp of four convex pieces, or prove that there is none."""
+    """Find a grasp of four convex pieces, or prove that there is none, until told to stop."""
     if not friction > 0.0:
         raise InputError(f"friction must be greater than 0, got {friction}")
     leaves: list[tuple[Path, ClosureCertificate]] = []
     waiting: list[tuple[float, Path]] = [(0.0, ())]
     examined = 0
-    while waiting and examined < cells:
+    while waiting and examined < cells and not stop():
         _, path = heappop(waiting)
         part = part_at(pieces, path)
         known = None if path else whole

@@ -65,6 +65,7 @@ from grasp_core.solvers.ties import (
     on_grid,
     surpassing,
 )
+from grasp_core.stopping import never
 from grasp_core.values import FINGERS
 
 SEARCH_GAP = 1e-3
@@ -146,15 +147,17 @@ class ContactFaces:
         closed = found.polytope is not None
         return Height(found.lower, partial(self.nearest_planes, found, length) if closed else None)
 
-    def climb(self, y: Array, measure: Measure = FERRARI_CANNY) -> tuple[Array, Height]:
+    def climb(
+        self, y: Array, measure: Measure = FERRARI_CANNY, stop: Callable[[], bool] = never
+    ) -> tuple[Array, Height]:
         """Move contacts uphill to a local optimum of the quality or of a task's loads, (k, 2).
 
-        Steps are taken as long as they are predicted to be worthwhile.
+        Steps are taken as long as they are predicted to be worthwhile, and until told to stop.
         """
         worthwhile = TASK_WORTHWHILE if measure.name == "task" else WORTHWHILE
         found, reach = self.height(measure, y), FIRST_REACH
         for _ in range(MOST_STEPS):
-            if found.planes is None or reach < LEAST_REACH:
+            if found.planes is None or reach < LEAST_REACH or stop():
                 break
             step, predicted = self.step(y, found.lower, found.planes(), reach)
             if predicted <= worthwhile * found.lower:
@@ -254,7 +257,7 @@ def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Foun
         if best is None or found.quality.lower > surpassing(best.quality.lower):
             best = found
         climbs += 1
-        if climbs == CLIMBED:
+        if climbs == CLIMBED or searching.stop():
             break
     return best if best is not None and best.quality.lower > 0.0 else None
 
@@ -281,7 +284,7 @@ def _closed_sets(
     closed: list[tuple[Indices, Array]] = []
     rated: list[float] = []
     for place, k in enumerate(np.argsort(-bounds, kind="stable")[:MOST_RATED]):
-        if place >= RATED and len(closed) >= CLIMBED:
+        if (place >= RATED and len(closed) >= CLIMBED) or (closed and searching.stop()):
             break
         chosen = sets[k]
         wrenches = searching.wrenches(on[chosen], at[chosen])
@@ -301,7 +304,7 @@ def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Fou
     if best.quality.lower <= 0.0:
         return best
     faces = ContactFaces(pieces, searching.friction)
-    moved, _ = faces.climb(at, searching.measure)
+    moved, _ = faces.climb(at, searching.measure, searching.stop)
     there = searching.measured(np.array(on), moved)
     inside = all(
         float((piece.E @ y - piece.b).max()) <= 0.0 for piece, y in zip(pieces, moved, strict=True)

@@ -59,7 +59,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import begin, climbed, piece_at
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
 from grasp_core.optimizing.contact_places import UNIT, Grounds, exact_maps, grounds_of, grounds_on
-from grasp_core.optimizing.search import EXACT_GAP, Searching, Stop
+from grasp_core.optimizing.search import EXACT_GAP, Searching
 from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, CutTree
 from grasp_core.planning.certify import named
 from grasp_core.quality.ferrari_canny import FerrariCanny
@@ -71,6 +71,7 @@ from grasp_core.quality.measures import (
     measured_set,
 )
 from grasp_core.solvers.ties import few_digits, surpassing
+from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp, four
 
 PLACED = 1e-7  # largest distance between equal points, and directions, in object radii
@@ -237,7 +238,8 @@ class Levels:
                 while self.best.quality.lower < share * (1.0 - SAME) * self.searching.proof.bound:
                     wanted = few_digits(self.best.quality.lower / share, grain)
                     if not self._refuted(wanted, grain):
-                        return "time" if self.searching.stop() else "undivided"
+                        stop = self.searching.stop
+                        return stop.why if stop() else "undivided"
         except KeyboardInterrupt:
             return "interrupt"
         return "gap"
@@ -303,7 +305,7 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         friction: Coulomb coefficient at every contact.
         gap: Share of the bound that the quality may be below it.
         time_limit_s: Time after which the search stops with the gap reached [s]; it may take some
-            seconds more.
+            seconds more, until contacts in force closure are found.
         measure: What is maximised, with normal forces that sum to one newton: the Ferrari-Canny
             quality `l1`, with torques about the centre of mass over the object's radius; the
             `weight` that is held in every orientation [N]; or the multiple of all wrenches of a
@@ -324,21 +326,39 @@ def best_grasp(  # noqa: PLR0913 - each is a quantity of its own
         InputError: An argument is out of range, or no contacts in force closure are found.
         SolverError: A program's answer failed its check.
     """
-    check_planar(body, "best_grasp")
+    if time_limit_s is not None:
+        value_of(TimeLimit, time_limit_s, "time_limit_s")
+    return best_until(
+        Stop(seconds=time_limit_s), body, friction, gap=gap, measure=measure, wrenches=wrenches,
+        clearance=clearance, seed=seed, jobs=jobs, progress=progress,
+    )  # fmt: skip
+
+
+def best_until(  # noqa: PLR0913 - as `best_grasp`
+    stop: Stop, body: Polyhedron, friction: float, *, gap: float, measure: MeasureName,
+    wrenches: ArrayLike | None, clearance: float | None, seed: int, jobs: int,
+    progress: Callable[[GapAt], None] | None,
+) -> BestGrasp:  # fmt: skip
+    """Do what `best_grasp` does until told to stop."""
+    clearance = checked_clearance(body, clearance)
     friction, seed = value_of(Friction, friction, "friction"), value_of(Seed, seed, "seed")
     value_of(Gap, gap, "gap")
     loads = Measure.of(measure, wrenches, body.radius)
     jobs = min(value_of(Count, jobs, "jobs"), MOST_JOBS)
     if progress is not None:
         function(progress, "progress")
-    if time_limit_s is not None:
-        value_of(TimeLimit, time_limit_s, "time_limit_s")
-    if clearance is None:
-        clearance = FINGER_RADIUS * body.radius
-    number(clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m")
-    stop = Stop(seconds=time_limit_s)
     levels = Levels(body, friction, loads, clearance, seed, jobs, stop, progress)
     return levels.result(levels.closed_to(gap))
+
+
+def checked_clearance(body: Polyhedron, clearance: float | None) -> float:
+    """Return how far contacts stay from edges [m]; refuse curved objects, and false distances."""
+    check_planar(body, "best_grasp")
+    if clearance is None:
+        clearance = FINGER_RADIUS * body.radius
+    return number(
+        clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m"
+    )
 
 
 SMALLEST_GAP, LARGEST_GAP = 1e-3, 0.9

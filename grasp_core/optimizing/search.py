@@ -13,7 +13,6 @@ loosest threshold first (see `best_grasp`).
 """
 
 import math
-import time
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -38,6 +37,7 @@ from grasp_core.optimizing.support_cuts import SEARCHED_BELOW, CutTree, Slack
 from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import FERRARI_CANNY, Measure, ResistedLoads, measured_set
 from grasp_core.solvers.ties import few_digits, first_best, on_grid
+from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS
 
 Nodes: TypeAlias = tuple[Array, Indices, Indices]
@@ -81,26 +81,6 @@ support of all polygons is smaller."""
 FIRST_STEPS = 60  # steps of these descents: they settle within it
 ROUNDED_UP = 1e-6
 """Share by which a threshold is rounded up at least, and less than three times as much."""
-
-
-class Stop:
-    """Tells threads to stop: when asked, after a time, or one thread after some nodes."""
-
-    def __init__(self, nodes: float = math.inf, seconds: float | None = None) -> None:
-        self._left = nodes
-        self._end = math.inf if seconds is None else time.monotonic() + seconds
-
-    def __call__(self) -> bool:
-        """Return whether to stop."""
-        return self._left <= 0 or time.monotonic() >= self._end
-
-    def now(self) -> None:
-        """Stop."""
-        self._left = 0
-
-    def spend(self, nodes: int) -> None:
-        """Take note that a thread has visited so many nodes."""
-        self._left -= nodes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

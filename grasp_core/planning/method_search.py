@@ -58,6 +58,7 @@ from grasp_core.planning.quadruples import (
 )
 from grasp_core.planning.result import COMPLETE_PARTS, FAMILIES, MethodCounts, PlanRequest, Tally
 from grasp_core.solvers.ties import coarse, graded
+from grasp_core.stopping import never, until
 from grasp_core.values import FaceQuadruple, ForceCone, four
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 32, 2048
@@ -187,6 +188,8 @@ class FamilySearch:
     shapes: Shapes
     friction: float
     kept: MethodSearch  # what is found and kept; grasps kept meanwhile raise the threshold
+    stop: Callable[[], bool] = never
+    """Whether to end the search with what was found by then."""
 
     @cached_property
     def _settling(self) -> Settling:
@@ -229,30 +232,32 @@ class FamilySearch:
 
     def _in_order(self, blocks: Blocks, places: range) -> Iterator[tuple[Attempt, ...]]:
         """Yield the attempts on each quadruple: over many blocks with a limit, or one by one."""
-        rooms, make = blocks
         if self.construction.limits is not None:
             size = 1 if self.kept.limit is None else TOGETHER
             for start in range(0, len(places), size):
                 some = places[start : start + size]
-                if float(rooms[some].max()) > self.least:
+                if float(blocks.rooms[some].max()) > self.least:
                     yield from self.best_first(blocks, some)
             return
         worth = self.construction.least
         for place in places:
-            if self.kept.full:
+            if self.kept.full or self.stop():
                 return
-            wide, _ = make(place).ranked(self.construction, worth)
+            wide, _ = blocks.make(place).ranked(self.construction, worth)
             yield from takewhile(lambda _: not self.kept.full, self._in_rows(wide, worth))
 
     def best_first(self, blocks: Blocks, places: range) -> Iterator[tuple[Attempt, ...]]:
         """Yield the attempts on each quadruple whose bound exceeds the threshold, best first."""
-        rooms, make = blocks
         queue = [
-            Waiting((-float(rooms[place]), BLOCK, (place,)), partial(self._made, make, place))
+            Waiting(
+                (-float(blocks.rooms[place]), BLOCK, (place,)),
+                partial(self._made, blocks.make, place),
+            )
             for place in places
         ]
         heapify(queue)
-        while queue:  # each turn takes rows from finite tables, at least one
+        # each turn takes rows from finite tables, at least one
+        while queue and not self.stop():
             head = heappop(queue)
             worth = self.least  # it rises while grasps are found
             if head.bound <= worth:
@@ -266,6 +271,8 @@ class FamilySearch:
     def _in_rows(self, wide: WideQuadruples, worth: float) -> Iterator[tuple[Attempt, ...]]:
         """Yield the attempts on quadruples whose bound exceeds `worth`, in the table's order."""
         for start in range(0, len(wide), SMALLEST_CHUNK):
+            if self.stop():
+                return
             rows = slice(start, start + SMALLEST_CHUNK)
             coned, bounds = wide.coned(rows).ranked(self.construction)
             for item in self._tightened(coned, bounds, slice(0, len(coned)), worth):
@@ -378,19 +385,22 @@ Placed: TypeAlias = tuple[Pieces, Placement]
 
 def found_on(
     on: Standard, to_try: Sequence[FaceQuadruple], request: PlanRequest, gathered: Gathered,
-    again: bool,
+    again: bool, stop: Callable[[], bool] = never,
 ) -> Iterator[Certified | None]:  # fmt: skip
-    """Decide quadruples together, or `again` with more parts; yield the grasp on each, or None."""
+    """Decide quadruples together, or `again` with more parts; yield the grasp on each, or None.
+
+    If `stop` says so, those that are left are not tried.
+    """
     if again:
         request = replace(request, max_face_parts=COMPLETE_PARTS)
-    else:
-        gathered.tally["tried"] += len(to_try)
-    search = _FreeSearch(on, request, gathered)
+    search = _FreeSearch(on, request, gathered, stop)
     known = {} if again else search.patches(to_try)
-    placed = [search.placed_on(faces, known.get(faces)) for faces in to_try]
+    placed = [search.placed_on(faces, known.get(faces)) for faces in until(stop, to_try)]
+    if not again:
+        gathered.tally["tried"] += len(placed)
     tilted = [each for each in placed if each] if search.upgrades else []
     choices = iter(cones_around(tilted, request.theta) if tilted else ())
-    for faces, each in zip(to_try, placed, strict=True):
+    for faces, each in zip(to_try, placed, strict=False):  # fewer if stopped
         yield search.certified(faces, each, next(choices, ())) if each else None
 
 
@@ -401,6 +411,7 @@ class _FreeSearch:
     on: Standard
     request: PlanRequest
     gathered: Gathered
+    stop: Callable[[], bool]
 
     @cached_property
     def upgrades(self) -> list[Construction]:
@@ -478,6 +489,8 @@ class _FreeSearch:
             answers.append((pieces, self._place(pieces, rng, restarts=0)))
             if isinstance(answers[-1][1], Placement):
                 return answers
+            if self.stop():
+                break
         if isinstance(answers[0][1], Undecided):
             pieces, _ = answers.pop(0)
             answers.append((pieces, self._place(pieces, rng)))
@@ -521,7 +534,7 @@ class _FreeSearch:
         try:
             return place_free(
                 pieces, self._friction(pieces), rng=rng, cells=self.request.max_face_parts,
-                restarts=restarts, whole=known,
+                restarts=restarts, whole=known, stop=self.stop,
             )  # fmt: skip
         except SolverError:
             return Undecided(1.0)

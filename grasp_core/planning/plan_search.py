@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import chain, combinations, islice, zip_longest
-from typing import TypeAlias
+from itertools import chain, combinations, islice, repeat, zip_longest
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
@@ -36,8 +36,10 @@ from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
 from grasp_core.processes import Processes
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
+from grasp_core.stopping import never, until
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
+Item = TypeVar("Item")
 Progress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
 BATCH, LIMITED_BATCH = 1024, 64
@@ -88,11 +90,14 @@ class PlanSearch:
     """The search of each method that is asked for; the free method comes last."""
     workers: Processes | None = None
     """Other processes that search parts; None where this one is alone."""
+    stop: Callable[[], bool] = never
+    """Whether to end the search with what was found by then."""
 
     @classmethod
     def of(
-        cls, body: Polyhedron, request: PlanRequest, workers: Processes | None = None
-    ) -> "PlanSearch":
+        cls, body: Polyhedron, request: PlanRequest, workers: Processes | None = None,
+        stop: Callable[[], bool] = never,
+    ) -> "PlanSearch":  # fmt: skip
         """Put an object into standard order, with faces cut as requested, and set up its search."""
         on = in_standard_order(body, request)
         reached = partial(_reached, on.body, request.finger)
@@ -101,25 +106,27 @@ class PlanSearch:
             for method in METHODS
             if method in request.families
         }
-        return cls(body, on, request, methods, workers)
+        return cls(body, on, request, methods, workers, stop)
 
     def run(self, progress: Progress | None = None) -> Iterator[Certified]:
         """Yield each certified grasp in the order of the methods, on the standard object."""
-        total, found = len(self.methods) * self.on.quadruples, 0
+        total, found, done = len(self.methods) * self.on.quadruples, 0, 0
         for done, grasps in self._steps():
             found += len(grasps)
             if progress is not None:
                 progress(done, total, found)
             yield from grasps
         if progress is not None:
-            progress(total, total, found)
+            progress(done if self.stop() else total, total, found)
 
     def _steps(self) -> Iterator[tuple[int, list[Certified]]]:
         """Yield, for each quadruple tried, how many are finished at least, and its grasps."""
         limit, dealt_with, kept_so_far = self.request.searched, 0, list[int]()
         families: list[Family] = [method for method in self.methods if method != "free"]
-        places = {family: range(len(self.blocks(family)[0])) for family in families}
-        blocks = (Block(family, place) for family in families for place in places[family])
+        sizes = {family: self.blocks(family).sizes for family in families}
+        blocks = (
+            Block(family, place) for family in families for place in range(len(sizes[family]))
+        )
         every = self.each_found(blocks) if limit is None else iter(())
         for method, search in self.methods.items():
             if limit is not None:
@@ -127,13 +134,16 @@ class PlanSearch:
                 search.limit = left if method == "free" else _share(limit, kept_so_far)
             if method == "free":
                 size = BATCH if limit is None else LIMITED_BATCH
-                found = self.each_found(self._batches(size, self.held))
+                found = zip(repeat(size), self.each_found(self._batches(size, self.held)))
             elif limit is None:
-                found = islice(every, len(places[method]))
+                found = zip(sizes[method], every, strict=False)
             else:
-                steps = self._constructed(method, places[method], search)
-                found = iter([Found(Gathered(), steps)])
-            yield from enumerate(_taken(found, search), start=dealt_with + 1)
+                steps = self._constructed(method, range(len(sizes[method])), search)
+                found = iter([(self.on.quadruples, Found(Gathered(), steps))])
+            for done, grasps in self._taken(found, search):
+                yield dealt_with + min(done, self.on.quadruples), grasps
+            if self.stop():
+                return
             # each quadruple counts once per order of the fingers
             orders = 1 if method == "free" else len(CONSTRUCTIONS[method].orders)
             tally = search.gathered.tally
@@ -141,18 +151,49 @@ class PlanSearch:
             kept_so_far.append(len(search.best))
             dealt_with += self.on.quadruples
         if self.request.complete:
-            search = self.methods["free"]
-            open_yet = tuple(search.gathered.undecided)
-            search.gathered.undecided.clear()
-            found = self.each_found(Batch((faces,), again=True) for faces in open_yet)
-            for grasps in _taken(found, search):
-                yield dealt_with, grasps
+            yield from ((dealt_with, grasps) for grasps in self._completed())
+
+    def _completed(self) -> Iterator[list[Certified]]:
+        """Decide the quadruples that are undecided, and yield the grasps on each."""
+        search = self.methods["free"]
+        undecided = search.gathered.undecided
+        open_yet = dict(undecided)
+        undecided.clear()
+        found = self.each_found(Batch((faces,), again=True) for faces in open_yet)
+        for _, grasps in self._taken(zip(repeat(0), found), search):
+            yield grasps
+        if self.stop():  # those that were not looked at again
+            known = {*search.held, *search.gathered.absences, *undecided}
+            undecided.update({faces: open_yet[faces] for faces in open_yet if faces not in known})
+
+    def _taken(
+        self, found: Iterable[tuple[int, Found]], search: MethodSearch
+    ) -> Iterator[tuple[int, list[Certified]]]:
+        """Keep the grasps that parts hold, each given with its size, until limit or stop.
+
+        Yields how many quadruples are finished at least and the grasps kept; adds up the time.
+        """
+        start, done = time.process_time(), 0
+        for size, each in found:
+            if search.full or self.stop():
+                break
+            for tried, grasps in enumerate(each.grasps, 1):
+                kept = search.keep_each(grasps)
+                search.seconds += time.process_time() - start
+                yield done + min(tried, size), kept
+                start = time.process_time()
+            search.take(each.gathered, each.seconds)
+            done += size
+            yield done, []  # also where bounds leave nothing to try
+        search.seconds += time.process_time() - start
 
     def each_found(self, parts: Iterable[Part]) -> Iterator[Found]:
         """Yield what each part holds, in order."""
         if self.workers is None:
             return map(self.found, parts)
-        return self.workers.in_order(self.found_elsewhere, parts, here=self.found_at_once)
+        return self.workers.in_order(
+            self.found_elsewhere, parts, here=self.found_at_once, stop=self.stop
+        )
 
     def __reduce__(self) -> tuple[Callable[..., "PlanSearch"], tuple[Polyhedron, PlanRequest]]:
         """Have another process set up the search anew."""
@@ -171,7 +212,7 @@ class PlanSearch:
             search = MethodSearch(part.family, gathered=gathered)
             places = range(part.place, part.place + 1)
             return Found(gathered, self._constructed(part.family, places, search))
-        tried = found_on(self.on, part.quadruples, self.request, gathered, part.again)
+        tried = found_on(self.on, part.quadruples, self.request, gathered, part.again, self.stop)
         return Found(gathered, ([one] if one else [] for one in tried))
 
     def found_at_once(self, part: Part) -> Found:
@@ -184,7 +225,7 @@ class PlanSearch:
     ) -> Iterator[list[Certified]]:
         """Yield the grasps of a construction on each quadruple of some blocks, worth keeping."""
         shapes, friction = self.on.shapes, self.request.friction
-        over = FamilySearch(CONSTRUCTIONS[family], shapes, friction, search)
+        over = FamilySearch(CONSTRUCTIONS[family], shapes, friction, search, self.stop)
         return over.found_in(self.blocks(family), places)
 
     def blocks(self, family: Family) -> Blocks:
@@ -275,21 +316,6 @@ def worth_starting(body: Polyhedron, request: PlanRequest, jobs: int) -> int:
     return min(jobs - 1, worth)
 
 
-def _taken(found: Iterable[Found], search: MethodSearch) -> Iterator[list[Certified]]:
-    """Keep the grasps that parts hold, until the limit; yield those kept, and add up the time."""
-    start = time.process_time()
-    for each in found:
-        if search.full:
-            break
-        for grasps in each.grasps:
-            kept = search.keep_each(grasps)
-            search.seconds += time.process_time() - start
-            yield kept
-            start = time.process_time()
-        search.take(each.gathered, each.seconds)
-    search.seconds += time.process_time() - start
-
-
 def _share(limit: int, before: Sequence[int]) -> int:
     """Most grasps that a construction can keep, given how many the constructions before it found.
 
@@ -315,18 +341,39 @@ TIP_RADIUS = 0.1
 """Radius of fingertips whose size is not given, in object radii: that of scenes."""
 
 
-def chosen(search: PlanSearch, lists: Sequence[Sequence[Certified]]) -> list[Certified]:
-    """Select the grasps to return, the best first; by radius, families take turns."""
+def chosen(
+    search: PlanSearch, stop: Callable[[], bool], progress: Callable[[int, int], None] | None = None
+) -> list[Certified]:
+    """Select the grasps to return, the best first; by radius, families take turns.
+
+    Where there is no time to rank a grasp by what is asked for, it comes after those that are
+    ranked. `progress` is called with (ranked, to be ranked).
+    """
     request = search.request
-    every = _largest_first(chain.from_iterable(lists))
+    every = _largest_first(chain.from_iterable(each.best for each in search.methods.values()))
     if request.rank_by == "radius":
         families = [[one for one in every if one.family == family] for family in FAMILIES]
         turns = [one for one in chain.from_iterable(zip_longest(*families)) if one is not None]
         return _largest_first(turns[: request.limit])
     if request.rank_by == "diverse":
-        return _far_apart(every, request.limit)
+        wanted = min(len(every), request.limit or len(every))
+        order = list(_told(until(stop, islice(_far_apart(every), wanted)), wanted, progress))
+        order += sorted(set(range(len(every))) - set(order))
+        return [every[place] for place in order[:wanted]]
     measure, same = _measure(search)
-    return _in_order(every, [measure(found) for found in every], same)[: request.limit]
+    figures = list(_told(map(measure, until(stop, every)), len(every), progress))
+    ranked = _in_order(every[: len(figures)], figures, same)
+    return [*ranked, *every[len(figures) :]][: request.limit]
+
+
+def _told(
+    items: Iterable[Item], total: int, progress: Callable[[int, int], None] | None
+) -> Iterator[Item]:
+    """Yield items, and tell how many of all are done."""
+    for done, item in enumerate(items, 1):
+        yield item
+        if progress is not None:
+            progress(done, total)
 
 
 def _measure(search: PlanSearch) -> tuple[Callable[[Certified], float], float]:
@@ -391,17 +438,14 @@ def _in_order(
     return [found[place] for place in np.argsort(ranks(figures, same), kind="stable")]
 
 
-def _far_apart(every: Sequence[Certified], limit: int | None) -> list[Certified]:
-    """Order grasps by the distance from the nearest before, that of their farthest contacts."""
-    if not every:
-        return []
+def _far_apart(every: Sequence[Certified]) -> Iterator[int]:
+    """Yield places, each next one the farthest from those before, by its farthest contact."""
     places = np.array([found.placement.positions for found in every])
-    nearest = np.full(len(every), np.inf)
-    kept = [0]
-    while len(kept) < min(len(every), limit or len(every)):
-        gaps = np.linalg.norm(places[:, :, None] - places[kept[-1]][None, None], axis=-1)
+    nearest, last = np.full(len(every), np.inf), 0
+    for _ in every:
+        yield last
+        gaps = np.linalg.norm(places[:, :, None] - places[last][None, None], axis=-1)
         there = np.maximum(gaps.min(axis=1).max(axis=1), gaps.min(axis=2).max(axis=1))
         nearest = np.minimum(nearest, there)
-        nearest[kept] = -np.inf
-        kept.append(first_best(nearest))
-    return [every[place] for place in kept]
+        nearest[last] = -np.inf
+        last = first_best(nearest)

@@ -10,7 +10,7 @@ and finds grasps on them or proves that there are none.
 import math
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from functools import partial
 from typing import cast
@@ -21,12 +21,13 @@ from grasp_core.frames import kept_angle
 from grasp_core.kinds import METHODS, ConeKind, Count, Method, RankBy, function, value_of
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.certify import absence_as_given, faces_as_given, to_grasp
+from grasp_core.planning.certify import Certified, absence_as_given, faces_as_given, to_grasp
 from grasp_core.planning.plan_search import PlanSearch, Progress, chosen, worth_starting
 from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
-from grasp_core.planning.result import Outcomes, Plan, PlanCounts, PlanRequest, check_request
+from grasp_core.planning.result import Ended, Outcomes, Plan, PlanCounts, PlanRequest, check_request
 from grasp_core.processes import local_processes
+from grasp_core.stopping import Stop
 from grasp_core.values import Grasp
 
 
@@ -45,6 +46,7 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     finger: Finger | None = None,
     edge_clearance_m: float = 0.0,
     share_faces_m: float | None = None,
+    time_limit_s: float | None = None,
     progress: Progress | None = None,
     jobs: int = 1,
 ) -> Plan:
@@ -77,6 +79,8 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             is then proved for what is left of the faces.
         share_faces_m: Let two fingers stand on one face, at least this far apart [m]; each face is
             cut once for that, across its longest direction.
+        time_limit_s: Time after which planning ends with what is found by then, within some
+            seconds [s]. `Plan.ended` then says so: a clock decided which grasps are in the plan.
         progress: Called after each quadruple that is tried.
         jobs: Largest number of processes. Only searches for all grasps of objects with many faces
             use more than one; the plan does not depend on it, except for `Plan.seconds`.
@@ -90,17 +94,41 @@ def plan(  # noqa: PLR0913 - the contract's keywords
     """
     request = PlanRequest(
         friction, _listed(families), theta_deg, cones, limit, rank_by, max_face_parts, complete,
-        edge_clearance_m, share_faces_m, seed, finger,
+        edge_clearance_m, share_faces_m, seed, time_limit_s, finger,
     )  # fmt: skip
-    check_request(body, request)
     if progress is not None:
         function(progress, "progress")
-    others = worth_starting(body, request, value_of(Count, jobs, "jobs"))
+    jobs = value_of(Count, jobs, "jobs")
+    return search_plan(body, request, Stop(seconds=request.time_limit_s), progress, jobs=jobs)
+
+
+MADE_S = 2e-4
+"""Time in which a grasp that is found is put into the object's frame [s]."""
+
+
+def search_plan(
+    body: Polyhedron, request: PlanRequest, stop: Stop, progress: Progress | None = None,
+    ranked: Callable[[int, int], None] | None = None, jobs: int = 1, after_s: float = MADE_S,
+) -> Plan:  # fmt: skip
+    """Plan what is requested, until told to stop; `ranked` is called with (ranked, to be ranked).
+
+    The time limit of the request does not count: `stop` does, which phases after it may share. The
+    search leaves the time `after_s` for each grasp of the plan [s].
+    """
+    check_request(body, request)
+    # other rankings measure every grasp that is found, and need time of their own
+    searching = stop.part(1 if request.rank_by == "radius" else 2)
+    most = math.inf if request.limit is None else request.limit
+    others = worth_starting(body, request, jobs)
     with local_processes(others) if others else nullcontext() as workers:
-        search = PlanSearch.of(body, request, workers)
-        for _ in search.run(progress):
-            pass
-    return _planned(search)
+        search = PlanSearch.of(body, request, workers, searching)
+        for found, _ in enumerate(search.run(progress)):
+            if found < most:
+                searching.reserve(after_s)
+    cut = searching()
+    best = chosen(search, stop, ranked)
+    ended = searching.why if cut or (stop() and request.rank_by != "radius") else "done"
+    return _planned(search, best, ended)
 
 
 def iter_grasps(  # noqa: PLR0913 - as `plan`
@@ -136,10 +164,16 @@ def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
     return (families,) if isinstance(families, str) else cast("tuple[Method, ...]", families)
 
 
-def _planned(search: PlanSearch) -> Plan:
+CUT_SHORT = (
+    "no grasp was found before the search was ended, which proves nothing; give it more time "
+    "(--time-limit-s), or fewer faces (--faces patches)"
+)
+"""Why a plan that a clock or an interrupt ended has no grasp."""
+
+
+def _planned(search: PlanSearch, best: Sequence[Certified], ended: Ended) -> Plan:
     """Put together a plan from what a search found, with the best grasps."""
     body, on, request, methods = search.body, search.on, search.request, search.methods
-    best = chosen(search, [each.best for each in methods.values()])
     start = time.process_time()
     grasps = tuple(to_grasp(body, request.friction, found, on) for found in best)
     per_grasp = (time.process_time() - start) / max(len(best), 1)
@@ -152,6 +186,7 @@ def _planned(search: PlanSearch) -> Plan:
         {method: each.counts for method, each in methods.items()},
     )
     known, every = search.outcomes, methods.values()
+    absence = CUT_SHORT if ended != "done" else _absence(body, request, counts, known)
     given = partial(faces_as_given, on=on)
     return Plan(
         body=body,
@@ -161,7 +196,8 @@ def _planned(search: PlanSearch) -> Plan:
         seed=request.seed,
         counts=counts,
         outcomes=known,
-        absence=None if grasps else _absence(body, request, counts, known),
+        ended=ended,
+        absence=None if grasps else absence,
         absences={
             given(faces): tuple(absence_as_given(proof, on) for proof in proofs)
             for each in every

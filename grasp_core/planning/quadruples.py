@@ -22,9 +22,8 @@ on discs are in object radii.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property, partial
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -295,15 +294,21 @@ class WideQuadruples:
         return self.some(order), bounds[order]
 
 
-Blocks: TypeAlias = tuple[Array, Callable[[int], WideQuadruples]]
-"""Upper bound on the discs of each block, (blocks,) [object radii], and what makes the block."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Blocks:
+    """Blocks of the face quadruples of an object."""
+
+    rooms: Array  # upper bound on the discs of each block, (blocks,) [object radii]
+    sizes: Sequence[int]
+    """Number of quadruples in each block, also of those that its table leaves out."""
+    make: Callable[[int], WideQuadruples]
 
 
 def kept(blocks: Blocks, count: int) -> Blocks:
     """Give blocks a memory: the first `count` are made once and then kept."""
-    rooms, make = blocks
+    make = blocks.make
     once = cache(make)
-    return rooms, lambda place: (once if place < count else make)(place)
+    return replace(blocks, make=lambda place: (once if place < count else make)(place))
 
 
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
@@ -325,7 +330,8 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
         numbers = np.arange(int(starts[place]), int(ends[place]), dtype=np.int64)
         return _quadruples(cones, order[_unranked(numbers, len(order))])
 
-    return np.concatenate(rooms), make
+    sizes = [*np.diff(ends, prepend=0).tolist(), *map(len, parts)]
+    return Blocks(np.concatenate(rooms), sizes, make)
 
 
 def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
@@ -339,7 +345,8 @@ def spanning_blocks(cones: PlannedCones, whole: int) -> Blocks:
     def make(place: int) -> WideQuadruples:
         return _quadruples(cones, order[table.quadruples(*pairs[place])])
 
-    return coarse(cones.rooms)[order][firsts], make
+    sizes = [math.comb(end, FINGERS) - math.comb(start, FINGERS) for start, end in pairs]
+    return Blocks(coarse(cones.rooms)[order][firsts], sizes, make)
 
 
 def _by_room(cones: PlannedCones, whole: int) -> Indices:

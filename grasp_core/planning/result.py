@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from textwrap import shorten
-from typing import Annotated, Any, Protocol, TypeAlias, get_args, runtime_checkable
+from typing import Annotated, Any, Literal, Protocol, TypeAlias, get_args, runtime_checkable
 
 from grasp_core.arrays import UNIT_SLACK
 from grasp_core.declared import Declared, InNotebooks, counted, summary
@@ -33,6 +33,9 @@ from grasp_core.planning.reach import Finger
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.values import Bounds, FaceQuadruple, Grasp, HalfAngle
 
+Ended: TypeAlias = Literal["done", "time", "interrupt"]
+"""Why a search for grasps ended: all was tried that was asked for, time was up, or it was
+interrupted."""
 FAMILIES: tuple[Family, ...] = get_args(Family)
 """The three families of grasps in the paper, each with its construction."""
 ITS_RADIUS = ", the object's radius in m"
@@ -139,7 +142,7 @@ class MethodCounts(Declared):
     pruned: FaceSets = 0
     """Candidates skipped because a bound shows that their discs are too small, their pairs are too
     far from symmetric for a regulus, the free method is not needed on them, or they cannot enter
-    the best `limit`."""
+    the best `limit`; 0 for a method whose search was ended early."""
     solved: FaceSets = 0
     """Choices of one convex piece per face that were considered."""
     infeasible: FaceSets = 0
@@ -228,6 +231,9 @@ class Plan(Declared, ById[Grasp], InNotebooks):
     seed: Seed
     counts: PlanCounts
     outcomes: Outcomes
+    ended: Ended = "done"
+    """Why the search ended. If its time was up or it was interrupted, a clock decided which grasps
+    are in the plan: there may be others, and better ones."""
     absence: str | None = None
     """Why there is no grasp, as a sentence; None when there is one."""
     absences: Annotated[Mapping[FaceQuadruple, tuple[Proof, ...]], UNRECORDED] = field(
@@ -326,6 +332,7 @@ class Plan(Declared, ById[Grasp], InNotebooks):
         sets = f"{counted(of, 'face quadruple')} searched: {known.held} held, {known.absent} absent"
         sets += f", {known.open} open, {known.out_of_reach} out of reach"
         parts = [counted(len(self.grasps), "grasp"), sets]
+        parts += [] if self.ended == "done" else [f"ended early ({self.ended})"]
         if self.absence is not None:
             parts.append(repr(shorten(self.absence, LONGEST_REASON)))
         radius = max((grasp.radius for grasp in self.grasps), default=0.0)

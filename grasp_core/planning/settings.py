@@ -14,6 +14,7 @@ from grasp_core.kinds import (
     Quantity,
     RankBy,
     Seed,
+    TimeLimit,
 )
 from grasp_core.settings import Settings
 
@@ -52,3 +53,6 @@ class PlanSettings(Settings):
     """Let two fingers stand on one face, at least this far apart [m]."""
     seed: Seed = 0
     """Seed of all random choices."""
+    time_limit_s: TimeLimit | None = None
+    """Time after which planning ends with what is found by then [s]; the plan then says that it is
+    not complete. If not given, there is no limit."""

@@ -20,6 +20,7 @@ from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
 from grasp_core.settings import extended
+from grasp_core.stopping import never
 from scenes.drawing.clips import GraphicsError, available_graphics, has_display, remedy
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import Job, validate, validated
@@ -71,8 +72,9 @@ def validate_file(
 
 
 def simulate_grasps(
-    saved: Plan, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None, reporter: Reporter
-) -> tuple[Exit, Verdicts]:
+    saved: Plan, setup: Setup, agenda: Agenda, *, jobs: int, folder: Path | None,
+    reporter: Reporter, stop: Callable[[], bool] = never,
+) -> tuple[Exit, Verdicts]:  # fmt: skip
     """Simulate grasps; return the exit code and the verdicts."""
     gate = require_faithful(setup, saved.friction, saved.body.radius)
     for check in gate.checks:
@@ -94,6 +96,7 @@ def simulate_grasps(
         ("held", kept),
         collect,
         folder,
+        stop,
     )
     _show(found, setup, reporter)
     good = all(verdict.good for verdict in found)

@@ -20,6 +20,7 @@ from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import extended
+from grasp_core.stopping import never
 from grasp_core.values import Grasp
 from scenes import exports
 from scenes.settings import ScaledScene
@@ -77,6 +78,7 @@ def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
 def execute_grasps(
     saved: Plan, settings: ExecutionSettings, *, jobs: int, folder: Path | None,
     reporter: Reporter, physics: Mapping[str, object] | None = None,
+    stop: Callable[[], bool] = never,
 ) -> tuple[Exit, Executions]:  # fmt: skip
     """Execute grasps; return the exit code and what was found."""
     if folder:
@@ -85,7 +87,7 @@ def execute_grasps(
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
     found = reporter.collected(
         "executing", executed(tasks, jobs), count, ("survived", lambda each: each.survived),
-        partial(Executions, AboutObject.of(saved.body), saved.friction, settings), folder,
+        partial(Executions, AboutObject.of(saved.body), saved.friction, settings), folder, stop,
     )  # fmt: skip
     _show(found, reporter)
     if not all(each.controls_let_go for each in found):

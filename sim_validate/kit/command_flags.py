@@ -95,6 +95,10 @@ class Mesh(Settings):
 class Planning(PlanSettings):
     """Which grasps to plan."""
 
+    time_limit_s: TimeLimit | None = None
+    """Time after which the command ends with what is found by then, within some seconds [s]. Its
+    phases, such as those of --optimize, --best and --regions, share it, and the files say if they
+    are not complete. If not given, there is no limit."""
     mesh: Annotated[Mesh, PLAIN] = field(default_factory=Mesh)
     approach_m: Positive | None = None
     """With --finger-radius-m: keep only grasps that fingers of that radius reach along straight
@@ -175,8 +179,6 @@ class Plan(Spoken):
     where that is less; a twentieth of the object's radius if not given."""
     gap: Gap = 0.05
     """With --best: share of the proved bound that the quality may be below it."""
-    time_limit_s: TimeLimit | None = None
-    """With --best: time after which the search ends with the gap reached [s]."""
     measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
     """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
     orientation; or the multiple of a task's --wrenches that is resisted."""
@@ -305,6 +307,8 @@ class Regions(Spoken):
     limit: FirstOnly = None
     friction: AtFriction = None
     certifying: Annotated[Certifying, PLAIN] = field(default_factory=Certifying)
+    time_limit_s: TimeLimit | None = None
+    """Time after which no more regions are begun; those that are proved are kept [s]."""
     jobs: Jobs = field(default_factory=available_cores)
     out: Path | None = None
     """Folder for regions.json and the proofs; if not given, no file is written."""

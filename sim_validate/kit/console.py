@@ -5,9 +5,11 @@ It also collects what long work gives, so that an interrupt loses nothing that i
 
 import importlib
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any, TypeVar
 
 from rich.box import SIMPLE_HEAD
@@ -19,19 +21,33 @@ from grasp_core.figures import table
 from grasp_core.files.json_text import text_of
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
+from grasp_core.stopping import never, until
 from sim_validate.kit.workers import check_interrupted
 
 Result = TypeVar("Result")
 File = TypeVar("File", bound=RecordFile)
 PLAIN_EVERY_S = 5.0
 """Time between two lines of progress if the output is no terminal [s]."""
-EARLIEST = 0.02
-"""Share of the work that must be done before the remaining time is estimated."""
+RECENT = 7
+"""Number of lines of progress over which the rate is taken: half a minute, as that of bars."""
+EARLIEST, ENOUGH = 0.02, 20
+"""Share of the work, or number of steps, that must be done before the remaining time is estimated.
+"""
+UNITS = ((172_800.0, 86_400.0, "days"), (7200.0, 3600.0, "h"), (120.0, 60.0, "min"))
+"""Times from which on a longer unit is used, the unit [s], and its name."""
 
 
 def printable(text: str) -> str:
     """Replace control characters, so that a file's name cannot steer the terminal."""
     return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def duration(seconds: float) -> str:
+    """Write a time in the unit that people would use for it."""
+    for least, unit, name in UNITS:
+        if seconds >= least:
+            return f"{seconds / unit:.1f} {name}"
+    return f"{seconds:.0f} s"
 
 
 GAP, MARGIN = 2, 1
@@ -107,12 +123,15 @@ class Reporter:
 
     def counted(
         self, title: str, results: Iterable[Result], total: int, word: str,
-        is_good: Callable[[Result], bool],
+        is_good: Callable[[Result], bool], stop: Callable[[], bool] = never,
     ) -> Iterator[Result]:  # fmt: skip
-        """Yield results, and show how many of all have come and how many of them are good."""
+        """Yield results, and show how many of all have come and how many of them are good.
+
+        When told to stop, those that have not come are left out.
+        """
         good = 0
         with self.progress(title) as steps:
-            for done, result in enumerate(results, 1):
+            for done, result in enumerate(until(stop, results), 1):
                 good += is_good(result)
                 yield result
                 steps.update(done, total, f"({good} {word})")
@@ -120,16 +139,16 @@ class Reporter:
     def collected(
         self, title: str, results: Iterable[Result], total: int,
         good: tuple[str, Callable[[Result], bool]], collect: Callable[..., File],
-        folder: Path | None = None,
+        folder: Path | None = None, stop: Callable[[], bool] = never,
     ) -> File:  # fmt: skip
-        """Collect results in the record of a file, and write it even if the work is interrupted.
+        """Collect results in the record of a file, and write it even if the work ends early.
 
         Shows how many of all have come, and how many of them are good, with the word for that.
         Without a result nothing is written.
         """
         done = list[Result]()
         try:
-            for result in self.counted(title, results, total, *good):
+            for result in self.counted(title, results, total, *good, stop):
                 done.append(result)
         finally:
             complete = len(done) == total
@@ -164,13 +183,18 @@ def _parts(
 
 
 class Steps:
-    """Shows the progress of long work in a `with` block."""
+    """Shows the progress of long work in a `with` block, also while no step ends."""
 
     def __init__(self, title: str, console: Console, *, shown: bool) -> None:
-        self.title, self.console, self.shown = title, console, shown
+        self.title: str = title
+        self.console, self.shown = console, shown
         self.bar: Any = None
         self.task: Any = None
-        self.begun = self.last = time.monotonic()
+        self._begun = time.monotonic()
+        self._done, self._note = 0, ""
+        self._total: int | None = None
+        self._before = deque[tuple[float, int]]([(self._begun, 0)], maxlen=RECENT)
+        self._over, self._beats = Event(), Thread(target=self._beat, daemon=True)
 
     def __enter__(self) -> "Steps":
         if self.shown and self.console.is_terminal:
@@ -186,25 +210,51 @@ class Steps:
             )
             self.bar.start()
             self.task = self.bar.add_task(self.title, total=None)
+        elif self.shown:
+            self._beats.start()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._over.set()
         if self.bar is not None:
             self.bar.stop()
+        elif self.shown:
+            self._beats.join()
 
-    def update(self, done: int, total: int, note: str = "") -> None:
-        """Show how many steps are done; an interrupt that was swallowed is raised here."""
+    def update(self, done: int, total: int | None, note: str = "", title: str = "") -> None:
+        """Show how many steps are done, of None if nobody can know; another title begins anew.
+
+        An interrupt that was swallowed is raised here.
+        """
         check_interrupted()
+        if title not in ("", self.title):
+            self.title, self._begun = title, time.monotonic()
+            self._before.clear()
+            self._before.append((self._begun, done))
+        self._done, self._total, self._note = done, total, note
         if self.bar is not None:
-            title = f"{self.title} {note}" if note else self.title
-            self.bar.update(self.task, completed=done, total=total, description=title)
-        elif self.shown and time.monotonic() - self.last > PLAIN_EVERY_S:
-            self.last = time.monotonic()
-            rate = done / (self.last - self.begun)
-            line = f"{self.title} {done}/{total} {note} {rate:.1f}/s"
-            if done > EARLIEST * total:
-                line += f", {(total - done) / rate:.0f} s left"
-            self.console.print(Text(line), soft_wrap=True)
+            shown = f"{self.title} {note}" if note else self.title
+            self.bar.update(self.task, completed=done, total=total, description=shown)
+
+    def _beat(self) -> None:
+        """Print a line of progress now and then until the work is over."""
+        while not self._over.wait(PLAIN_EVERY_S):
+            self.console.print(Text(printable(self._line())), soft_wrap=True)
+
+    def _line(self) -> str:
+        done, total, now = self._done, self._total, time.monotonic()
+        of = "" if total is None else f"/{total}"
+        parts = [f"{self.title} {done}{of}" if done or of else self.title, self._note]
+        then, before = self._before[0]
+        self._before.append((now, done))
+        rate = (done - before) / max(now - then, PLAIN_EVERY_S)
+        if rate > 0.0 and total is not None:
+            parts.append(f"{rate:.3g}/s")
+        parts.append(f"after {duration(now - self._begun)}")
+        line = " ".join(filter(None, parts))
+        if total is not None and rate > 0.0 and done > min(EARLIEST * total, ENOUGH):
+            line += f", some {duration((total - done) / rate)} left"
+        return line
 
 
 def warn_of(lines: Sequence[str], file: str, reporter: Reporter) -> None:

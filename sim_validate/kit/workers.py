@@ -26,6 +26,7 @@ from types import FrameType
 from typing import Any, TypeVar
 
 from grasp_core.errors import InputError
+from grasp_core.stopping import Stop
 
 Unit = TypeVar("Unit")
 Result = TypeVar("Result")
@@ -55,13 +56,14 @@ def processes(units: int, jobs: int) -> int:
 
 
 def each(
-    function: Callable[[Unit], Result], units: Sequence[Unit], *, jobs: int
-) -> Iterator[Result]:
+    function: Callable[[Unit], Result], units: Sequence[Unit], *, jobs: int,
+    stop: Callable[[], bool] | None = None,
+) -> Iterator[Result]:  # fmt: skip
     """Yield the results of a function on each unit, in order, as they become ready.
 
     What units have in common is sent once to each process if the function holds it. This process
     works with the others, which start where there is work for them for longer than a
-    start takes.
+    start takes. Results that other processes have not ready when `stop` says so are dropped.
     """
     # commands' flags count cores, and need not wait for this
     from grasp_core.processes import local_processes
@@ -71,7 +73,7 @@ def each(
         yield from map(function, units)
         return
     with local_processes(others, START_S) as workers:
-        yield from workers.in_order(function, units, ahead=len(units))
+        yield from workers.in_order(function, units, ahead=len(units), stop=stop)
 
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -105,6 +107,28 @@ def interrupts_noted() -> Generator[None, None, None]:
 def _note(_: int, __: FrameType | None) -> None:
     _noted.set()
     raise KeyboardInterrupt
+
+
+@contextmanager
+def interrupts_end(stop: Stop) -> Generator[None, None, None]:
+    """Have the first interrupt end work in order, with what is done; the next one is raised."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+
+    def note(_: int, __: FrameType | None) -> None:
+        stop.now()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    for number in before:
+        signal.signal(number, note)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def check_interrupted() -> None:

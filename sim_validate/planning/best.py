@@ -18,9 +18,18 @@ from grasp_core.files.records import recorded
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import Family, Friction, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.optimizing.best_grasp import BestGrasp, Ended, GapAt, best_grasp, measured
+from grasp_core.optimizing.best_grasp import (
+    BestGrasp,
+    Ended,
+    GapAt,
+    best_until,
+    checked_clearance,
+    measured,
+)
+from grasp_core.optimizing.contact_places import grounds_of
 from grasp_core.optimizing.support_cuts import write_proof
 from grasp_core.quality.measures import MeasureName
+from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
@@ -134,7 +143,6 @@ class Best(ResultFile):
         return {each.id: each.share_of_bound for each in reversed(self.rated)}
 
 
-STEPS = 100
 WHY = {
     "gap": "the gap asked for is reached",
     "time": "the time limit is reached",
@@ -146,39 +154,50 @@ ROUGH = 1e-3
 """Gap between the bounds of what planned grasps hold."""
 
 
+def check_object(body: Polyhedron, planning: command_flags.Planning) -> None:
+    """Refuse an object with too many places for contacts, before anything is searched."""
+    grounds_of(body, checked_clearance(body, planning.edge_clearance_m or None))
+
+
 def search_best(
-    body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, reporter: Reporter
+    body: Polyhedron, command: command_flags.Plan, wrenches: Array | None, stop: Stop,
+    reporter: Reporter,
 ) -> BestGrasp:  # fmt: skip
     """Search for the best grasp, for wrenches (m, 6) if asked, and show how the gap closes."""
     planning = command.planning
     with reporter.progress("bounding") as steps:
+        # what a level costs is not known before it is done
+        steps.update(0, None, "(looking for good contacts)")
 
         def tell(now: GapAt) -> None:
-            closed = round(STEPS * (1.0 - max(now.gap - command.gap, 0.0)))
             word, *_ = MEASURES[command.measure]
             note = f"({word} {now.quality:.4f}, bound {now.bound:.4f}, gap {100 * now.gap:.1f} %)"
-            steps.update(closed, STEPS, note)
+            steps.update(now.nodes, None, note)
 
-        return best_grasp(
-            body, planning.friction, gap=command.gap, time_limit_s=command.time_limit_s,
+        return best_until(
+            stop, body, planning.friction, gap=command.gap,
             clearance=planning.edge_clearance_m or None, seed=planning.seed, jobs=command.jobs,
             measure=command.measure, wrenches=wrenches, progress=tell,
         )  # fmt: skip
 
 
 def write_best(
-    body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp], folder: Path | None,
+    body: Polyhedron, best: BestGrasp, planned: Sequence[Grasp], folder: Path | None, stop: Stop,
     reporter: Reporter,
 ) -> Best:  # fmt: skip
-    """Write result and proof, and return them with the planned grasps by the same measure."""
+    """Write result and proof, and return them with the planned grasps by the same measure.
+
+    For all other measures these are the planned grasps that there is time for.
+    """
     measure, friction = best.proof.measure, best.proof.friction
     bounds = [grasp.ferrari_canny for grasp in planned]
     if not measure.is_usual:
-        found = [measured(body, grasp, friction, measure, ROUGH) for grasp in planned]
-        bounds = [(each.lower, each.upper) for each in found]
+        found = (measured(body, grasp, friction, measure, ROUGH) for grasp in planned)
+        rating = reporter.counted("rating", found, len(planned), "rated", bool, stop)
+        bounds = [(each.lower, each.upper) for each in rating]
     rated = (
         Rated(each.id, each.family, ends, ends[0] / best.bound)
-        for each, ends in zip(planned, bounds, strict=True)
+        for each, ends in zip(planned, bounds, strict=False)
     )
     record = Best.of(body, best, rated, PROOF if folder else None)
     if folder:

@@ -15,22 +15,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import GraspError
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import METHODS
+from grasp_core.kinds import METHODS, RankBy
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.plan_search import carried
-from grasp_core.planning.planner import plan
-from grasp_core.planning.result import Moved, Plan, methods_for
+from grasp_core.planning.planner import search_plan
+from grasp_core.planning.result import Moved, Plan, PlanRequest, methods_for
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.settings import types
+from grasp_core.stopping import Stop
 from grasp_core.values import Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.compiling import PLANNING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import alone_in, remove_results
-from sim_validate.kit.workers import each
+from sim_validate.kit.workers import each, interrupts_end
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 from sim_validate.settings import Certifying
 
@@ -42,47 +44,70 @@ SAME_CONTACTS = 0.01
 optimum end some thousandths from it."""
 
 
-def plan_object(
-    body: Polyhedron, planning: command_flags.Planning, jobs: int, reporter: Reporter
-) -> Plan:
-    """Plan the grasps of an object and, if asked for, improve them."""
+WRITTEN_S = 2e-3
+"""Time in which the figures of a planned grasp are computed and written [s]."""
+
+
+def ready(jobs: int, reporter: Reporter) -> None:
+    """Compile the inner loops of planning before its time begins, where none are kept."""
     if must_compile(PLANNING, jobs):
         reporter.say("compiling inner loops once, which takes a minute of one core")
         compile_loops(PLANNING)
+
+
+def plan_object(
+    body: Polyhedron, planning: command_flags.Planning, jobs: int, stop: Stop, later: int,
+    reporter: Reporter,
+) -> Plan:  # fmt: skip
+    """Plan the grasps of an object and, if asked for, improve them, with time for later phases."""
     with reporter.progress("planning") as steps:
         asked: dict[str, Any] = {name: getattr(planning, name) for name in types(PlanSettings)}
         if planning.families == METHODS:
             asked["families"] = methods_for(body)
-        found = plan(
-            body,
-            **asked,
-            finger=asked_finger(planning),
-            progress=lambda done, total, grasps: steps.update(done, total, f"({grasps} grasps)"),
-            jobs=jobs,
-        )
+        request = PlanRequest(**asked, finger=asked_finger(planning))
+
+        def tell(done: int, total: int, grasps: int) -> None:
+            if request.searched is None:
+                steps.update(done, total, f"({grasps} grasps)")
+            else:  # bounds end such a search long before all are tried
+                steps.update(done, None, f"of at most {total} ({grasps} grasps)")
+
+        found = search_plan(
+            body, request, stop.part(1 + planning.optimize + later), tell,
+            partial(steps.update, note="grasps", title=f"ranking by {request.rank_by}"),
+            jobs, WRITTEN_S,
+        )  # fmt: skip
     if planning.optimize and found.grasps:
-        found = improved(body, found, planning, jobs, reporter)
-        if left_out := len(found.moves) - len(found):
-            reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")
+        found = improved(body, found, planning, jobs, stop.part(1 + later), reporter)
     return found
 
 
 def improved(
-    body: Polyhedron, found: Plan, planning: command_flags.Planning, jobs: int, reporter: Reporter
-) -> Plan:
-    """Move contacts to raise the quality; keep one of grasps that end alike, the best first."""
-    results = each(partial(_improve, body, planning), found.grasps, jobs=jobs)
+    body: Polyhedron, found: Plan, planning: command_flags.Planning, jobs: int, stop: Stop,
+    reporter: Reporter,
+) -> Plan:  # fmt: skip
+    """Move contacts to raise the quality; keep one of grasps that end alike, the best first.
+
+    Those for which there is no time come last, as they were planned.
+    """
+    results = each(partial(_improve, body, planning), found.grasps, jobs=jobs, stop=stop)
     done = list(
         reporter.counted(
-            "optimising", results, len(found.grasps), "raised", lambda pair: pair[1].gain > 1.0
+            "optimising", results, len(found), "raised", lambda pair: pair[1].gain > 1.0, stop
         )
     )
+    left = found.grasps[len(done) :]
     done.sort(key=lambda pair: -pair[0].ferrari_canny[0])
     kept: list[Grasp] = []
     for grasp, _ in done:
         if not any(_same_contacts(grasp, other, SAME_CONTACTS * body.radius) for other in kept):
             kept.append(grasp)
-    return replace(found, grasps=tuple(kept), moves=tuple(moved for _, moved in done))
+    if left_out := len(done) - len(kept):
+        reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")
+    return replace(
+        found, grasps=(*kept, *left), moves=tuple(moved for _, moved in done),
+        ended=stop.why if left else found.ended,
+    )  # fmt: skip
 
 
 def _same_contacts(one: Grasp, two: Grasp, slack: float) -> bool:
@@ -116,7 +141,7 @@ def _improve(
 
 def with_regions(
     body: Polyhedron, found: Plan, planning: command_flags.Planning, folder: Path | None, jobs: int,
-    reporter: Reporter,
+    stop: Stop, reporter: Reporter,
 ) -> Plan:  # fmt: skip
     """Certify regions around a plan's contacts if asked for, and write the proofs to a folder."""
     if not (planning.regions and found.grasps):
@@ -125,46 +150,75 @@ def with_regions(
 
     asked = Certifying(edge_clearance_m=planning.edge_clearance_m)
     proved = certified(
-        body, found.grasps, found.friction, asked, folder=folder, jobs=jobs, reporter=reporter
-    )
-    grasps = tuple(map(wider, found.grasps, proved.grasps))
+        body, found.grasps, found.friction, asked, folder=folder, jobs=jobs, stop=stop,
+        reporter=reporter,
+    )  # fmt: skip
+    left = found.grasps[len(proved.grasps) :]
+    grasps = (*map(wider, found.grasps, proved.grasps), *left)
     widened = sum(new is not old for new, old in zip(grasps, found.grasps, strict=True))
     reporter.say(f"{widened} of {len(grasps)} grasps got larger regions, each with its own proof")
-    return replace(found, grasps=grasps)
+    return replace(found, grasps=grasps, ended=stop.why if left else found.ended)
 
 
 def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
     """Plan grasps, write them to a file, and show the best of them."""
-    wrenches = _task(command)
-    body = object_to_plan(command.object, command.planning, reporter)
-    with alone_in(command.out):
-        found = plan_object(body, command.planning, command.jobs, reporter)
-        best: BestGrasp | None = None
-        if command.best:
+    wrenches, planning, failed = _task(command), command.planning, None
+    body = object_to_plan(command.object, planning, reporter)
+    best: BestGrasp | None = None
+    if command.best:
+        from sim_validate.planning.best import check_object
+
+        check_object(body, planning)
+    ready(command.jobs, reporter)
+    stop, later = Stop(seconds=planning.time_limit_s), command.best + planning.regions
+    with alone_in(command.out), interrupts_end(stop):
+        found = plan_object(body, planning, command.jobs, stop, later, reporter)
+        if command.best and not stop.asked:
             from sim_validate.planning.best import search_best
 
-            best = search_best(body, command, wrenches, reporter)
+            try:
+                best = search_best(body, command, wrenches, stop.part(later), reporter)
+            except GraspError as error:  # the planned grasps are kept
+                failed = error
         if command.out:
             remove_results(command.out)
-        found = with_regions(body, found, command.planning, command.out, command.jobs, reporter)
+        found = with_regions(body, found, planning, command.out, command.jobs, stop, reporter)
         planned, possible = found.grasps, None
         if best is not None:
             found = replace(found, grasps=(best.grasp, *planned), absence=None)
-        text = plan_to_json(body, found)
+        text = ""
+        if stop.asked:
+            reporter.warn("interrupted: what is found is kept; interrupt again to drop it")
+        if command.out or (reporter.json_only and best is None):
+            with reporter.progress(f"writing {len(found)} grasps"):
+                text = plan_to_json(body, found)
         if command.out:
             reporter.say(f"wrote {write_text(command.out / 'grasps.json', text)}")
         if best is not None:
             from sim_validate.planning.best import write_best
 
-            possible = write_best(body, best, planned, command.out, reporter)
+            possible = write_best(body, best, planned, command.out, stop, reporter)
         else:
             reporter.text(text)
+    code = _show(body, found, planning.rank_by, reporter)
+    if failed is not None:
+        raise failed
+    if possible is None:
+        return code
+    from sim_validate.planning.best import show_best
+
+    return max(code, show_best(possible, reporter))
+
+
+def _show(body: Polyhedron, found: Plan, rank_by: RankBy, reporter: Reporter) -> int:
+    """Show what was tried and the best grasps; return the exit code."""
     say_counts(body, found, reporter)
+    code = say_ended(found, reporter)
     if found.absence:
         reporter.say(found.absence)
-        return Exit.NONE
+        return code or Exit.NONE
     reporter.records(f"{len(found.grasps)} grasps of {body.name}", found.grasps)
-    if command.planning.rank_by == "payload":  # which is not kept with grasps
+    if rank_by == "payload":  # which is not kept with grasps
         masses = (
             carried(body, each.positions - body.center_of_mass, each.normals, found.friction,
                     found.finger) for each in found.grasps[:TABLE_ROWS]
@@ -173,11 +227,26 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
         reporter.table("what one squeeze carries", ("grasp", "payload kg"), payloads)
     if found.moves:
         show_gains(found.moves, reporter)
-    if possible is None:
-        return Exit.GOOD
-    from sim_validate.planning.best import show_best
+    return code
 
-    return show_best(possible, reporter)
+
+EARLY = {
+    "time": ("the time limit", Exit.PARTIAL),
+    "interrupt": ("an interrupt", Exit.INTERRUPTED),
+}
+"""What ended planning early, in words, and the exit code."""
+
+
+def say_ended(found: Plan, reporter: Reporter) -> int:
+    """Warn of a plan that was ended early; return the exit code for that."""
+    if found.ended == "done":
+        return Exit.GOOD
+    what, code = EARLY[found.ended]
+    reporter.warn(
+        f"{what} ended planning: the plan is not complete, and says so ({found.ended!r}); there "
+        "may be other grasps, and better ones"
+    )
+    return code
 
 
 def _task(command: command_flags.Plan) -> Array | None:

@@ -29,6 +29,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_placement import placement_probability
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
+from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
@@ -278,29 +279,32 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
             remove_results(command.out, "regions")
         found = certified(
             saved.body, saved.grasps, saved.friction, command.certifying, folder=command.out,
-            jobs=command.jobs, reporter=reporter,
+            jobs=command.jobs, stop=Stop(seconds=command.time_limit_s), reporter=reporter,
         )  # fmt: skip
     _show(found, reporter)
     reporter.document(found.document())
+    if not found.complete:
+        reporter.warn(f"the time limit ended the proofs after {len(found.grasps)} grasps")
+        return Exit.PARTIAL
     proved = found.summary["proved"] == len(found.grasps)
     return Exit.GOOD if proved else Exit.NEGATIVE
 
 
 def certified(
     body: Polyhedron, grasps: Sequence[Grasp], friction: float, asked: Certifying, *,
-    folder: Path | None, jobs: int, reporter: Reporter,
+    folder: Path | None, jobs: int, stop: Stop, reporter: Reporter,
 ) -> Regions:  # fmt: skip
     """Certify regions in order, and write each proof when it is ready, if there is a folder."""
-    proofs = each(partial(_certify, body, friction, asked), grasps, jobs=jobs)
+    proofs = each(partial(_certify, body, friction, asked), grasps, jobs=jobs, stop=stop)
 
     def recorded() -> Iterator[GraspRegions]:
-        for grasp, (proved, share) in zip(grasps, proofs, strict=True):
+        for grasp, (proved, share) in zip(grasps, proofs, strict=False):  # fewer if stopped
             found = GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved))
             yield replace(found, closed_share=share)
 
     return reporter.collected(
         "certifying", recorded(), len(grasps), ("proved", lambda one: one.regions is not None),
-        partial(Regions, AboutObject.of(body), friction, asked), folder,
+        partial(Regions, AboutObject.of(body), friction, asked), folder, stop,
     )  # fmt: skip
 
 

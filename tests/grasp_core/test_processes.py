@@ -155,3 +155,9 @@ def test_arrays_keep_their_bits_and_stay_read_only():
     assert fixed.tobytes() == free.tobytes() == array.tobytes()
     assert not fixed.flags.writeable
     assert free.flags.writeable
+
+
+def test_nobody_waits_for_another_process_once_told_to_stop(other, monkeypatch):
+    monkeypatch.setattr(other, "_unclaimed", lambda: None)  # this process does nothing itself
+    looks = iter([False, True])
+    assert list(other.in_order(time.sleep, [HANGING_S], stop=lambda: next(looks))) == []

@@ -70,6 +70,7 @@ CALLS = [
     Call("gc.plan", lambda: {"body": body(), "limit": 1}, PLANNED | {
         "limit": optional(AT_LEAST_ONE),
         "complete": SWITCH,
+        "time_limit_s": optional(NOT_NEGATIVE),
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),
     Call("gc.save_grasps", lambda: {"path": "grasps.json", "plan": gc.plan(body(), limit=1)},

@@ -162,7 +162,7 @@ def test_an_unexpected_error_is_internal_and_shows_its_place_when_asked(monkeypa
     def broken(*_, **__):
         raise RuntimeError("boom")
 
-    monkeypatch.setattr("sim_validate.planning.plan.plan", broken)
+    monkeypatch.setattr("sim_validate.planning.plan.search_plan", broken)
     assert main(["plan", "wedge"]) == Exit.INTERNAL
     assert "internal error" in capsys.readouterr().err
     assert main(["plan", "wedge", "-v"]) == Exit.INTERNAL

@@ -33,7 +33,7 @@ def attempts(body, theta, orders, count=EACH):
     """Faces in finger order with force cones that positively span, around normals and tilted."""
     shapes = face_shapes(body)
     cones = PlannedCones(body, shapes, theta, tilted=True)
-    _, make = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=np.int64))
+    make = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=np.int64)).make
     table = make(0).coned(slice(None))
     found = []
     for row, kind in zip(*np.nonzero(table.half_angles > LEAST_SPAN_ANGLE), strict=True):

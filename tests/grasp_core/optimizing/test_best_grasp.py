@@ -276,6 +276,19 @@ def test_a_time_limit_ends_the_search_with_a_proved_bound():
     assert bounds == sorted(bounds, reverse=True)
 
 
+def test_without_time_only_the_first_contacts_in_force_closure_climb(monkeypatch):
+    climbs, measured = [], []
+    climbed, quality = ascent.climbed, ascent.wrench_set_quality
+    monkeypatch.setattr(ascent, "climbed", lambda *a: climbs.append(a) or climbed(*a))
+    monkeypatch.setattr(
+        ascent, "wrench_set_quality", lambda *a: measured.append(quality(*a)) or measured[-1]
+    )
+    gc.best_grasp(example_object("wedge"), FRICTION, time_limit_s=0.0)
+    assert len(climbs) == 1
+    closed = [each.lower > 0.0 for each in measured]
+    assert closed.index(True) == len(closed) - 2  # it is measured once more before it climbs
+
+
 def test_an_interrupt_ends_the_search_with_a_proved_bound(monkeypatch):
     calls = []
 

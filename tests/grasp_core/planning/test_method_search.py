@@ -1,5 +1,7 @@
 """Best-first search: what a limit keeps is the best of everything, whatever kind of object."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,17 +64,17 @@ def opened(body, family, least):
     request = PlanRequest(0.4, (family,), None, "tilted")
     on = in_standard_order(body, request)
     cones = PlannedCones(on.body, on.shapes, request.theta, tilted=True)
-    (rooms, blocks), made = all_blocks(cones, len(on.faces), on.shared), []
+    blocks, made = all_blocks(cones, len(on.faces), on.shared), []
 
     def make(place):
         made.append(place)
-        return blocks(place)
+        return blocks.make(place)
 
     class Opened(FamilySearch):
         least = property(lambda _: least[0])
 
     search = Opened(CONSTRUCTIONS[family], on.shapes, 0.4, MethodSearch(family))
-    return search.best_first((rooms, make), range(len(rooms))), made
+    return search.best_first(replace(blocks, make=make), range(len(blocks.rooms))), made
 
 
 def bound(attempts):

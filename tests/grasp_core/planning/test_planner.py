@@ -1,4 +1,5 @@
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -7,10 +8,14 @@ import trimesh
 import grasp_core as gc
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import CONSTRUCTIONS
-from grasp_core.kinds import METHODS
+from grasp_core.kinds import METHODS, RankBy
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.objects.standard_order import standard
+from grasp_core.planning.plan_search import PlanSearch
+from grasp_core.planning.planner import search_plan
 from grasp_core.planning.quadruples import PlannedCones, all_blocks
+from grasp_core.planning.result import PlanRequest
+from grasp_core.stopping import Stop
 from scenes.example_objects import example_object
 from tests.benchmarks.invariance import chosen, examine, found_on
 from tests.benchmarks.objects import sphere_hull
@@ -183,9 +188,10 @@ def test_radii_stay_below_the_bounds_that_prune():
     planned = standard(given)
     body = planned.body
     cones = PlannedCones(body, face_shapes(body), theta, tilted=True)
-    ((room,), make), tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
+    blocks, tested = all_blocks(cones, len(body.faces), np.empty((0, 4), dtype=int)), 0
+    (room,) = blocks.rooms
     for family in DISCS:
-        wide, loose = make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
+        wide, loose = blocks.make(0).ranked(CONSTRUCTIONS[family], LEAST_RADIUS)
         coned, tight = wide.coned(slice(None)).ranked(CONSTRUCTIONS[family])
         coarse = dict(zip(map(tuple, wide.faces.tolist()), loose, strict=True))
         limits = [coarse[tuple(each)] for each in coned.faces.tolist()]
@@ -221,3 +227,78 @@ def test_a_focus_before_some_fingers_and_behind_others_gives_regions_where_nothi
                 assert gc.force_closure(np.array(points), grasp.normals, 0.5).closed
             mixed += 1
     assert mixed >= 4
+
+
+class Looks(Stop):
+    """An end after so many looks at the clock, which no clock decides."""
+
+    def __init__(self, looks):
+        super().__init__()
+        self.looks = looks
+
+    def __call__(self):
+        self.looks -= 1
+        return super().__call__() or self.looks < 0
+
+
+@pytest.fixture(scope="module")
+def bar():
+    body = example_object("double-wedge-bar")
+    return body, {grasp.id for grasp in gc.plan(body)}
+
+
+@pytest.mark.parametrize(
+    ("limit", "looks"), [(None, 0), (None, 10), (None, 60), (6, 0), (6, 5), (6, 15)]
+)
+def test_a_plan_that_is_ended_early_keeps_what_it_found_and_says_so(bar, looks, limit):
+    body, every = bar
+    found = search_plan(body, PlanRequest(limit=limit), Looks(looks))
+    assert found.ended == "time"
+    assert {grasp.id for grasp in found} < every
+    assert all(gc.force_closure(grasp).closed for grasp in found)
+    assert (found.absence is None) == (len(found) > 0)
+    assert found.absence is None or "proves nothing" in found.absence
+    assert found.counts.families["free"].pruned == 0
+    assert "ended early (time)" in repr(found)
+    assert found.outcomes.held + found.outcomes.absent + found.outcomes.open == 70
+
+
+@pytest.mark.parametrize("rank_by", get_args(RankBy))
+def test_grasps_that_there_is_no_time_to_rank_come_last(bar, rank_by):
+    body, every = bar
+    ranked = []
+
+    def tell(done, total):
+        ranked.append((done, total))
+        if done == 3:
+            stop.now()
+
+    stop = Stop()
+    found = search_plan(body, PlanRequest(rank_by=rank_by), stop, ranked=tell)
+    assert {grasp.id for grasp in found} == every
+    if rank_by == "radius":
+        assert (found.ended, ranked) == ("done", [])
+    else:
+        assert found.ended == "interrupt"
+        assert ranked == [(done, len(every)) for done in (1, 2, 3)]
+
+
+def test_what_is_undecided_stays_so_where_time_is_up(bar, monkeypatch):
+    body, _ = bar
+    usual, stop, completed = gc.plan(body, 0.3), Stop(), PlanSearch._completed
+
+    def stopped(search):
+        stop.now()
+        return completed(search)
+
+    monkeypatch.setattr(PlanSearch, "_completed", stopped)
+    found = search_plan(body, PlanRequest(0.3, complete=True), stop)
+    assert found.ended == "interrupt"
+    assert found.undecided == usual.undecided
+    assert len(found.undecided) == 8
+
+
+def test_a_time_limit_is_a_keyword_of_plan():
+    found = gc.plan(example_object("box"), time_limit_s=0.0)
+    assert (len(found), found.ended) == (0, "time")
+    assert gc.plan(example_object("box"), time_limit_s=1e6).ended == "done"

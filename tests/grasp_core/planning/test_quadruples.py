@@ -24,7 +24,8 @@ def planned(body):
 def test_blocks_hold_every_quadruple_with_room_once(name):
     cones = planned(example_object(name))
     roomy = np.flatnonzero(cones.rooms > 0.0)
-    rooms, make = tables.all_blocks(cones, len(cones.rooms), NONE)
+    blocks = tables.all_blocks(cones, len(cones.rooms), NONE)
+    rooms, make = blocks.rooms, blocks.make
     made = [make(place).faces for place in range(len(rooms))]
     assert all(len(each) <= tables.LARGEST_BLOCK for each in made)
     listed = np.concatenate(made)
@@ -69,8 +70,7 @@ def test_the_widest_half_angle_is_that_of_the_definition():
 def test_limits_before_cones_are_chosen_bound_those_after(name):
     body = example_object(name)
     cones, tested = planned(body), 0
-    _, make = tables.all_blocks(cones, len(body.faces), NONE)
-    wide = make(0)
+    wide = tables.all_blocks(cones, len(body.faces), NONE).make(0)
     limits = cones.limits(wide.faces, wide.widest)
     coned = wide.coned(slice(None))
     usable = coned.half_angles > tables.LEAST_SPAN_ANGLE

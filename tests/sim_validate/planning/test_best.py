@@ -11,6 +11,7 @@ from grasp_core.records.grasps_json import grasps_from_json
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning.best import Best
+from tests.sim_validate.interrupts import interrupt_once
 
 ASKED = ["plan", "tetrahedron", "--limit", "2", "--families", "concurrent", "--best"]
 
@@ -48,6 +49,32 @@ def test_planned_grasps_are_compared_with_the_bound(folder):
 def test_a_time_limit_ends_with_the_gap_reached(capsys):
     assert main([*ASKED, "--gap", "0.001", "--time-limit-s", "0.1"]) == 6
     assert "the time limit is reached" in capsys.readouterr().out
+
+
+def test_planned_grasps_are_written_where_no_best_one_is_found(tmp_path, monkeypatch, capsys):
+    def none(*_, **__):
+        raise gc.InputError("no contacts in force closure")
+
+    monkeypatch.setattr("sim_validate.planning.best.best_until", none)
+    assert main([*ASKED, "--out", str(tmp_path)]) == Exit.INPUT
+    assert "no contacts in force closure" in capsys.readouterr().err
+    assert len(gc.load_grasps(tmp_path / "grasps.json")) == 1
+
+
+def test_an_object_that_no_best_grasp_can_be_searched_on_is_refused_before_it_is_planned(
+    monkeypatch, capsys
+):
+    monkeypatch.setattr("grasp_core.optimizing.contact_places.MOST_PIECES", 3)
+    monkeypatch.setattr("sim_validate.planning.plan.search_plan", None)
+    assert main(ASKED) == Exit.INPUT
+    assert "1 to 3 convex pieces" in capsys.readouterr().err
+
+
+def test_an_interrupt_of_planning_ends_the_search_for_the_best_too(tmp_path, monkeypatch):
+    interrupt_once(monkeypatch)
+    assert main([*ASKED, "--out", str(tmp_path)]) == Exit.INTERRUPTED
+    assert gc.load_grasps(tmp_path / "grasps.json").ended == "interrupt"
+    assert not (tmp_path / "best.json").exists()
 
 
 def test_a_task_can_be_held_best(tmp_path, capsys):
