@@ -4,12 +4,15 @@ Each setting is declared once here. Functions take these classes, tables of file
 commands are made of them; see `grasp_core.settings`. Scenes spell out every setting of MuJoCo.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
+from grasp_core.declared import default_of
 from grasp_core.errors import InputError
 from grasp_core.kinds import LARGEST, Direction, NotNegative, Quantity, Range, Share
 from grasp_core.settings import CHOSEN, Settings
+from grasp_core.small_objects import fitted
 
 if TYPE_CHECKING:
     from grasp_core.objects.polyhedron import Polyhedron
@@ -212,6 +215,10 @@ class ScaledScene(Settings):
 UPRIGHT = (0.0, 0.0, -1.0)
 WATER_KG_M3 = 1000.0
 """Density of an object of which neither mass nor density is given."""
+FITTED: Mapping[str, int] = {
+    "off_mm": 1, "max_mm": 1, "tip_stiffness_n_per_m": 1, "push_n": 2, "tip_mass_kg": 2,
+}  # fmt: skip
+"""Settings that are fitted to small objects, with the power of the size (see `small_objects`)."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -234,6 +241,10 @@ class HeldSettings(Settings):
     down: Direction = UPRIGHT
     """Direction of gravity in the object's frame, in trials that do not choose their own; its
     length does not matter."""
+    fit_to_size: bool = True
+    """Fit numbers that are left at their defaults to objects with a radius below 25 mm: with s the
+    radius over 25 mm, `off_mm`, `max_mm` and `tip_stiffness_n_per_m` are multiplied by s, `push_n`
+    and `tip_mass_kg` by its square. Files say which numbers were used."""
 
     def _check_together(self) -> None:
         if self.mass_kg is not None and self.density_kg_m3 is not None:
@@ -258,5 +269,11 @@ class HeldSettings(Settings):
         return body.mass_at(WATER_KG_M3 if self.density_kg_m3 is None else self.density_kg_m3)
 
     def for_body(self, body: "Polyhedron") -> Self:
-        """Return the settings with the mass of an object."""
-        return replace(self, mass_kg=self.mass_of(body), density_kg_m3=None)
+        """Return the settings with the mass of an object, and with what is fitted to its size."""
+        usual = {each.name: default_of(each) for each in fields(self) if each.name in FITTED}
+        small = {
+            name: fitted(number, body.radius, FITTED[name])
+            for name, number in usual.items()
+            if self.fit_to_size and getattr(self, name) == number
+        }
+        return replace(self, mass_kg=self.mass_of(body), density_kg_m3=None, **small)

@@ -35,6 +35,7 @@ from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kep
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
 from grasp_core.processes import Processes
+from grasp_core.small_objects import fitted
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
 from grasp_core.stopping import never, until
 from grasp_core.values import FINGERS, FaceQuadruple, four
@@ -336,7 +337,7 @@ def _without_room(on: Standard) -> int:
 
 
 PUSH_N = 10.0
-"""Largest push of a finger under which payloads and first slips are compared [N]."""
+"""Largest push of a finger under which payloads are compared [N]; less for small objects."""
 TIP_RADIUS = 0.1
 """Radius of fingertips whose size is not given, in object radii: that of scenes."""
 
@@ -414,10 +415,10 @@ def carried(
     count, tip = len(points), TIP_RADIUS * body.radius if finger is None else finger.radius_m
     start = Grip(
         points, normals, np.full(count, friction), np.zeros((count, 3)),
-        springs(STIFFNESS_N_PER_M, count), np.full(count, tip),
+        springs(fitted(STIFFNESS_N_PER_M, body.radius), count), np.full(count, tip),
     )  # fmt: skip
     try:
-        return searched(start, any_direction(1.0), PUSH_N).scale
+        return searched(start, any_direction(1.0), fitted(PUSH_N, body.radius, 2)).scale
     except NoForcesError:
         return 0.0
 

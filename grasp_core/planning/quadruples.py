@@ -306,9 +306,12 @@ class Blocks:
 
 def kept(blocks: Blocks, count: int) -> Blocks:
     """Give blocks a memory: the first `count` are made once and then kept."""
-    make = blocks.make
-    once = cache(make)
-    return replace(blocks, make=lambda place: (once if place < count else make)(place))
+    once = cache(blocks.make)
+
+    def make(place: int) -> WideQuadruples:
+        return (once if place < count else blocks.make)(place)
+
+    return replace(blocks, make=make)
 
 
 def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
@@ -330,7 +333,7 @@ def all_blocks(cones: PlannedCones, whole: int, shared: Indices) -> Blocks:
         numbers = np.arange(int(starts[place]), int(ends[place]), dtype=np.int64)
         return _quadruples(cones, order[_unranked(numbers, len(order))])
 
-    sizes = [*np.diff(ends, prepend=0).tolist(), *map(len, parts)]
+    sizes: list[int] = [*(ends - starts).tolist(), *(len(part) for part in parts)]
     return Blocks(np.concatenate(rooms), sizes, make)
 
 

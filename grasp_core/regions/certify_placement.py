@@ -39,10 +39,12 @@ from grasp_core.regions.placement import (
     chance_of_turning,
 )
 from grasp_core.regions.proof import TwistCover
+from grasp_core.small_objects import fitted
 from grasp_core.values import FINGERS, Grasp, four
 
 OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
-"""Standard deviations of place and turn that rankings and datasets count on."""
+"""Standard deviations of place and turn that rankings and datasets count on; that of the place is
+less for small objects."""
 CONES = 4000
 """Default for the largest number of cones in one proof."""
 PRISMS = ((4.5, 4.0), (4.0, 3.2), (3.5, 2.6))
@@ -173,7 +175,7 @@ def usual_chance(body: Polyhedron, grasp: Grasp, friction: float) -> float:
         InputError: The contacts are not on the faces.
     """
     proved = placement_probability(
-        body, grasp, friction, pose_sigma_m=OFF_M, pose_sigma_rad=OFF_RAD
+        body, grasp, friction, pose_sigma_m=fitted(OFF_M, body.radius), pose_sigma_rad=OFF_RAD
     )
     return 0.0 if proved is None else proved.lower
 

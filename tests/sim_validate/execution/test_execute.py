@@ -7,6 +7,7 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
+from scenes.example_objects import example_object
 from sim_validate.execution.execute import Fingertips
 from sim_validate.execution.trials import Skipped
 from sim_validate.settings import KINDS
@@ -139,3 +140,19 @@ def test_a_curved_surface_is_there_as_far_as_fingertips_come_and_no_farther():
             points = np.vstack([corners, rng.dirichlet(np.ones(len(corners)), 20) @ corners])
             gaps = np.linalg.norm(points[:, None] - near.contacts, axis=2)
             assert gaps.min() > away
+
+
+def test_a_tiny_part_is_held_by_fingers_of_its_own_size_and_its_controls_let_go():
+    box = example_object("box")
+    body = gc.Polyhedron.from_mesh(0.00346 / box.radius * box.vertices, box.triangles)
+    grasp = gc.plan(body, limit=1)[0]
+    trials = ("weight", "knock", "misplaced")
+    asked = sv.ExecutionSettings(mass_kg=0.00035, trials=trials, misplacements=2)
+    found = sv.execute(body, grasp, 0.5, asked)
+    assert all(trial.survived for trial in found.trials)
+    assert found.controls
+    assert all(control.let_go for control in found.controls)
+    for trial in found.trials:
+        assert trial.displacement_m < 0.0007
+    with pytest.raises(gc.NoForcesError, match="unstable"):
+        sv.execute(body, grasp, 0.5, replace(asked, fit_to_size=False))

@@ -10,7 +10,9 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
+from grasp_core.settings import as_table
 from scenes.example_objects import example_object
+from sim_validate.hands.trials import hand_execution_settings
 from sim_validate.settings import KINDS, TrialKind
 
 TABLE = {
@@ -52,3 +54,40 @@ def test_the_usual_knock_gives_every_mass_the_same_speed(mass_kg, impulse):
     given = sv.ExecutionSettings(mass_kg, knock_n_s=0.2)
     assert given.impulse_n_s == given.used.knock_n_s == 0.2
     assert sv.ExecutionSettings(mass_kg, knock_n_s=0.0).impulse_n_s == 0.0
+
+
+USUAL = {
+    "push_n": 10.0, "off_mm": 2.0, "max_mm": 5.0, "tip_mass_kg": 0.05,
+    "tip_stiffness_n_per_m": 2000.0,
+}  # fmt: skip
+
+
+def of_size(radius_m):
+    wedge = example_object("wedge")
+    return gc.Polyhedron.from_mesh(radius_m / wedge.radius * wedge.vertices, wedge.triangles)
+
+
+def numbers(settings):
+    return {name: getattr(settings, name) for name in USUAL}
+
+
+def test_what_is_left_at_its_default_is_fitted_to_small_objects():
+    asked = sv.ExecutionSettings(mass_kg=0.0003)
+    assert numbers(asked) == numbers(asked.for_body(of_size(0.0251))) == USUAL
+    tiny = of_size(0.0025)
+    found = asked.for_body(tiny)
+    assert numbers(found) == pytest.approx({
+        "push_n": 0.1, "off_mm": 0.2, "max_mm": 0.5, "tip_mass_kg": 0.0005,
+        "tip_stiffness_n_per_m": 200.0,
+    })  # fmt: skip
+    assert found.for_body(tiny) == found
+    assert sv.ExecutionSettings.of_table(as_table(found), "execution").for_body(tiny) == found
+
+
+def test_numbers_that_are_given_stay_as_they_are():
+    tiny = of_size(0.0025)
+    found = sv.ExecutionSettings(mass_kg=0.0003, push_n=0.5, max_mm=1.0).for_body(tiny)
+    assert (found.push_n, found.max_mm, found.off_mm) == (0.5, 1.0, pytest.approx(0.2))
+    as_given = sv.ExecutionSettings(mass_kg=0.0003, fit_to_size=False)
+    assert as_given.for_body(tiny) == as_given
+    assert numbers(hand_execution_settings(0.0003).for_body(tiny)) == {**USUAL, "push_n": 100.0}
