@@ -241,10 +241,11 @@ class HeldSettings(Settings):
     down: Direction = UPRIGHT
     """Direction of gravity in the object's frame, in trials that do not choose their own; its
     length does not matter."""
-    fit_to_size: bool = True
-    """Fit numbers that are left at their defaults to objects with a radius below 25 mm: with s the
-    radius over 25 mm, `off_mm`, `max_mm` and `tip_stiffness_n_per_m` are multiplied by s, `push_n`
-    and `tip_mass_kg` by its square. Files say which numbers were used."""
+    keep_defaults: bool = False
+    """Keep the defaults for objects of every size. Otherwise numbers that are left at them are
+    fitted to objects with a radius below 25 mm: with s the radius over 25 mm, `off_mm`, `max_mm`
+    and `tip_stiffness_n_per_m` are multiplied by s, `push_n` and `tip_mass_kg` by its square. Files
+    say which numbers were used."""
 
     def _check_together(self) -> None:
         if self.mass_kg is not None and self.density_kg_m3 is not None:
@@ -274,6 +275,6 @@ class HeldSettings(Settings):
         small = {
             name: fitted(number, body.radius, FITTED[name])
             for name, number in usual.items()
-            if self.fit_to_size and getattr(self, name) == number
+            if not self.keep_defaults and getattr(self, name) == number
         }
         return replace(self, mass_kg=self.mass_of(body), density_kg_m3=None, **small)

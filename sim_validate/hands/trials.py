@@ -463,7 +463,7 @@ def execute_hand(
 def hand_execution_settings(mass_kg: float) -> ExecutionSettings:
     """Return the usual settings for hands, in which motors alone limit how hard fingers push."""
     # a hand's fingers are as they are, however small the object is
-    return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N, fit_to_size=False)
+    return ExecutionSettings(mass_kg=mass_kg, push_n=MOST_PUSH_N, keep_defaults=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -62,7 +62,7 @@ HELD = {
     "tip_mass_kg": POSITIVE,
     "damping_ratio": POSITIVE | {"a hundred": 100.0},
     "down": array(GRAVITY) | {"zero": (0.0, 0.0, 0.0), "minute": (1e-300, 0.0, 0.0)},
-    "fit_to_size": SWITCH,
+    "keep_defaults": SWITCH,
 }
 
 

@@ -155,4 +155,4 @@ def test_a_tiny_part_is_held_by_fingers_of_its_own_size_and_its_controls_let_go(
     for trial in found.trials:
         assert trial.displacement_m < 0.0007
     with pytest.raises(gc.NoForcesError, match="unstable"):
-        sv.execute(body, grasp, 0.5, replace(asked, fit_to_size=False))
+        sv.execute(body, grasp, 0.5, replace(asked, keep_defaults=True))

@@ -13,6 +13,8 @@ import sim_validate as sv
 from grasp_core.settings import as_table
 from scenes.example_objects import example_object
 from sim_validate.hands.trials import hand_execution_settings
+from sim_validate.kit.command_flags import Execute
+from sim_validate.kit.flag_values import flags_from
 from sim_validate.settings import KINDS, TrialKind
 
 TABLE = {
@@ -88,6 +90,8 @@ def test_numbers_that_are_given_stay_as_they_are():
     tiny = of_size(0.0025)
     found = sv.ExecutionSettings(mass_kg=0.0003, push_n=0.5, max_mm=1.0).for_body(tiny)
     assert (found.push_n, found.max_mm, found.off_mm) == (0.5, 1.0, pytest.approx(0.2))
-    as_given = sv.ExecutionSettings(mass_kg=0.0003, fit_to_size=False)
+    as_given = sv.ExecutionSettings(mass_kg=0.0003, keep_defaults=True)
     assert as_given.for_body(tiny) == as_given
     assert numbers(hand_execution_settings(0.0003).for_body(tiny)) == {**USUAL, "push_n": 100.0}
+    changed = {"keep_defaults": as_given.keep_defaults}
+    assert flags_from(changed, Execute) == ["--keep-defaults"]  # commands that repeat executions
