@@ -48,6 +48,10 @@ def remove_unfinished(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
+POINTER = b"version https://git-lfs.github.com/spec/"
+"""First bytes of the small text that Git LFS leaves in place of a large file."""
+
+
 def bounded_bytes(path: Path, most: int) -> bytes:
     """Read a regular file, or its first `most + 1` bytes; pipes, which could block, are refused."""
     try:
@@ -60,9 +64,15 @@ def bounded_bytes(path: Path, most: int) -> bytes:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             raise OSError(None, "the path is a folder, a pipe or a device", str(path))
         with os.fdopen(handle, "rb", closefd=False) as stream:
-            return stream.read(most + 1)
+            data = stream.read(most + 1)
     finally:
         os.close(handle)
+    if data.startswith(POINTER):
+        raise InputError(
+            "the file is a pointer of Git LFS, which stands for the file itself; fetch that with "
+            "`git lfs pull`"
+        )
+    return data
 
 
 MAX_TEXT_BYTES = 256 * 2**20
@@ -73,7 +83,8 @@ MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 def read_bytes(path: Path, most: int = MAX_TEXT_BYTES) -> bytes:
     """Read a regular file; pipes and devices are refused, because they may never end."""
     try:
-        data = bounded_bytes(path, most)
+        with about(path):
+            data = bounded_bytes(path, most)
     except OSError as error:
         raise InputError(
             f"{path}: the file cannot be read ({error.strerror}); give the path of a readable file"

@@ -34,7 +34,10 @@ FLATTEST = 0.5
 
 def too_many(triangles: int, most: int) -> NoReturn:
     """Refuse a file that has too many triangles."""
-    message = f"the mesh has {triangles} or more triangles, the limit is {most}; simplify it"
+    message = (
+        f"the mesh has {triangles} or more triangles, the limit is {most}; simplify it, or allow "
+        "more (--max-triangles)"
+    )
     raise MeshError(MeshRefusal.TOO_MANY, message)
 
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.errors import MeshError, MeshRefusal, about
+from grasp_core.errors import InputError, MeshError, MeshRefusal, about
 from grasp_core.files.text_files import bounded_bytes
 from grasp_core.mesh_files.glb import read_glb
 from grasp_core.mesh_files.limits import MeshLimits
@@ -63,12 +63,19 @@ def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
             data = bounded_bytes(path, limits.max_mesh_bytes)
             if len(data) > limits.max_mesh_bytes:
                 most = limits.max_mesh_bytes
-                message = f"the file is over the limit of {most} bytes; simplify it"
+                message = (
+                    f"the file is over the limit of {most} bytes; simplify it, or allow more "
+                    "(--max-mesh-bytes, and perhaps --max-triangles)"
+                )
                 raise MeshError(MeshRefusal.TOO_MANY, message)
             return mesh_of_bytes(kind, data, limits.max_triangles)
         except OSError as error:
             message = f"the file cannot be read ({error.strerror}); check the path"
             raise MeshError(MeshRefusal.UNREADABLE, message) from error
+        except InputError as error:
+            if isinstance(error, MeshError):
+                raise
+            raise MeshError(MeshRefusal.UNREADABLE, str(error)) from error
         except MemoryError as error:
             message = "reading it needs more memory than there is; simplify the mesh"
             raise MeshError(MeshRefusal.LIMIT, message) from error

@@ -167,7 +167,7 @@ def _planar_groups(
     if len(groups) > choices.max_faces:
         message = (
             f"the mesh has more planar faces than the limit of {choices.max_faces}; simplify the "
-            "mesh, or plan on nearly flat patches (--faces patches)"
+            "mesh, plan on nearly flat patches (--faces patches), or allow more (--max-faces)"
         )
         raise MeshError(MeshRefusal.TOO_MANY, message)
     return groups

@@ -100,7 +100,8 @@ def one_solid(found: SoundSurface, choices: MeshChoices) -> SoundSurface:
     if (count := len(shells)) > (most := choices.max_parts):
         raise MeshError(
             MeshRefusal.SEPARATE,
-            f"the mesh has {count} parts, more than the limit of {most}; give one solid",
+            f"the mesh has {count} parts, more than the limit of {most}; give one solid, or allow "
+            "more (--max-parts)",
         )
     as_it_is = found.mended(whole, found.surface.caps, 0.0, said)
     if count == 1:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from grasp_core.errors import InputError
+from grasp_core.errors import InputError, about
+from grasp_core.files.text_files import bounded_bytes
 
 LARGEST_TEXT, LARGEST_FILES = 4 * 2**20, 64 * 2**20
 """Largest size of the text, and of all files that it names together [bytes]."""
@@ -225,8 +226,8 @@ def _is_called(folder: Path, package: str) -> bool:
 
 def _bytes(path: Path, most: int) -> bytes:
     try:
-        with path.open("rb") as file:
-            content = file.read(most + 1)
+        with about(path.name):
+            content = bounded_bytes(path, most)
     except OSError as error:
         raise InputError(f"{path.name} cannot be read: {error.strerror or error}") from error
     if len(content) > most:

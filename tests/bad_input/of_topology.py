@@ -70,9 +70,10 @@ BAD = {
 }  # fmt: skip
 FLAGS = {
     "six faces of five allowed": (
-        BOX, "--max-faces 5 --faces planar", "GP-MESH-TOO-MANY|planar faces|patches"),
-    "twelve triangles of ten allowed": (BOX, "--max-triangles 10", "GP-MESH-TOO-MANY|simplify"),
-    "two parts of one allowed": (TWO, "--max-parts 1", "GP-MESH-SEPARATE|limit"),
+        BOX, "--max-faces 5 --faces planar", "GP-MESH-TOO-MANY|planar faces|patches|--max-faces"),
+    "twelve triangles of ten allowed": (
+        BOX, "--max-triangles 10", "GP-MESH-TOO-MANY|--max-triangles"),
+    "two parts of one allowed": (TWO, "--max-parts 1", "GP-MESH-SEPARATE|--max-parts"),
     "patches of a box that is open in all": (
         ([*CORNERS], [(0, 1, 2)]), "--faces patches", "GP-MESH-OPEN|which side|largest-part"),
     "a centre of mass far off": (BOX, "--center-of-mass-m 9 9 9", "center_of_mass"),

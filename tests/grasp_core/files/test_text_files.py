@@ -1,7 +1,13 @@
+from functools import partial
+
 import pytest
 
+import grasp_core as gc
+import scenes
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import read_text, write_text
+from sim_validate.hands.dexgraspbench import load_dex_record
+from sim_validate.kit.files import read_arrays
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):
@@ -18,6 +24,23 @@ def test_a_failed_write_leaves_the_old_file_and_no_rest(tmp_path):
         write_text(path, "\ud800")
     assert read_text(path) == "one"
     assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+
+
+POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:0123\nsize 123456\n"
+
+
+@pytest.mark.parametrize("ending", ["obj", "stl", "ply", "off", "glb", "json", "npy", "xml", "npz"])
+def test_a_pointer_of_git_lfs_is_called_what_it_is_by_every_reader(ending, tmp_path):
+    path = tmp_path / f"file.{ending}"
+    path.write_text(POINTER)
+    read = {
+        "json": gc.load_grasps, "npy": load_dex_record,
+        "xml": partial(scenes.load_hand, fingertips=("a", "b", "c")),
+        "npz": lambda path: read_arrays(path, ()),
+    }.get(ending, gc.load_polyhedron)  # fmt: skip
+    with pytest.raises(InputError, match=r"pointer of Git LFS.*`git lfs pull`") as caught:
+        read(path)
+    assert str(path.name) in str(caught.value)
 
 
 def test_unreadable_files_are_refused(tmp_path):

@@ -297,9 +297,9 @@ def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
     mesh = read_triangles(path, just)
     assert (len(mesh.triangles), mesh.data) == (4, data)
     assert np.isfinite(mesh.vertices).all()
-    for limits in (MeshLimits(max_mesh_bytes=len(data) - 1), MeshLimits(max_triangles=3)):
-        with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*limit") as caught:
-            read_triangles(path, limits)
+    for flag, most in (("max-mesh-bytes", len(data) - 1), ("max-triangles", 3)):
+        with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*limit.*--{flag}") as caught:
+            read_triangles(path, MeshLimits(**{flag.replace("-", "_"): most}))
         assert caught.value.reason is MeshRefusal.TOO_MANY
 
 
