@@ -46,6 +46,7 @@ from grasp_core.objects.planar_faces import (
 from grasp_core.objects.shells import (
     check_bounds,
     check_volume,
+    keep_out_of_voids,
     one_solid,
     outward_sheets,
     wound_alike,
@@ -91,6 +92,7 @@ def build(
         check_bounds(found)
     else:
         found = outward_sheets(found, largest_part=choices.largest_part)
+        found = found if known else keep_out_of_voids(found)
     patches = None
     if groups is None:
         patches = choices.patches
@@ -289,7 +291,10 @@ def sound_surface(
     # a volume is enclosed where edges are run along as often in both directions
     closed = not mesh.edges.balance.any()
     found = SoundSurface(mesh.vertices, mesh.triangles, replace(surface, closed=closed))
-    return one_solid(found, choices) if closed else found
+    if not closed:
+        return found
+    solid = one_solid(found, choices)
+    return solid if known else keep_out_of_voids(solid)
 
 
 def _joined(given: Mesh, flatness_m: float, most_parts: int) -> tuple[Mesh, list[str]]:

@@ -235,6 +235,23 @@ def check_volume(solid: Mesh) -> None:
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
 
+def keep_out_of_voids(found: SoundSurface) -> SoundSurface:
+    """Let no finger stand on the walls of voids, which are closed parts wound inwards."""
+    label, sizes = _parts(found), np.linalg.det(found.corners - found.vertices.mean(axis=0))
+    volumes = np.bincount(label, weights=sizes) / 6.0
+    is_open = np.bincount(label, weights=(found.across < 0).any(axis=1)) > 0.0
+    is_void = ~is_open & (volumes < -THINNEST * found.extent**3)
+    if not is_void.any():
+        return found
+    count, volume = int(is_void.sum()), -1e6 * float(volumes[is_void].sum())
+    said = (
+        f"{count} void{'s' * (count > 1)} of {volume:.4g} cm^3 sealed from the outside: no finger "
+        "is placed inside, and volume and centre of mass are without it"
+    )
+    walls = np.flatnonzero(is_void[label])
+    return found.mended(found, np.union1d(found.surface.caps, walls), 0.0, [said])
+
+
 def thin_share(solid: Solid) -> float:
     """Return the share of the surface that is beside slits or walls thinner than `THIN`.
 
@@ -266,10 +283,7 @@ def check_bounds(surface: Mesh) -> None:
 
 def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
     """Orient the parts of an open surface outwards."""
-    # parts connect across edges of two triangles
-    here, side = np.nonzero(found.across >= 0)
-    links = np.column_stack([here, found.across[here, side]])
-    label, said = numbered(len(found.triangles), links), list[str]()
+    label, said = _parts(found), list[str]()
     mesh, whole, count = Mesh(found.vertices, found.triangles), found.areas.sum(), label.max() + 1
     if largest_part:
         kept = label == np.bincount(label, weights=mesh.areas).argmax()
@@ -302,6 +316,12 @@ def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
         said.append(left_out(apart, dropped))
     used = mesh.with_triangles(mesh.triangles[sound[label]])
     return found.mended(used, NO_CAPS, max(dropped, 0.0), said)
+
+
+def _parts(mesh: Mesh) -> Indices:
+    """Number the part of each triangle; parts connect across edges of two triangles, (t,)."""
+    here, side = np.nonzero(mesh.across >= 0)
+    return numbered(len(mesh.triangles), np.column_stack([here, mesh.across[here, side]]))
 
 
 def _winding_of_parts(mesh: Mesh, label: Indices) -> Array:

@@ -331,7 +331,8 @@ class Surface(Declared):
     """Whether the triangles, caps included, enclose a solid. Where they do not, the mass properties
     are those of the convex hull."""
     caps: Places = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    """Indices of the triangles that close small holes, (c,); no finger may stand on them."""
+    """Indices of triangles on which no finger may stand, (c,): those that close small holes, and
+    the walls of voids that are sealed from the outside."""
     holes: Number = 0
     """Number of holes that were closed."""
     largest_hole_m: NotNegative = 0.0

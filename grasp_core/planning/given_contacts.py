@@ -123,13 +123,14 @@ class Facets:
 
 @lru_cache(maxsize=8)
 def facets_of(body: Polyhedron) -> Facets:
-    """List the triangles of an object's surface; kept, as they are searched for every contact."""
+    """List the triangles on which fingers may stand; kept, as every contact searches them."""
     if body.patches is None:
         fans = [fan(face) for face in body.faces]
         faces = np.repeat(np.arange(len(fans)), [len(each) for each in fans])
         return Facets(faces, body.normals[faces], np.concatenate(fans))
     corners = body.vertices[body.triangles[:, ::-1]]
     areas, normals = areas_and_normals(corners)
+    areas[body.surface.caps] = 0.0
     (kept,) = np.nonzero(areas > 0.0)
     return Facets(kept, normals[kept], corners[kept])
 

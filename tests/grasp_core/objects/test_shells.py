@@ -9,6 +9,7 @@ from scipy import ndimage
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
+from grasp_core.planning.given_contacts import facets_of
 
 UNIT = 0.01
 """Side of the cubes that boxes are counted in [m]."""
@@ -107,8 +108,37 @@ def test_a_cavity_that_is_wound_inwards_stays_one(turn):
     parts = [box(*WHOLE), turned(box((2, 2, 2), (4, 4, 4)))]
     body = load(*(map(turned, parts) if turn else parts))
     assert body.volume == pytest.approx((216 - 8) * UNIT**3)
-    assert len(body.faces) == 12
     assert any("inside out" in note for note in body.notes) is turn
+
+
+def test_no_finger_stands_in_a_void_that_is_sealed_from_the_outside(tmp_path):
+    outside, void = box(*WHOLE), turned(box((1, 2, 2), (4, 4, 4)))
+    body = load(outside, void)
+    assert len(body.faces) == 6
+    assert sum(face.area for face in body.faces) == pytest.approx(6 * 36 * UNIT**2)
+    np.testing.assert_allclose(body.center_of_mass[0], UNIT * (216 * 3 - 12 * 2.5) / 204)
+    assert body.notes[-1].startswith("1 void of 12 cm^3 sealed from the outside")
+    plan = gc.plan(body, 0.5, limit=5)
+    again = gc.load_grasps(gc.save_grasps(tmp_path / "grasps.json", plan)).body
+    assert (len(again.faces), again.notes) == (6, body.notes)
+    plates = [box(low, high) for low, high in (
+        ((0, 0, 0), (6, 6, 1)), ((0, 0, 5), (6, 6, 6)), ((0, 0, 1), (6, 1, 5)),
+        ((0, 5, 1), (6, 6, 5)), ((0, 1, 1), (1, 5, 5)), ((5, 1, 1), (6, 5, 5)))]  # fmt: skip
+    assert len(load(*plates).faces) == 6
+    assert len(load(*plates[:5]).faces) == 11
+
+
+@pytest.mark.parametrize("hole", [0, 40])
+def test_a_finger_on_a_curved_surface_may_stand_in_no_sealed_void_either(hole):
+    """Inside an open surface, too, a closed part that is wound inwards bounds a void."""
+    outer, inner = (trimesh.creation.icosphere(subdivisions=3, radius=r) for r in (0.05, 0.04))
+    below = np.argsort(outer.triangles_center[:, 2])[hole:]
+    body = load((outer.vertices, outer.faces[below]), (inner.vertices, inner.faces[:, ::-1]))
+    assert body.surface.closed is not bool(hole)
+    assert len(body.surface.caps) == len(inner.faces)
+    assert all(np.linalg.norm(face.centroid) > 0.045 for face in body.faces)
+    corners = facets_of(body).corners
+    assert np.linalg.norm(corners.mean(axis=1), axis=1).min() > 0.045
 
 
 def test_a_part_in_a_cavity_is_apart():
