@@ -81,6 +81,11 @@ def intersection_volume(one: Mesh, two: Mesh) -> float:
     return float((_manifold(one) ^ _manifold(two)).volume())
 
 
+def gap_between(one: Mesh, two: Mesh, most: float) -> float:
+    """Compute the distance between two solids, or `most` if they are farther apart [m]."""
+    return float(_manifold(one).min_gap(_manifold(two), most))
+
+
 def union(solids: Sequence[Mesh], numbers: Sequence[Indices]) -> tuple[Solid, Indices]:
     """Unite solids whose triangles are numbered; parts of triangles keep their numbers, (t,)."""
     kernel = _kernel()

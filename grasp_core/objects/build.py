@@ -51,7 +51,8 @@ from grasp_core.objects.shells import (
     outward_sheets,
     wound_alike,
 )
-from grasp_core.objects.surface import Face, Mesh, SoundSurface, Surface, components
+from grasp_core.objects.surface import SIDES, Face, Mesh, SoundSurface, Surface, components
+from grasp_core.objects.touching_parts import pulled_apart
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
@@ -277,10 +278,11 @@ def sound_surface(
 ) -> SoundSurface:
     """Make one surface of triangles."""
     if known is None:
-        mesh, said = _joined(given, flatness_m, choices.max_parts)
+        mesh, said = _joined(given, flatness_m)
         surface = Surface(flatness_m=flatness_m, repairs=tuple(said))
         if mesh.edges.fault():
             mesh, surface = _capped(mesh, surface)
+            mesh = pulled_apart(mesh) or mesh
     else:  # vertices that were kept apart may be equal, where a united solid touches itself
         mesh, _ = welded(given, reach=-1.0)
         surface, count = known, len(mesh.triangles)
@@ -297,11 +299,14 @@ def sound_surface(
     return solid if known else keep_out_of_voids(solid)
 
 
-def _joined(given: Mesh, flatness_m: float, most_parts: int) -> tuple[Mesh, list[str]]:
+def _joined(given: Mesh, flatness_m: float) -> tuple[Mesh, list[str]]:
     """Weld close vertices, and wind triangles like their neighbours; also say what was changed."""
     mesh, dropped = welded(given)
     said = [f"dropped {dropped} triangles without area"] if dropped else []
     fault = mesh.edges.fault()
+    if fault and (twice := len(mesh.triangles) - len((once := _without_repeats(mesh)).triangles)):
+        mesh, fault = once, once.edges.fault()
+        said.append(f"dropped {twice} triangles that were there twice")
     if fault and fault.reason is MeshRefusal.WINDING:
         wound = wound_alike(mesh.triangles, mesh.areas)
         if wound is None:
@@ -314,9 +319,7 @@ def _joined(given: Mesh, flatness_m: float, most_parts: int) -> tuple[Mesh, list
         mesh = Mesh(mesh.vertices, triangles)
         said.append(f"triangles wound against their neighbours were turned, {turned.sum()} in all")
         fault = mesh.edges.fault()
-    if fault and fault.reason is MeshRefusal.NON_MANIFOLD:
-        mesh = _welded_apart(given, most_parts) or mesh
-    elif fault and flatness_m:
+    if fault and fault.reason is not MeshRefusal.NON_MANIFOLD and flatness_m:
         closer, _ = welded(mesh, 0.5 * flatness_m)
         if closer.edges.fault() is None:
             mesh = closer
@@ -324,19 +327,25 @@ def _joined(given: Mesh, flatness_m: float, most_parts: int) -> tuple[Mesh, list
     return mesh, said
 
 
-def _welded_apart(given: Mesh, most: int) -> Mesh | None:
-    """Weld parts without common vertices one by one; None unless all of several bound solids."""
-    vertices, triangles = given.vertices, given.triangles
-    sides = np.column_stack([triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()])
-    _, label = np.unique(components(len(vertices), sides)[triangles[:, 0]], return_inverse=True)
-    if not 1 <= label.max() < most:
-        return None
-    parts = [welded(Mesh(vertices, triangles[label == part]))[0] for part in range(label.max() + 1)]
-    if any(part.edges.fault() for part in parts):
-        return None
-    counts = [len(part.vertices) for part in parts]
-    joined = [part.triangles + sum(counts[:place]) for place, part in enumerate(parts)]
-    return Mesh(np.concatenate([part.vertices for part in parts]), np.concatenate(joined))
+def _without_repeats(mesh: Mesh) -> Mesh:
+    """Drop triangles that are there twice, and those once from behind if a closed surface is left.
+
+    Triangles stay where edges are run along as often in both directions with them, and not without:
+    there, two parts have the same wall.
+    """
+    triangles, count = mesh.triangles, len(mesh.vertices)
+    first = triangles.argmin(axis=1)[:, None]
+    turned = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
+    once, either = (
+        Mesh(mesh.vertices, triangles[np.sort(np.unique(
+            (row[:, 0] * count + row[:, 1]) * count + row[:, 2], return_index=True)[1])])
+        for row in (turned, np.sort(triangles, axis=1))
+    )  # fmt: skip
+    if not once.edges.balance.any():
+        return once
+    if not mesh.edges.balance.any():
+        return mesh
+    return either if (either.edges.uses == SIDES).all() else once
 
 
 def _capped(mesh: Mesh, surface: Surface) -> tuple[Mesh, Surface]:

@@ -2,10 +2,11 @@
 
 A shell is a part of the mesh that connects across edges. A shell that encloses a positive volume is
 a body; one of negative volume is a cavity if a body encloses it, and a body that is inside out if
-it is beside all others. Bodies that overlap or touch are united. A body inside the material of
-another cannot be told from a cavity that is wound like the outside, so it is refused, as are bodies
-apart from each other. Parts that would be refused are left out if all of them together have next to
-no area, or if the user asks for the largest part alone.
+it is beside all others. Bodies that overlap are united, and those that touch (see
+`touching_parts`). A body inside the material of another cannot be told from a cavity that is wound
+like the outside, so it is refused, as are bodies apart from each other. Parts that would be refused
+are left out if all of them together have next to no area, or if the user asks for the largest part
+alone.
 
 Of open surfaces, winding numbers decide it. The winding number of a point is the sum of the solid
 angles of all triangles as seen from it, divided by that of the whole sphere. It is one inside a
@@ -27,7 +28,8 @@ Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding n
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +37,8 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal
 from grasp_core.mesh_files.limits import MeshChoices
-from grasp_core.objects.booleans import Solid, intersection_volume, union
+from grasp_core.objects.booleans import Solid, gap_between, intersection_volume, union
+from grasp_core.objects.planar_faces import PLANAR, planar_slack
 from grasp_core.objects.surface import (
     NO_CAPS,
     Edges,
@@ -43,13 +46,19 @@ from grasp_core.objects.surface import (
     SoundSurface,
     components,
     crosses_of,
-    numbered,
 )
+from grasp_core.objects.touching_parts import pressed_together, widest_gap
 
 OVERLAP = 1e-6
 """Volume shared by two parts, over the whole, above which they overlap and not only touch."""
 SMALL = 0.01
 """Largest share of the surface that is left out without being asked for."""
+APART = 0.5
+"""Largest distance of faces that touch, over that within which corners count as in one plane."""
+PRESSED = 0.25
+"""Depth to which touching faces are pressed into each other, over the same distance."""
+NEARLY = 1e-3
+"""Largest gap between solids that are nearly one, over the extent."""
 CLEAN = 1e-4
 """Largest share of a union's surface beside slits as thin as rounding; sound ones show 1e-6."""
 THINNEST = 1e-9
@@ -107,7 +116,7 @@ def one_solid(found: SoundSurface, choices: MeshChoices) -> SoundSurface:
     if count == 1:
         return as_it_is
     try:
-        kept, dropped, changed = _of_many(shells, abs(found.volume), choices.largest_part)
+        kept, dropped, changed = _of_many(shells, found, largest_part=choices.largest_part)
     except InputError as error:
         if isinstance(error, MeshError):
             raise
@@ -120,23 +129,24 @@ def one_solid(found: SoundSurface, choices: MeshChoices) -> SoundSurface:
 
 
 def _of_many(
-    shells: list[_Body], volume: float, largest_part: bool
+    shells: list[_Body], found: SoundSurface, *, largest_part: bool
 ) -> tuple[_Body, float, list[str]]:
     """Return the one body to use, the share of the area left out, and what else was changed."""
     said = list[str]()
     area = sum(shell.area for shell in shells)
-    slack = OVERLAP * volume
+    slack = OVERLAP * abs(found.volume)
     bodies, bad, why = _sorted_out(shells, slack, said)
     if not bodies and why is not None:
         raise why
-    united = _united(bodies, slack, said)
+    united = _united(bodies, found, said)
     kept = max(united, key=lambda body: body.area)
     apart = [body for body in united if body is not kept]
     if apart and why is None:
         why = MeshError(
             MeshRefusal.SEPARATE,
-            f"the mesh holds {len(united)} solids, expected one solid; give each its own file, or "
-            "use the largest alone (--largest-part)",
+            f"the mesh holds {len(united)} solids, expected one solid; "
+            f"{_on_gaps(united, found.extent) or _on_edges(united, found.extent)}give each its own "
+            "file, or use the largest alone (--largest-part)",
         )
     dropped = sum(body.area for body in (*apart, *bad)) / area
     if why is not None and dropped > SMALL and not largest_part:
@@ -209,23 +219,70 @@ def _is_inside_another(place: int, bodies: list[_Body], slack: float) -> bool:
     )
 
 
-def _united(bodies: list[_Body], slack: float, said: list[str]) -> list[_Body]:
+def _united(bodies: list[_Body], found: SoundSurface, said: list[str]) -> list[_Body]:
     """Unite bodies that overlap or touch; those that do not are returned as they are."""
     if len(bodies) == 1:
         return bodies
-    solid, marks = union(bodies, [body.marks for body in bodies])
-    found, flat, _ = _sorted_out(_Body(solid.vertices, solid.triangles, marks).parts(), slack, [])
-    found += [shell for shell in flat if shell.volume > 0.0]
-    if len(found) == len(bodies):
+    extent, slack = found.extent, OVERLAP * abs(found.volume)
+    reach = APART * planar_slack(extent, found.surface.flatness_m)
+    united = _union(bodies, slack)
+    # exact faces unite as they are; those that are off by rounding need to overlap
+    if len(united) > 1 or reach > THIN * extent or _slitted(united):
+        places, pairs = pressed_together(bodies, max(THIN * extent, reach), PRESSED * reach)
+        pressed = [replace(each, vertices=at) for each, at in zip(bodies, places, strict=True)]
+        groups = _joined_by(pairs, bodies, united)
+        united = _union(pressed, slack) if pairs else united
+        if len(united) < groups:  # by what faces move, parts overlap that only an edge connects
+            return bodies
+    if len(united) == len(bodies):
         return bodies
-    if max(map(thin_share, found)) > CLEAN:
+    if _slitted(united):
         raise MeshError(
             MeshRefusal.OVERLAP,
-            "parts touch, but rounding leaves thin slits between them; let them overlap, or unite "
-            "them in a modelling program",
+            f"parts touch, but rounding leaves thin slits between them; {_on_gaps(bodies, extent)}"
+            "let them overlap, or unite them in a modelling program",
         )
     said.append(f"{len(bodies)} parts that overlap or touch were united")
-    return found
+    return united
+
+
+def _union(bodies: list[_Body], slack: float) -> list[_Body]:
+    solid, marks = union(bodies, [body.marks for body in bodies])
+    parts = _Body(solid.vertices, solid.triangles, marks).parts()
+    united, flat, _ = _sorted_out(parts, slack, [])
+    return united + [shell for shell in flat if shell.volume > 0.0]
+
+
+def _joined_by(pairs: list[tuple[int, int]], bodies: list[_Body], united: list[_Body]) -> int:
+    """Count the groups of bodies that pairs connect, or that are in one solid already."""
+    marks = [frozenset(body.marks.tolist()) for body in bodies]
+    for solid in united:
+        first, *others = [k for k, own in enumerate(marks) if not own.isdisjoint(solid.marks)]
+        pairs = [*pairs, *((first, other) for other in others)]
+    return len(set(components(len(bodies), np.array(pairs, dtype=np.int64).reshape(-1, 2))))
+
+
+def _slitted(bodies: list[_Body]) -> bool:
+    return max(map(thin_share, bodies)) > CLEAN
+
+
+def _on_gaps(bodies: list[_Body], extent: float) -> str:
+    """Say what helps bodies with gaps between their faces, if there are any."""
+    gap = widest_gap(bodies, NEARLY * extent)
+    if gap is None or gap <= PLANAR * extent:
+        return ""
+    return (
+        f"take faces that are up to {1e3 * gap:.2g} mm apart for touching (--flatness-m "
+        f"{1.1 * gap / APART:.1e}), or "
+    )
+
+
+def _on_edges(bodies: list[_Body], extent: float) -> str:
+    """Say so if bodies meet in no more than edges or corners."""
+    near = PLANAR * extent
+    if any(gap_between(one, two, 2.0 * near) <= near for one, two in combinations(bodies, 2)):
+        return "some meet in edges or corners only, which hold nothing: let them overlap, or "
+    return ""
 
 
 def check_volume(solid: Mesh) -> None:
@@ -237,7 +294,7 @@ def check_volume(solid: Mesh) -> None:
 
 def keep_out_of_voids(found: SoundSurface) -> SoundSurface:
     """Let no finger stand on the walls of voids, which are closed parts wound inwards."""
-    label, sizes = _parts(found), np.linalg.det(found.corners - found.vertices.mean(axis=0))
+    label, sizes = found.connected, np.linalg.det(found.corners - found.vertices.mean(axis=0))
     volumes = np.bincount(label, weights=sizes) / 6.0
     is_open = np.bincount(label, weights=(found.across < 0).any(axis=1)) > 0.0
     is_void = ~is_open & (volumes < -THINNEST * found.extent**3)
@@ -283,7 +340,7 @@ def check_bounds(surface: Mesh) -> None:
 
 def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
     """Orient the parts of an open surface outwards."""
-    label, said = _parts(found), list[str]()
+    label, said = found.connected, list[str]()
     mesh, whole, count = Mesh(found.vertices, found.triangles), found.areas.sum(), label.max() + 1
     if largest_part:
         kept = label == np.bincount(label, weights=mesh.areas).argmax()
@@ -316,12 +373,6 @@ def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
         said.append(left_out(apart, dropped))
     used = mesh.with_triangles(mesh.triangles[sound[label]])
     return found.mended(used, NO_CAPS, max(dropped, 0.0), said)
-
-
-def _parts(mesh: Mesh) -> Indices:
-    """Number the part of each triangle; parts connect across edges of two triangles, (t,)."""
-    here, side = np.nonzero(mesh.across >= 0)
-    return numbered(len(mesh.triangles), np.column_stack([here, mesh.across[here, side]]))
 
 
 def _winding_of_parts(mesh: Mesh, label: Indices) -> Array:

@@ -94,6 +94,12 @@ class Mesh:
         """The one triangle across each edge (k, k+1), (t, 3); -1 where there is none."""
         return self.edges.neighbours()
 
+    @cached_property
+    def connected(self) -> Indices:
+        """Number of the part of each triangle; parts connect across edges of two triangles."""
+        here, side = np.nonzero(self.across >= 0)
+        return numbered(len(self.triangles), np.column_stack([here, self.across[here, side]]))
+
     def fitted(self, members: Indices) -> Plane:
         """Fit a plane to triangles."""
         weights = self.areas[members]

@@ -35,9 +35,6 @@ OPEN = (CORNERS, TRIANGLES[1:])
 BAD = {
     "an open box": ((BOX[0], BOX[1][1:]), "GP-MESH-OPEN|patches"),
     "an open tetrahedron": (OPEN, "GP-MESH-OPEN|patches"),
-    "a face twice": ((CORNERS, [*TRIANGLES, TRIANGLES[0]]), "triangles"),
-    "a face twice, once from behind": (
-        (CORNERS, [*TRIANGLES, TRIANGLES[0][::-1]]), "GP-MESH-NON-MANIFOLD"),
     "two faces back to back": ((CORNERS, [(0, 1, 2), (2, 1, 0)]), "volume"),
     "an edge of four faces": (
         ([*CORNERS, (-0.1, 0, 0), (0, -0.1, 0)],
@@ -47,9 +44,9 @@ BAD = {
     "a solid inside a solid": (
         boxes(((0, 0, 0), 0.1), ((0.02, 0.02, 0.02), 0.05)), "GP-MESH-OVERLAP|unite"),
     "solids that share an edge": (
-        boxes(((0, 0, 0), 0.1), ((0.1, 0.1, 0), 0.1)), "GP-MESH-SEPARATE"),
+        boxes(((0, 0, 0), 0.1), ((0.1, 0.1, 0), 0.1)), "GP-MESH-SEPARATE|edges or corners"),
     "solids that share a corner": (
-        boxes(((0, 0, 0), 0.1), ((0.1, 0.1, 0.1), 0.1)), "GP-MESH-SEPARATE"),
+        boxes(((0, 0, 0), 0.1), ((0.1, 0.1, 0.1), 0.1)), "GP-MESH-SEPARATE|edges or corners"),
     "a part inside out beside another": (
         (TWO[0], [*TWO[1][:6], *turned(TWO[1][6:])]), "GP-MESH"),
     "a flat solid": (([(x, y, 0) for x, y, _ in CORNERS], TRIANGLES), "GP-MESH-ZERO-VOLUME"),
@@ -85,6 +82,8 @@ GOOD = {
     "solids that overlap": boxes(((0, 0, 0), 0.1), ((0.05, 0.03, 0.02), 0.1)),
     "solids that share a face": boxes(((0, 0, 0), 0.1), ((0.1, 0, 0), 0.1)),
     "inside out": (CORNERS, turned(TRIANGLES)),
+    "a face twice": (CORNERS, [*TRIANGLES, TRIANGLES[0]]),
+    "a face twice, once from behind": (CORNERS, [*TRIANGLES, TRIANGLES[0][::-1]]),
     "a triangle without area": (CORNERS, [*TRIANGLES, (0, 1, 1)]),
     "a cavity": (
         boxes(((0, 0, 0), 0.1), ((0.02, 0.02, 0.02), 0.05))[0],

@@ -136,6 +136,26 @@ def test_vertices_that_rounding_moved_apart_are_joined():
     assert caught.value.reason in {MeshRefusal.OPEN, MeshRefusal.SEPARATE}
 
 
+@pytest.mark.parametrize("behind", [False, True])
+def test_triangles_that_are_there_twice_are_dropped(behind):
+    mesh = box()
+    again = mesh.faces[:4][:, ::-1] if behind else np.roll(mesh.faces[:4], 1, axis=1)
+    body = gc.Polyhedron.from_mesh(mesh.vertices, np.vstack([again, mesh.faces]))
+    assert body.notes[0] == "dropped 4 triangles that were there twice"
+    assert body.volume == pytest.approx(mesh.volume)
+    assert (len(body.triangles), len(body.faces)) == (12, 6)
+
+
+def test_a_wall_that_two_parts_share_is_not_dropped():
+    """Two boxes of which one is inside the other, with one face in common."""
+    inner = trimesh.creation.box((0.05, 0.06, 0.04))
+    inner.apply_translation([0.0, 0.0, 0.02])
+    whole = trimesh.util.concatenate([box(), inner])
+    with pytest.raises(gc.MeshError) as caught:
+        gc.Polyhedron.from_mesh(whole.vertices, whole.faces)
+    assert caught.value.reason in {MeshRefusal.OVERLAP, MeshRefusal.NON_MANIFOLD}
+
+
 @pytest.mark.parametrize("seed", [0])
 def test_a_solid_wound_at_random_has_the_faces_of_the_clean_one(seed):
     mesh = prism()
