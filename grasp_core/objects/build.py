@@ -13,8 +13,10 @@ the same integrals, and tests compare the two; importing it takes longer than pl
 
 Source: Eberly, "Polyhedral mass properties (revisited)", 2002.
 
-The volume that a hole may hide is bounded by that of half a ball: a cap of area A across a hole of
-width d is off by at most A d / 3 if the true surface stays within the half-ball over the hole.
+The volume that a hole may hide is bounded by that of half an ellipsoid over it, half as high as the
+hole is wide: a cap of area A across a hole of width w is off by at most A w / 3 if the true surface
+stays within. For a round hole this is half a ball. The width is the second largest extent along the
+principal axes of the hole's border, so that long slits count for what they are.
 
 Close vertices are linked and connected parts found with numpy, since importing scipy's graphs takes
 longer than planning a small object does. Its search tree is used only where points are dense.
@@ -389,7 +391,8 @@ def caps_of(mesh: Mesh) -> Caps | None:
         return None
     caps = [Mesh(points, _cap(points, loop)) for loop in loops]
     widths = np.array([_width(points[loop]) for loop in loops])
-    hidden = float(np.array([each.areas.sum() for each in caps]) @ widths) / 3.0
+    across = np.array([_across(points[loop]) for loop in loops])
+    hidden = float(np.array([each.areas.sum() for each in caps]) @ across) / 3.0
     hole_of = np.repeat(np.arange(len(loops)), [len(each.triangles) for each in caps])
     return Caps(
         np.concatenate([each.triangles for each in caps]), widths,
@@ -427,6 +430,13 @@ def _width(places: Array) -> float:
     if len(places) > 500:  # noqa: PLR2004 - the diagonal of the box is at most 1.8 times as long
         return float(np.linalg.norm(np.ptp(places, axis=0)))
     return float(np.linalg.norm(places[:, None] - places[None], axis=2).max())
+
+
+def _across(places: Array) -> float:
+    """Return the second largest extent of points along their principal axes."""
+    spokes = places - places.mean(axis=0)
+    axes = np.linalg.svd(spokes, full_matrices=False)[2]
+    return float(np.sort(np.ptp(spokes @ axes.T, axis=0))[-2])
 
 
 def welded(mesh: Mesh, reach: float | None = None) -> tuple[Mesh, int]:

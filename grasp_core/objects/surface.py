@@ -198,8 +198,8 @@ class Edges(NamedTuple):
             return MeshError(MeshRefusal.WINDING, message)
         if open_edges := int((self.uses == 1).sum()):
             message = (
-                f"{open_edges} edges belong to one triangle only; close the surface, or "
-                "use its sound parts (--faces patches)"
+                f"{open_edges} edges belong to one triangle only; close the surface, or use its "
+                "sound parts (--faces patches) with the volume of the convex hull"
             )
             return MeshError(MeshRefusal.OPEN, message)
         if (self.uses != SIDES).any():
@@ -344,7 +344,7 @@ class Surface(Declared):
     largest_hole_m: NotNegative = 0.0
     """Largest distance between two corners of one closed hole [m]."""
     volume_error: NotNegative = 0.0
-    """Largest error of the volume if each closed hole was a half-sphere, as a share of it."""
+    """Largest error of the volume if each closed hole was half an ellipsoid, as a share of it."""
     dropped: Annotated[float, Range(least=0.0, most=1.0)] = 0.0
     """Area of the parts that were left out, as a share of the whole."""
     flatness_m: NotNegative = 0.0

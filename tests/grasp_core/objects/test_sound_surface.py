@@ -232,6 +232,19 @@ def test_a_hole_that_may_hide_more_than_two_hundredths_of_the_volume_stays_open(
     assert not gc.Polyhedron.from_mesh(mesh.vertices, left, faces="patches").surface.closed
 
 
+@pytest.mark.parametrize("sections", [64, 128])
+def test_a_long_triangle_of_a_thin_pipe_hides_little(sections):
+    """Half a ball over its length would be larger than all the material."""
+    pipe = trimesh.creation.annulus(0.009, 0.011, 0.15, sections=sections)
+    long = np.flatnonzero(np.ptp(pipe.triangles, axis=1).max(axis=1) > 0.14)
+    beside = Edges.of(pipe.faces).neighbours()[long[0]]
+    for gone in (long[:1], [long[0], beside[np.isin(beside, long)][0]]):
+        body = gc.Polyhedron.from_mesh(pipe.vertices, np.delete(pipe.faces, gone, axis=0))
+        assert body.surface.volume_source == "capped surface"
+        assert body.volume == pytest.approx(pipe.volume, rel=5e-3)
+        assert abs(body.volume / pipe.volume - 1.0) <= body.surface.volume_error <= 0.02
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
     rng = np.random.default_rng(seed)
