@@ -131,7 +131,7 @@ def widest_gap(bodies: Sequence[Mesh], most: float) -> float | None:
 def _step(planes: list[tuple[Array, float]]) -> Array:
     """Return the least step past some planes, by their normals and distances, (3,) [m]."""
     N, d = np.array([normal for normal, _ in planes]), np.array([way for _, way in planes])
-    step: Array = np.linalg.lstsq(N, d, rcond=PARALLEL)[0]
+    step = np.asarray(np.linalg.lstsq(N, d, rcond=PARALLEL)[0], dtype=np.float64)
     passed = N @ step
     if (passed > 0.0).all():
         step *= max(1.0, float((d / passed).max()))
@@ -155,15 +155,15 @@ def _touching(mine: Mesh, other: Mesh, reach: float) -> tuple[Indices, Array, Ar
         a, b = np.nonzero(mine.normals[some] @ other.normals[there].T <= OPPOSED)
         a, b = some[a], there[b]
         one, two = mine.corners[a], other.corners[b]
-        up = np.einsum("pki,pi->pk", two - one[:, :1], mine.normals[a])
-        down = np.einsum("pki,pi->pk", one - two[:, :1], other.normals[b])
-        # where they face each other, both are as near as the nearer one's corners are
+        up: Array = np.einsum("pki,pi->pk", two - one[:, :1], mine.normals[a])
+        down: Array = np.einsum("pki,pi->pk", one - two[:, :1], other.normals[b])
+        # where they face each other, they are as near as the corners of the nearer one
         far_up, far_down = np.abs(up).max(axis=1), np.abs(down).max(axis=1)
-        gap = np.where(far_up <= far_down, up.max(axis=1), down.max(axis=1))
+        own = np.where((far_up <= far_down)[:, None], up, down)
         far = np.minimum(far_up, far_down)
         near = np.flatnonzero(far <= reach)
         near = near[_overlap(one[near], two[near], mine.normals[a[near]]) > reach]
-        found.append((a[near], gap[near], far[near]))
+        found.append((a[near], own[near].max(axis=1), far[near]))
     one, gap, far = (np.concatenate(column) for column in zip(*found, strict=True))
     return one, gap, far
 
