@@ -225,7 +225,7 @@ def _united(bodies: list[_Body], found: SoundSurface, said: list[str]) -> list[_
         return bodies
     extent, slack = found.extent, OVERLAP * abs(found.volume)
     reach = APART * planar_slack(extent, found.surface.flatness_m)
-    united = _union(bodies, slack)
+    united, pairs = _union(bodies, slack), list[tuple[int, int]]()
     # exact faces unite as they are; those that are off by rounding need to overlap
     if len(united) > 1 or reach > THIN * extent or _slitted(united):
         places, pairs = pressed_together(bodies, max(THIN * extent, reach), PRESSED * reach)
@@ -236,7 +236,7 @@ def _united(bodies: list[_Body], found: SoundSurface, said: list[str]) -> list[_
             return bodies
     if len(united) == len(bodies):
         return bodies
-    if _slitted(united):
+    if pairs and _slitted(united):  # else what is thin is where surfaces cross
         raise MeshError(
             MeshRefusal.OVERLAP,
             f"parts touch, but rounding leaves thin slits between them; {_on_gaps(bodies, extent)}"

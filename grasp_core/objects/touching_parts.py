@@ -30,10 +30,11 @@ OPPOSED = -0.998
 """Largest cosine between the normals of touching triangles: small ones lean by their rounding."""
 PARALLEL = 0.02
 """Least singular value of normals that count as different, over the largest."""
-MOST_PAIRS = 200_000_000
-"""Largest number of pairs of triangles of two parts that are compared: a few seconds."""
+MOST_PAIRS = 50_000_000
+"""Largest number of pairs of triangles of two parts that are compared, which takes a second."""
 BLOCK = 500_000
 """Number of pairs of triangles that are compared at a time."""
+NONE = np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)
 
 
 def pulled_apart(mesh: Mesh) -> Mesh | None:
@@ -99,8 +100,8 @@ def pressed_together(
 ) -> tuple[list[Array], list[tuple[int, int]]]:
     """Let faces that are at most `reach` apart [m] overlap by a depth [m].
 
-    Gives the vertices of each body, (n, 3) [m], and the pairs of bodies that have such faces. Of
-    two bodies the one with less surface changes.
+    Gives the vertices of each body, (n, 3) [m], and the pairs of bodies that have such faces, or
+    are too fine for them to be looked for. Of two bodies the one with less surface changes.
     """
     pairs = list[tuple[int, int]]()
     places = [body.vertices.copy() for body in bodies]
@@ -109,9 +110,9 @@ def pressed_together(
     for small, large in combinations(by_area, 2):
         mine = bodies[small]
         found = _touching(mine, bodies[large], reach)
-        if len(found[0]):
+        if found is None or len(found[0]):
             pairs.append((small, large))
-        for triangle, gap, _ in zip(*found, strict=True):
+        for triangle, gap, _ in zip(*(found or NONE), strict=True):
             for vertex in mine.triangles[triangle].tolist():
                 plane = mine.normals[triangle], max(gap + depth, 0.0)
                 planes[small].setdefault(vertex, []).append(plane)
@@ -124,7 +125,7 @@ def pressed_together(
 def widest_gap(bodies: Sequence[Mesh], most: float) -> float | None:
     """Return the largest distance of faces that touch up to `most` [m]; None if none do."""
     pairs = combinations(bodies, 2)
-    gaps = np.concatenate([_touching(one, two, most)[2] for one, two in pairs])
+    gaps = np.concatenate([(_touching(one, two, most) or NONE)[2] for one, two in pairs])
     return float(gaps.max()) if len(gaps) else None
 
 
@@ -139,16 +140,15 @@ def _step(planes: list[tuple[Array, float]]) -> Array:
     return step * min(1.0, FARTHEST * float(np.abs(d).max()) / length) if length else step
 
 
-def _touching(mine: Mesh, other: Mesh, reach: float) -> tuple[Indices, Array, Array]:
+def _touching(mine: Mesh, other: Mesh, reach: float) -> tuple[Indices, Array, Array] | None:
     """Find pairs of facing triangles of two meshes that are near each other in more than an edge.
 
     Gives the triangle of `mine` in each pair, how far it must move to be past the other (negative
-    where it is past it), and its distance from the other, (p,) each [m].
+    where it is past it), and its distance from the other, (p,) each [m]; None for too many.
     """
-    here, there = _beside(mine, other, reach), _beside(other, mine, reach)
-    found = [(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))]
+    here, there, found = _beside(mine, other, reach), _beside(other, mine, reach), [NONE]
     if len(here) * len(there) > MOST_PAIRS:
-        return found[0]
+        return None
     step = max(BLOCK // max(len(there), 1), 1)
     for start in range(0, len(here), step):
         some = here[start : start + step]
