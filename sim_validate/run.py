@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from grasp_core.errors import GraspError
+from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.text_files import write_text
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import plan_to_json
@@ -77,7 +78,7 @@ def _run_in(
         remove_results(folder)
         proving = stop.part(1 + later)
         found = with_regions(body, found, planning, folder, jobs, proving, reporter)
-        write_text(folder / "grasps.json", plan_to_json(body, found))
+        write_text(folder / GRASPS, plan_to_json(body, found))
     say_counts(body, found, reporter)
     early = say_ended(found, reporter)
     if found.absence:

@@ -7,11 +7,12 @@ not finite, very deep nesting, and characters that cannot be encoded.
 import json
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 from grasp_core import kinds
 from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import check_kind, with_article
 
 DEEPEST = 64
 """Largest number of objects and lists inside each other; files of graspproof have less than ten."""
@@ -20,21 +21,6 @@ LARGEST_WHOLE = 2**64 - 1
 """Largest whole number: larger ones are no seeds, counts or indices, nor fit into arrays."""
 LONGEST_ECHO = 40
 """Largest number of characters of a key that a message repeats."""
-KINDS: Mapping[str, Collection[str]] = {
-    "baseline": {"grasps_file"},
-    "verdicts.json": {"verdicts"},
-    "regions.json": {"edge_clearance_m", "reserve", "grasps"},
-    "executions.json": {"executions"},
-    "manifest.json": {"units_sha256", "files"},
-    "grasps.json": {"object", "grasps"},
-    "best.json": {"clearance_m", "ended"},
-    "document of analyses": {"source", "edges"},
-    "wrench file": {"wrenches"},
-    "contacts file": {"contacts"},
-}
-"""The JSON files of graspproof, with the keys that tell each from those listed after it."""
-BESIDE = ("verdicts.json", "regions.json", "executions.json", "best.json")
-"""Files that are kept in the same folder as the grasps.json that they belong to."""
 
 
 def object_of(
@@ -43,7 +29,7 @@ def object_of(
     """Return the object that a JSON text holds."""
     found = json_of(text, nulls=nulls)
     if not isinstance(found, dict):
-        raise InputError(f"{_with_article(wanted)} must hold one JSON object, got {shown(found)}")
+        raise InputError(f"{with_article(wanted)} must hold one JSON object, got {shown(found)}")
     record = cast("dict[str, Any]", found)
     check_kind(record, wanted)
     if schema is not None:
@@ -85,23 +71,6 @@ def _check(holder: Any, nulls: bool, where: tuple[object, ...]) -> None:
                 _check(value, nulls, (*where, key))
         elif fault := _fault(value, nulls=nulls):
             raise InputError(f"{place([*where, key][1:])}: {fault}")
-
-
-def check_kind(found: Mapping[str, Any], wanted: str) -> None:
-    """Refuse a JSON file of graspproof that is of another kind than the one asked for."""
-    own = set(KINDS.get(wanted, ()))
-    for kind, keys in KINDS.items():
-        other = set(keys)
-        if kind != wanted and other <= found.keys() and not (own - other) & found.keys():
-            beside = " beside it" if wanted == "grasps.json" and kind in BESIDE else ""
-            raise InputError(
-                f"this is {_with_article(kind)}, not {_with_article(wanted)}; "
-                f"give the {wanted}{beside}"
-            )
-
-
-def _with_article(kind: str) -> str:
-    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
 
 
 def check_schema(found: Mapping[str, Any], schema: int) -> None:

@@ -20,6 +20,7 @@ from grasp_core.closure.contacts import contact_frictions
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.figures import Shown
+from grasp_core.files.file_kinds import CONTACTS_FILE, GRASPS
 from grasp_core.files.json_text import json_of, object_of, shown, text_of
 from grasp_core.files.records import Key, from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
@@ -109,7 +110,7 @@ def plan_to_json(body: Polyhedron, plan: Plan) -> str:
 
 def grasps_from_json(text: str) -> Plan:
     """Read a `grasps.json` as the plan that was written, without what files do not keep."""
-    found = object_of(text, "grasps.json", schema=SCHEMA)
+    found = object_of(text, GRASPS, schema=SCHEMA)
     del found["schema"]
     body = from_record(RecordedObject, found.pop("object", None), "object").body()
     plan = from_record(Plan, found, body=body)
@@ -270,7 +271,7 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     found = json_of(text)
     if isinstance(found, dict) and "schema" in found and "contacts" not in found:
         return _planned(text, overrides)
-    file = from_record(ContactsFile, object_of(text, "contacts file", nulls=False))
+    file = from_record(ContactsFile, object_of(text, CONTACTS_FILE, nulls=False))
     if file.contacts is not None:
         return (_contact_set(file, file.contacts, "0", "contacts", overrides),)
     listed = file.grasps or ()

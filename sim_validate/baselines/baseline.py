@@ -14,6 +14,7 @@ from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.figures import Figure, Kept, compared, keeps
+from grasp_core.files.file_kinds import BASELINE
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import FLAT, Key, RecordFile, record_of
 from grasp_core.files.text_files import read_text, write_text
@@ -146,7 +147,7 @@ class How(Settings):
 class Baseline(RecordFile):
     """Verdicts on the grasps of one object, and all settings and versions that they depend on."""
 
-    FILE = "baseline"
+    FILE = BASELINE
     SCHEMA = 2
 
     grasps_file: str

@@ -80,7 +80,7 @@ def simulate_grasps(
     for check in gate.checks:
         reporter.detail(str(check))
     if folder:
-        remove_results(folder, "verdicts")
+        remove_results(folder, Verdicts.FILE)
     job = Job(saved.body, saved.friction, agenda, setup)
 
     def kept(verdict: Verdict) -> bool:
@@ -113,7 +113,7 @@ def _show(verdicts: Verdicts, setup: Setup, reporter: Reporter) -> None:
         f"{totals['controls']} negative controls were let go (all should), "
         f"{totals['controls_held']} held"
     )
-    warn_of(_surprises(verdicts.verdicts), "verdicts.json", reporter)
+    warn_of(_surprises(verdicts.verdicts), Verdicts.FILE, reporter)
     if not totals["controls"]:
         reporter.warn("there were no negative controls: nothing shows that this test can fail")
 

@@ -14,6 +14,7 @@ from grasp_core.arrays import Wrench
 from grasp_core.closure.contacts import contacts_sha256, stacked
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import GRASPS, VERDICTS
 from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.kinds import OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
@@ -29,9 +30,7 @@ from sim_validate.engine.limits_and_friction import Analysis, PlannedLoad, Rig, 
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulate import Load
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
-from sim_validate.planning.asked_objects import GRASPS, grasp_with_id, some
-
-VERDICTS = "verdicts.json"
+from sim_validate.planning.asked_objects import grasp_with_id, some
 
 
 @dataclass(frozen=True, slots=True)

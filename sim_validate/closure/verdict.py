@@ -17,6 +17,7 @@ from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import Declared, InNotebooks
 from grasp_core.figures import Compared, Shown, figure, less, more
+from grasp_core.files.file_kinds import VERDICTS
 from grasp_core.files.records import FLAT, UNRECORDED, recorded
 from grasp_core.kinds import Friction, Many, Measured, OrInfinity, path_of
 from grasp_core.objects.polyhedron import Polyhedron
@@ -363,7 +364,7 @@ class Verdicts(AboutGrasps[Verdict]):
     """The verdicts on an object's grasps, as `verdicts.json` holds them."""
 
     ITEMS = "verdicts"
-    FILE = "verdicts.json"
+    FILE = VERDICTS
     SCHEMA = 2
 
     gate: Gate

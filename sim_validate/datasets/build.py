@@ -37,6 +37,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 from grasp_core.errors import GraspError, InputError
+from grasp_core.files.file_kinds import UNIT
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import FieldError, shown
@@ -92,7 +93,7 @@ OTHERS = "others"
 class UnitRecord(RecordFile):
     """Record of a finished unit of work: where its rows belong, or why it has none."""
 
-    FILE = "unit.json"
+    FILE = UNIT
     SCHEMA = 2
 
     object: str

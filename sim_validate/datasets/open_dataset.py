@@ -24,6 +24,7 @@ from typing import Annotated, Any
 
 from grasp_core.declared import Declared, FieldError
 from grasp_core.errors import InputError, about
+from grasp_core.files.file_kinds import MANIFEST
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import Record, RecordFile, from_record, record_of, recorded
 from grasp_core.files.text_files import read_text, write_text
@@ -57,7 +58,6 @@ from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.kit.files import path_inside, require_inside
 from sim_validate.planning.asked_objects import NAMED, some
 
-MANIFEST = "manifest.json"
 CONFIG = "config.toml"
 QUARANTINE = "quarantine.jsonl"
 Size = Annotated[int, Range(least=0)]

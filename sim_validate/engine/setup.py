@@ -22,6 +22,7 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
+from grasp_core.files.file_kinds import WRENCH_FILE
 from grasp_core.files.json_text import object_of, shown
 from grasp_core.files.records import UNRECORDED, from_record
 from grasp_core.files.text_files import read_text
@@ -225,7 +226,7 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
 
 def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
     """Parse the wrenches in the text of a file."""
-    given = from_record(WrenchFile, object_of(text, "wrench file", nulls=False))
+    given = from_record(WrenchFile, object_of(text, WRENCH_FILE, nulls=False))
     return tuple(
         NamedWrench(each.name, np.array([*each.force_n, *each.torque_n_m]))
         for each in given.wrenches

@@ -82,7 +82,7 @@ def execute_grasps(
 ) -> tuple[Exit, Executions]:  # fmt: skip
     """Execute grasps; return the exit code and what was found."""
     if folder:
-        remove_results(folder, "executions")
+        remove_results(folder, Executions.FILE)
     changed, count = physics or {}, len(saved.grasps)
     tasks = [ExecutionJob(saved.body, g, saved.friction, settings, changed) for g in saved.grasps]
     found = reporter.collected(

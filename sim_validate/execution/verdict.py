@@ -13,6 +13,7 @@ from grasp_core.arrays import Array, Shape
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more
+from grasp_core.files.file_kinds import EXECUTIONS
 from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
 from grasp_core.kinds import FieldError, OrInfinity, Quantity, path_of
 from grasp_core.solvers.ties import first_best
@@ -326,7 +327,7 @@ class ExecutedGrasp(Declared):
 class Executions(AboutGrasps[ExecutedGrasp]):
     """The executions of an object's grasps, as `executions.json` holds them."""
 
-    FILE = "executions.json"
+    FILE = EXECUTIONS
     SCHEMA = 2
 
     settings: ExecutionSettings

@@ -17,6 +17,7 @@ from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
+from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile, record_of
 from grasp_core.hands.hand import HANDS, Coupling, Hand
 from grasp_core.hands.hand_motors import hand_payload
@@ -42,7 +43,7 @@ from sim_validate.kit.compiling import REACHING, compile_loops, must_compile
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import AboutObject, alone_in, remove_results
-from sim_validate.planning.asked_objects import GRASPS, asked_grasps
+from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import ExecutionSettings
 
 HELD = Agenda(critical_friction=False)
@@ -110,7 +111,7 @@ def reach_file(command: hand_flags.Reach, reporter: Reporter, judge: Judge | Non
 
 def _reach(command: hand_flags.Reach, hand: Hand, saved: Plan, reporter: Reporter) -> Reaches:
     if command.out is not None:
-        remove_results(command.out, "reaches")
+        remove_results(command.out, REACHES)
     job = ReachJob(
         hand, saved.body, saved.friction,
         ReachSettings(

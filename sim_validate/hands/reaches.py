@@ -16,6 +16,7 @@ from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.figures import Shown
+from grasp_core.files.file_kinds import REACHES
 from grasp_core.files.records import FLAT, recorded
 from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
@@ -104,7 +105,7 @@ class Reaches(AboutGrasps[ReachedGrasp]):
     """A hand in the grasps of an object, as `reaches.json` holds it."""
 
     ITEMS = "reaches"
-    FILE = "reaches.json"
+    FILE = REACHES
     SCHEMA = 2
 
     hand: Hand

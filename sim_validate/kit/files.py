@@ -23,7 +23,7 @@ from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal, Self, TypeAlias, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, about
 from grasp_core.figures import scalars
+from grasp_core.files.file_kinds import BESIDE, GRASPS, REGIONS, VERDICTS
 from grasp_core.files.json_text import DEEPEST, check_values, shown
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import (
@@ -286,49 +287,44 @@ def _locked(folder: Path) -> Generator[int]:
         os.close(handle)
 
 
-REPORT, INDEX, GRASPS = "report", "index.html", "grasps"
+REPORT, INDEX, GRASP_PAGES = "report", "index.html", "grasps"
 STYLE = "style.css"
 STATIC = (STYLE, "gallery.js", "tables.js", "turntable.js")
-BEST = ("best.json", "best-proof.npz")
-REACHES = "reaches.json"
-JUDGEMENTS = "judgements.json"
-Kind: TypeAlias = Literal["verdicts", "regions", "executions", "reaches", "judgements", "grasps"]
-FILES: dict[Kind, tuple[str, ...]] = {
-    "verdicts": ("verdicts.json",), "regions": ("regions.json",),
-    "executions": ("executions.json",), "reaches": (REACHES,), "judgements": (JUDGEMENTS,),
-    "grasps": ("transfer.json", "grasps.json", *BEST),
-}  # fmt: skip
-OF_EACH_GRASP: dict[Kind, tuple[str, str, bytes]] = {
-    "verdicts": ("traces", ".npz", b".times_s.npy"),
-    "regions": ("proofs", ".npz", b"object_sha256.npy"),
-    "grasps": ("scenes", ".xml", b"`graspproof scene"),
+BEST_PROOF = "best-proof.npz"
+OF_EACH_GRASP: dict[str, tuple[str, str, bytes]] = {
+    VERDICTS: ("traces", ".npz", b".times_s.npy"),
+    REGIONS: ("proofs", ".npz", b"object_sha256.npy"),
+    GRASPS: ("scenes", ".xml", b"`graspproof scene"),
 }
-"""Folder, ending and distinctive bytes of those files of which each grasp has one."""
+"""Folder, ending and distinctive bytes of those files of which each grasp has one, by the file of
+results that they belong to."""
 PICTURES, CLIPS = "pictures", "clips"
 MARK = ".graspproof-report"
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
 ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
 """Pattern of a grasp's id, as plans name grasps; people give other ids to contacts of their own."""
 OF_REPORT = (
-    INDEX, *STATIC, "object-*.js", f"{GRASPS}/*.html", f"{PICTURES}/*.svg", f"{CLIPS}/*.webp",
+    INDEX, *STATIC, "object-*.js", f"{GRASP_PAGES}/*.html", f"{PICTURES}/*.svg", f"{CLIPS}/*.webp",
 )  # fmt: skip
 """Patterns of the files of a report, the first page first."""
-PAGES = ("", GRASPS, PICTURES, CLIPS)
+PAGES = ("", GRASP_PAGES, PICTURES, CLIPS)
 PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in PAGES))
 """Subfolders into which commands write."""
 
 
-def remove_results(folder: Path, kind: Kind = "grasps") -> None:
-    """Remove results of one kind, and pages that show them; grasps take all other kinds along."""
+def remove_results(folder: Path, file: str = GRASPS) -> None:
+    """Remove a file of results, and pages that show them; a grasps.json takes all others along."""
     remove_report(folder / REPORT)
-    for each in FILES if kind == "grasps" else (kind,):
-        _remove(folder / name for name in FILES[each])
+    for each in (*BESIDE, GRASPS) if file == GRASPS else (file,):
+        _remove([folder / each])
         if each in OF_EACH_GRASP:
             part, suffix, mark = OF_EACH_GRASP[each]
             _remove([
                 path for path in (folder / part).glob(f"*{suffix}")
                 if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
             ])  # fmt: skip
+    if file == GRASPS:
+        _remove([folder / BEST_PROOF])
 
 
 def _remove(paths: Iterable[Path]) -> None:
@@ -389,7 +385,7 @@ def remove_pages(folder: Path) -> None:
     """Remove the pages of a report, the first page first; its mark stays."""
     for pattern in OF_REPORT:
         _remove(folder.glob(pattern))
-    for kind in (GRASPS, PICTURES, CLIPS):
+    for kind in (GRASP_PAGES, PICTURES, CLIPS):
         part = folder / kind
         if part.is_dir() and not any(part.iterdir()):
             part.rmdir()

@@ -22,6 +22,7 @@ from grasp_core.closure.wrench_sets import Norm
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedError, about
 from grasp_core.figures import NONE, Shown, figures
+from grasp_core.files.file_kinds import ANALYSES
 from grasp_core.files.records import FLAT, recorded
 from grasp_core.files.text_files import read_text
 from grasp_core.forces.contact_forces import contact_forces
@@ -132,7 +133,7 @@ class Analysis(Declared):
 class Analyses(ResultFile):
     """The analyses of all grasps of a contacts file."""
 
-    FILE = "document of analyses"
+    FILE = ANALYSES
     SCHEMA = 1
 
     source: str

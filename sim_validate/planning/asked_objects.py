@@ -16,8 +16,6 @@ from scenes.example_objects import example_object
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 
-GRASPS = "grasps.json"
-"""Name of the file in a folder of results."""
 NAMED = 5
 """Largest number of names that a message lists."""
 

@@ -14,6 +14,7 @@ from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
+from grasp_core.files.file_kinds import BEST
 from grasp_core.files.records import recorded
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import Family, Friction, Number, Quantity, Range
@@ -34,9 +35,8 @@ from grasp_core.values import FINGERS, FaceQuadruple, Grasp
 from sim_validate.kit import command_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject, ResultFile
+from sim_validate.kit.files import BEST_PROOF, AboutObject, ResultFile
 
-PROOF = "best-proof.npz"
 MEASURES: Mapping[MeasureName, tuple[str, str, str]] = {
     "ferrari-canny": ("quality", "Ferrari-Canny quality", " N"),
     "weight": ("weight", "weight held in every orientation, for normal forces of sum 1 N", " N"),
@@ -72,7 +72,7 @@ class Placed(Declared):
 class Best(ResultFile):
     """The best grasp of an object by one measure, with the proved bound on all others."""
 
-    FILE = "best.json"
+    FILE = BEST
     SCHEMA = 2
 
     object: AboutObject
@@ -199,11 +199,11 @@ def write_best(
         Rated(each.id, each.family, ends, ends[0] / best.bound)
         for each, ends in zip(planned, bounds, strict=False)
     )
-    record = Best.of(body, best, rated, PROOF if folder else None)
+    record = Best.of(body, best, rated, BEST_PROOF if folder else None)
     if folder:
-        write_proof(folder / PROOF, best.proof)
+        write_proof(folder / BEST_PROOF, best.proof)
         write_text(folder / Best.FILE, record.text())
-        reporter.say(f"wrote {folder / Best.FILE} and {folder / PROOF}")
+        reporter.say(f"wrote {folder / Best.FILE} and {folder / BEST_PROOF}")
     reporter.document(record.document())
     return record
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError
+from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import METHODS, RankBy
 from grasp_core.objects.polyhedron import Polyhedron
@@ -193,7 +194,7 @@ def plan_file(command: command_flags.Plan, reporter: Reporter) -> int:
             with reporter.progress(f"writing {len(found)} grasps"):
                 text = plan_to_json(body, found)
         if command.out:
-            reporter.say(f"wrote {write_text(command.out / 'grasps.json', text)}")
+            reporter.say(f"wrote {write_text(command.out / GRASPS, text)}")
         if best is not None:
             from sim_validate.planning.best import write_best
 

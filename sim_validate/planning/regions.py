@@ -21,6 +21,7 @@ from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError, UndecidedError, about
 from grasp_core.figures import Shown, figures
+from grasp_core.files.file_kinds import REGIONS
 from grasp_core.files.records import FLAT, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
 from grasp_core.kinds import Count, Family, NotNegative, Share, number, path_of
@@ -159,7 +160,7 @@ class GraspRegions(Declared):
 class Regions(AboutGrasps[GraspRegions]):
     """The certified regions of an object's grasps, as `regions.json` holds them."""
 
-    FILE = "regions.json"
+    FILE = REGIONS
     SCHEMA = 2
 
     certifying: Annotated[Certifying, FLAT]
@@ -276,7 +277,7 @@ def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
         return Exit.NONE
     with alone_in(command.out):
         if command.out is not None:
-            remove_results(command.out, "regions")
+            remove_results(command.out, REGIONS)
         found = certified(
             saved.body, saved.grasps, saved.friction, command.certifying, folder=command.out,
             jobs=command.jobs, stop=Stop(seconds=command.time_limit_s), reporter=reporter,

@@ -7,6 +7,7 @@ from typing import Annotated, Self
 
 from grasp_core.declared import counted
 from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import GRASPS, TRANSFER
 from grasp_core.files.records import FLAT
 from grasp_core.files.text_files import write_text
 from grasp_core.mesh_files.limits import MeshChoices
@@ -30,7 +31,7 @@ from sim_validate.kit import command_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject, ResultFile, alone_in, remove_results
-from sim_validate.planning.asked_objects import GRASPS, asked_grasps, load_object
+from sim_validate.planning.asked_objects import asked_grasps, load_object
 
 MM = 1e3
 ABSENT = "-"
@@ -44,7 +45,7 @@ BAD: tuple[Change, ...] = ("worse", "gone")
 class TransferFile(ResultFile):
     """Grasps carried over to a changed part; both parts are only named, so nothing reads it."""
 
-    FILE = "transfer.json"
+    FILE = TRANSFER
     SCHEMA = 2
 
     old: AboutObject

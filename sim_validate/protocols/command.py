@@ -54,7 +54,7 @@ def _judged(
 ) -> tuple[Exit, Judgements]:  # fmt: skip
     folder = command.out
     if folder:
-        remove_results(folder, "judgements")
+        remove_results(folder, Judgements.FILE)
     found = workers.each(call, cases, jobs=jobs)
     tests = {name: protocol(name) for name in command.protocol}
     collect = partial(Judgements, AboutObject.of(saved.body), saved.friction, tests)

@@ -7,6 +7,7 @@ from typing import Annotated
 from grasp_core.declared import Declared, summary
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
+from grasp_core.files.file_kinds import JUDGEMENTS
 from grasp_core.files.records import FLAT, Key, recorded
 from grasp_core.kinds import Friction, Measured, Number, OrInfinity, Quantity
 from sim_validate.kit.files import AboutObject, ResultFile
@@ -114,7 +115,7 @@ class Totals(Declared):
 class Judgements(ResultFile):
     """The judgements of an object's grasps by published tests."""
 
-    FILE = "judgements.json"
+    FILE = JUDGEMENTS
     SCHEMA = 2
 
     object: AboutObject

@@ -13,6 +13,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
@@ -32,7 +33,7 @@ from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id
 from sim_validate.report.report import Report, write_report
-from sim_validate.report.run_folder import GRASPS, RunFolder, folder_of, reaches_beside
+from sim_validate.report.run_folder import RunFolder, folder_of, reaches_beside
 from sim_validate.report.sections import why_not_held
 
 COMING, RESTING = 60, 20

@@ -14,6 +14,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.cones.spanning import angles_between
 from grasp_core.figures import figures, table
+from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.kinds import Count, Number, function, path_of, value_of
@@ -35,7 +36,6 @@ from scenes.drawing.sheets import night_style, svg_of
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.kit import files
 from sim_validate.kit.workers import available_cores, each
-from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best import MEASURES, Best, Rated
 from sim_validate.protocols.verdict import Totals
 from sim_validate.report import sections

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import GRASPS, REACHES
 from grasp_core.files.records import RecordFile
 from grasp_core.grasp_tables import ById, Named
 from grasp_core.planning.result import Plan
@@ -16,8 +17,6 @@ from scenes.drawing.hands import PosedHand, posed_hand
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.engine.traces import LET_GO, Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
-from sim_validate.kit.files import REACHES
-from sim_validate.planning.asked_objects import GRASPS
 from sim_validate.planning.best import Best
 from sim_validate.planning.regions import GraspRegions, Regions
 from sim_validate.protocols.verdict import Judgements

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 import grasp_core as gc
+from grasp_core.files.file_kinds import REACHES
 from sim_validate.hands.reaches import Reaches
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import REACHES
 from sim_validate.main import main
 from tests.three_fingers import THREE_TIPS, three_fingers_file
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.json_text import BESIDE, DEEPEST, object_of
+from grasp_core.files.file_kinds import BESIDE, GRASPS
+from grasp_core.files.json_text import DEEPEST, object_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.kit import files
 from sim_validate.kit.exit_codes import Exit
@@ -204,6 +205,8 @@ KINDS = {
     "verdicts.json": {"schema": 2, "verdicts": []},
     "regions.json": {"schema": 3, "edge_clearance_m": 0, "reserve": 0, "grasps": []},
     "executions.json": {"schema": 1, "executions": []},
+    "reaches.json": {"schema": 2, "hand": {}, "reaches": []},
+    "judgements.json": {"schema": 2, "protocols": {}, "judgements": []},
     "baseline": {"schema": 1, "grasps_file": "a"},
     "manifest.json": {"schema": 1, "units_sha256": "", "files": []},
     "wrench file": {"wrenches": []},
@@ -214,9 +217,11 @@ KINDS = {
 def test_another_file_of_ours_is_called_by_its_name(tmp_path, capsys, kind):
     path = tmp_path / "x.json"
     path.write_text(json.dumps(KINDS[kind]))
-    for command in ("view", "validate"):
+    article = "an" if kind.startswith("e") else "a"
+    for command, wanted in (("view", GRASPS), ("validate", GRASPS), ("replay", "verdicts.json")):
+        if kind == wanted:
+            continue
         assert main([command, str(path)]) == Exit.INPUT
         said = capsys.readouterr().err
-        article = "an" if kind.startswith("e") else "a"
-        assert f"x.json: this is {article} {kind}, not a grasps.json; give the grasps.json" in said
-        assert ("beside it" in said) == (kind in BESIDE)
+        assert f"x.json: this is {article} {kind}, not a {wanted}; give the {wanted}" in said
+        assert ("beside it" in said) == (wanted == GRASPS and kind in BESIDE)
