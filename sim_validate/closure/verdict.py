@@ -188,7 +188,8 @@ LOST_WITH_NOISE = Compared(
     items=("repeats with noise no longer held", "repeats with noise held now"), close="noisy_close"
 )
 CONTROLS = Compared(less, "negative controls", of_part=True)
-CONTROLS_HELD = Compared(more, "negative controls that were not let go")
+CONTROLS_HELD = Compared(more, "negative controls that held")
+CONTROLS_UNDECIDED = Compared(more, "undecided negative controls")
 CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
 """How the figures of a verdict are shown, and compared with those of an earlier one."""
 
@@ -281,12 +282,17 @@ class Verdict(HoldsWrenches, InNotebooks):
     @recorded
     def controls_let_go(self) -> Annotated[bool, Shown("controls let go", compared=None)]:
         """Whether every negative control let go of the object, as it must."""
-        return not self.controls_held
+        return all(each.let_go for each in self.controls)
 
     @figure
     def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
-        """Names of the negative controls that did not let go of the object."""
-        return tuple(each.control.name for each in self.controls if not each.let_go)
+        """Names of the negative controls that held a load, which none must."""
+        return tuple(each.control.name for each in self.controls if each.held)
+
+    @figure
+    def controls_undecided(self) -> Annotated[tuple[str, ...], CONTROLS_UNDECIDED]:
+        """Names of the negative controls that neither held a load nor let go in every trial."""
+        return tuple(each.control.name for each in self.controls if not (each.held or each.let_go))
 
     @recorded
     def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
@@ -387,7 +393,7 @@ class Verdicts(AboutGrasps[Verdict]):
             "grasps": len(self.verdicts),
             "grasps_held": sum(verdict.held for verdict in self.verdicts),
             "controls": len(controls),
-            "controls_held": sum(control.held for control in controls),
+            "controls_held": sum(len(verdict.controls_held) for verdict in self.verdicts),
             "controls_let_go": sum(control.let_go for control in controls),
             "mismatches": sum(len(verdict.mismatches) for verdict in self.verdicts),
         }

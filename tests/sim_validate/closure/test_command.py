@@ -120,3 +120,10 @@ def test_what_a_verdict_lists_may_be_given_back(planned, verdict):
         lines += [f"{name} = {json.dumps(value)}" for name, value in given.items()]
     (planned / "same.toml").write_text("\n".join(lines))
     assert verdict("--setup", "same.toml")["setup"] == settings
+
+
+def test_undecided_controls_are_counted_beside_those_that_let_go(planned, capsys):
+    words = ["validate", "grasps.json", "--limit", "1", "--timeout-s", "1e-9"]
+    assert main(words) == Exit.NEGATIVE
+    said = " ".join(capsys.readouterr().out.split())
+    assert "0 of 3 negative controls were let go (all should), 0 held, 3 undecided" in said
