@@ -198,6 +198,21 @@ RankBy: TypeAlias = Literal[
     "radius", "friction-margin", "ferrari-canny", "payload", "placement", "diverse"
 ]  # fmt: skip
 """What makes one grasp better than another (see `plan`)."""
+RANKINGS: Mapping[RankBy, str] = {
+    "radius": "the largest discs, of each family in turn",
+    "friction-margin": "the least critical friction",
+    "ferrari-canny": "the largest Ferrari-Canny quality",
+    "payload": "the largest mass in any orientation under one squeeze with pushes up to 10 N",
+    "placement": "the largest proved chance of closure where the object is off by 2 mm and 2 "
+    "degrees",
+    "diverse": "for each next grasp, the largest distance from those before it",
+}
+"""What the best grasps have by each ranking."""
+MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
+"""Which loads count: wrenches of unit length, the weight in every orientation, or a user's loads.
+"""
+HANDS = ("allegro", "allegro-urdf", "leap")
+"""The names of the built-in hands."""
 OrInfinity = Annotated[float, Null(math.inf)]
 """A number that is infinite where nothing ever happens; null in files."""
 Measured = Annotated[float, Null(math.nan)]

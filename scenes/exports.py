@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from grasp_core.values import FINGERS, Grasp
 from scenes.drawing import sheets
 from scenes.drawing.painting import approaches
 from scenes.mujoco.fingertips import fitting_radius
+from scenes.settings import ENDINGS, GraspFormat
 
 ROD_LENGTH = 0.5
 """Length of the rods where no free lines were planned, in object radii."""
@@ -46,9 +47,6 @@ HEAD = """\
 WIDTH = 120
 SECTIONS = 24
 ROUGHNESS = 0.6
-GraspFormat: TypeAlias = Literal["moveit", "gltf"]
-ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
-"""Endings of the files that each format is written to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,8 @@
-"""The tables of docs/files.md and docs/datasets.md: `python -m tests.file_reference`.
+"""The tables of files.md, datasets.md and commands.md in docs: `python -m tests.file_reference`.
 
 The page has a line `<!-- fields: verdicts.json -->` where the tables of a file begin, and
-`<!-- end -->` where they end. Those of columns of grasps begin with `<!-- columns: GROUP -->`.
+`<!-- end -->` where they end. Those of columns of grasps begin with `<!-- columns: GROUP -->`, that
+of rankings with `<!-- rankings -->`.
 """
 
 import re
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple, get_args
 
 from grasp_core.figures import meanings
 from grasp_core.files.records import entries, inside_record
-from grasp_core.kinds import words
+from grasp_core.kinds import RANKINGS, words
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.columns import TABLES, dataset_tables
@@ -20,11 +21,12 @@ from sim_validate.planning.transfer import TransferFile
 from sim_validate.protocols.verdict import Judgements
 
 PAGE = Path(__file__).parent.parent / "docs" / "files.md"
-DATASETS = PAGE.parent / "datasets.md"
+DATASETS, COMMANDS = PAGE.parent / "datasets.md", PAGE.parent / "commands.md"
 FILES = {kind.FILE: kind for kind in (Verdicts, Executions, Reaches, Judgements, TransferFile)}
 IN_FILES = re.compile(r"\b(None|NaN)\b")
 """What JSON lacks: files have null there."""
 COLUMNS = re.compile(r"(<!-- columns: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
+RANKED = re.compile(r"(<!-- rankings -->\n).*?(?=<!-- end -->)", re.DOTALL)
 MARKED = re.compile(r"(<!-- fields: ([^>]*?) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 
@@ -120,6 +122,16 @@ def datasets_page() -> str:
     return COLUMNS.sub(lambda found: found[1] + columns(found[2]), text)
 
 
+def commands_page() -> str:
+    """The text of the page about commands with the rankings as they are declared."""
+    rows = [f"| `{name}` | {what} |" for name, what in RANKINGS.items()]
+    table = "\n".join(
+        ["", "| `--rank-by` | what the best grasps have |", "|---|---|", *rows, "", ""]
+    )
+    return RANKED.sub(lambda found: found[1] + table, COMMANDS.read_text(encoding="utf-8"))
+
+
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
     DATASETS.write_text(datasets_page(), encoding="utf-8")
+    COMMANDS.write_text(commands_page(), encoding="utf-8")

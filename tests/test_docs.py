@@ -151,6 +151,7 @@ def test_every_module_function_and_test_that_pages_name_exists():
 
 def test_columns_of_datasets_are_told_as_their_classes_tell_them():
     assert file_reference.datasets_page() == DATASETS
+    assert file_reference.commands_page() == PAGES["commands"]
 
 
 def listed(page, heading):

@@ -52,7 +52,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import Key, from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import Many, Range, TorqueLimit, shown, value_of
+from grasp_core.kinds import HANDS, Many, Range, TorqueLimit, shown, value_of
 
 LARGEST_SIZE = 2.0  # largest length of a hand [m]: a larger one is in other units
 MOST_TURN = 2.0 * np.pi  # largest angle of a joint, in either direction [rad]
@@ -390,9 +390,6 @@ class Hand(Declared):
     def __repr__(self) -> str:
         parts = counted(len(self.fingers), "finger"), counted(len(self.joints), "joint")
         return summary("Hand", self.name, *parts)
-
-
-HANDS = ("allegro", "allegro-urdf", "leap")  # the names of the hands
 
 
 def load_hand(name: str) -> Hand:

@@ -7,6 +7,8 @@ from grasp_core.kinds import Count, Quantity, Range
 from grasp_core.settings import Settings
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
+FORMATS = ("obj", "stl", "ply", "off", "glb")
+"""Endings of mesh files, which say their format."""
 Unit: TypeAlias = Literal["m", "cm", "mm", "in"]
 
 

@@ -22,7 +22,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal, about
 from grasp_core.files.text_files import bounded_bytes
 from grasp_core.mesh_files.glb import read_glb
-from grasp_core.mesh_files.limits import MeshLimits
+from grasp_core.mesh_files.limits import FORMATS, MeshLimits
 from grasp_core.mesh_files.polygons import (
     Polygons,
     TextPoints,
@@ -31,7 +31,6 @@ from grasp_core.mesh_files.polygons import (
     too_many,
 )
 
-FORMATS = ("obj", "stl", "ply", "off", "glb")
 BEGINNINGS = {"ply": b"ply", "glb": b"gltf"}
 """First bytes of files of some formats, in small letters."""
 STL_HEAD = 80

@@ -45,6 +45,7 @@ from grasp_core.kinds import (
     Count,
     Friction,
     Gap,
+    MeasureName,
     Range,
     Seed,
     TimeLimit,
@@ -66,7 +67,6 @@ from grasp_core.quality.ferrari_canny import FerrariCanny
 from grasp_core.quality.measures import (
     FERRARI_CANNY,
     Measure,
-    MeasureName,
     ResistedLoads,
     measured_set,
 )

@@ -38,10 +38,7 @@ class PlanSettings(Settings):
     limit: Count | None = None
     """Keep at most this many grasps, the best ones; if not given, all."""
     rank_by: RankBy = "radius"
-    """Which grasps are best: those with the largest discs, of each family in turn; with the least
-    critical friction; with the largest quality; that carry the largest mass in any orientation
-    under one squeeze of at most 10 N, less for objects with a radius below 25 mm; or each next one
-    the farthest from those before it."""
+    """What the best grasps have; see `grasp_core.kinds.RANKINGS`."""
     max_face_parts: Count = 1
     """Number of parts into which the family `free` may divide the four faces while it is undecided.
     """

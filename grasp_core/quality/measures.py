@@ -50,7 +50,7 @@ always has an answer; its multipliers are a twist of length up to `STEEP` that b
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal, NamedTuple, TypeAlias, get_args
+from typing import Annotated, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,7 +60,7 @@ from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program, into_cones
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
-from grasp_core.kinds import LARGEST, SMALLEST, one_of
+from grasp_core.kinds import LARGEST, SMALLEST, MeasureName, one_of
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
     GAP,
@@ -73,9 +73,6 @@ from grasp_core.quality.ferrari_canny import (
 from grasp_core.solvers.conic import minimize
 from grasp_core.solvers.ties import first_best
 
-MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
-"""Which loads count: wrenches of unit length, the weight in every orientation, or a user's loads.
-"""
 MOST_LOADS = 100
 """Most loads of a task: each takes a cone program wherever contacts are measured, and a search
 measures thousands of contacts."""

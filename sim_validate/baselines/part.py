@@ -13,7 +13,7 @@ from pathlib import Path
 
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
-from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan

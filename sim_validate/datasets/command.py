@@ -6,7 +6,7 @@ from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.files.records import record_of
-from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
 from sim_validate.datasets import flags as dataset_flags

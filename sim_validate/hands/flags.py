@@ -9,7 +9,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from grasp_core.kinds import Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
+from grasp_core.kinds import HANDS, Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
 from sim_validate.kit.command_flags import (
     AtFriction,
     FirstOnly,
@@ -21,9 +21,7 @@ from sim_validate.kit.command_flags import (
 )
 from sim_validate.kit.workers import available_cores
 
-HandName = Annotated[
-    str, arg(help="The hand: allegro, allegro-urdf, leap, or an MJCF or URDF file.")
-]
+HandName = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
 Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
     "For a hand from a file: names of sites, geoms or bodies that are fingertips, separated by "
     "commas."

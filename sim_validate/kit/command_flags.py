@@ -12,6 +12,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from grasp_core.kinds import (
     MOST_COUNT,
+    RANKINGS,
     Cases,
     Count,
     Direction,
@@ -20,25 +21,27 @@ from grasp_core.kinds import (
     Friction,
     FrictionOrZero,
     Gap,
+    MeasureName,
     Quantity,
     Range,
+    RankBy,
     Seed,
     Size,
     TimeLimit,
     Vector,
 )
-from grasp_core.mesh_files.limits import Lengths, MeshChoices, MeshLimits
+from grasp_core.mesh_files.limits import FORMATS, Lengths, MeshChoices, MeshLimits
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import Carrying
-from scenes.settings import ScaledScene
+from scenes.settings import ENDINGS, GraspFormat, ScaledScene
 from sim_validate.kit.workers import available_cores
 from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
 
 Positive = Annotated[float, Range(above=0.0)]
 Jobs = Annotated[Count, arg(help="Largest number of processes; results do not depend on it.")]
 ObjectName = Annotated[
-    str, arg(help="A mesh file (obj, stl, ply, off, glb) or the name of a built-in object.")
+    str, arg(help=f"A mesh file ({', '.join(FORMATS)}) or the name of a built-in object.")
 ]
 GraspsFile = Annotated[Path, arg(help="A grasps.json, as `plan` writes it.")]
 GraspId = Annotated[
@@ -99,6 +102,10 @@ class Planning(PlanSettings):
     """Time after which the command ends with what is found by then, within some seconds [s]. Its
     phases, such as those of --optimize, --best and --regions, share it, and the files say if they
     are not complete. If not given, there is no limit."""
+    rank_by: Annotated[RankBy, arg(help=(
+        "What the best grasps have. "
+        f"{'; '.join(f'{name}: {what}' for name, what in RANKINGS.items())}."
+    ))] = "radius"  # fmt: skip
     mesh: Annotated[Mesh, PLAIN] = field(default_factory=Mesh)
     approach_m: Positive | None = None
     """With --finger-radius-m: keep only grasps that fingers of that radius reach along straight
@@ -179,7 +186,7 @@ class Plan(Spoken):
     where that is less; a twentieth of the object's radius if not given."""
     gap: Gap = 0.05
     """With --best: share of the proved bound that the quality may be below it."""
-    measure: Literal["ferrari-canny", "weight", "task"] = "ferrari-canny"
+    measure: MeasureName = "ferrari-canny"
     """With --best: what is largest. The Ferrari-Canny quality; the weight that is held in every
     orientation; or the multiple of a task's --wrenches that is resisted."""
     wrenches: Path | None = None
@@ -248,11 +255,13 @@ class Export(Spoken):
     """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
 
     grasps: Positional[GraspsFile]
-    to: Literal["moveit", "gltf"]
+    to: GraspFormat
     """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
     see docs/files.md."""
-    out: Annotated[Path, arg(aliases=("-o",))]
-    """File to write, which ends in .yaml for moveit and .glb for gltf."""
+    out: Annotated[Path, arg(aliases=("-o",), help=(
+        "File to write, which ends in "
+        f"{', '.join(f'{ends[0]} for {name}' for name, ends in ENDINGS.items())}."
+    ))]  # fmt: skip
     grasp: GraspId = None
     limit: FirstOnly = None
     fingertip_radius_m: Quantity | None = None
@@ -269,13 +278,16 @@ class View(Spoken):
     grasp: str | None = None
     """Id of the grasp to show; if not given, the first one."""
     friction: AtFriction = None
-    picture: Annotated[Path, Ending(PICTURES)] | None = None
-    """Write the grasp as a picture like the paper's (svg, png)."""
-    page: Annotated[Path, Ending(PAGES)] | None = None
-    """Write a page (html) on which the grasp can be turned."""
-    clip: Annotated[Path, Ending(CLIPS)] | None = None
-    """Write a clip (webp, gif) of the fingers closing, which MuJoCo renders where there are
-    graphics."""
+    picture: Annotated[Annotated[Path, Ending(PICTURES)] | None, arg(help=(
+        f"Write the grasp as a picture like the paper's ({', '.join(PICTURES)})."
+    ))] = None  # fmt: skip
+    page: Annotated[Annotated[Path, Ending(PAGES)] | None, arg(help=(
+        f"Write a page ({', '.join(PAGES)}) on which the grasp can be turned."
+    ))] = None  # fmt: skip
+    clip: Annotated[Annotated[Path, Ending(CLIPS)] | None, arg(help=(
+        f"Write a clip ({', '.join(CLIPS)}) of the fingers closing, which MuJoCo renders where "
+        "there are graphics."
+    ))] = None  # fmt: skip
     hand: bool = True
     """Show the hand of the reaches.json beside the grasps, where it reaches the grasp, in the
     picture and on the page."""
@@ -365,9 +377,10 @@ class Transfer(Spoken):
     """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
 
     grasps: Positional[GraspsFile]
-    part: Positional[str]
-    """The changed part, in the same frame: a mesh file (obj, stl, ply, off, glb) or the name of a
-    built-in object."""
+    part: Annotated[Positional[str], arg(help=(
+        f"The changed part, in the same frame: a mesh file ({', '.join(FORMATS)}) or the name of a "
+        "built-in object."
+    ))]  # fmt: skip
     carrying: Annotated[Carrying, PLAIN] = field(default_factory=Carrying)
     friction: AtFriction = None
     lengths: Annotated[Lengths, PLAIN] = field(default_factory=Lengths)
@@ -385,8 +398,9 @@ class Inspect(Spoken):
     """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
 
     object: Positional[ObjectName]
-    picture: Annotated[Path, Ending(PICTURES)] | None = None
-    """Write the object as a picture (svg, png)."""
+    picture: Annotated[Annotated[Path, Ending(PICTURES)] | None, arg(help=(
+        f"Write the object as a picture ({', '.join(PICTURES)})."
+    ))] = None  # fmt: skip
     mesh: Annotated[Mesh, PLAIN] = field(default_factory=Mesh)
 
 

@@ -5,8 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.mesh_files.limits import MeshLimits
-from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.mesh_files.limits import FORMATS, MeshLimits
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan

@@ -17,7 +17,7 @@ from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import BEST
 from grasp_core.files.records import recorded
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import Family, Friction, Number, Quantity, Range
+from grasp_core.kinds import Family, Friction, MeasureName, Number, Quantity, Range
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best_grasp import (
     BestGrasp,
@@ -29,7 +29,6 @@ from grasp_core.optimizing.best_grasp import (
 )
 from grasp_core.optimizing.contact_places import grounds_of
 from grasp_core.optimizing.support_cuts import write_proof
-from grasp_core.quality.measures import MeasureName
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp
 from sim_validate.kit import command_flags

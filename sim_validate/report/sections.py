@@ -11,7 +11,7 @@ import numpy as np
 from grasp_core.declared import counted
 from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
-from grasp_core.hands.hand import HANDS
+from grasp_core.kinds import HANDS
 from scenes.drawing.pages import Fact, number
 from sim_validate.execution.verdict import (
     ExecutedGrasp,

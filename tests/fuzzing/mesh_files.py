@@ -8,7 +8,8 @@ import numpy as np
 import trimesh
 
 import grasp_core as gc
-from grasp_core.mesh_files.reading import FORMATS, mesh_of_bytes
+from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.mesh_files.reading import mesh_of_bytes
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES
 from tests.bad_input.of_binary_meshes import glb, tree
 from tests.fuzzing.array_files import npz

@@ -6,19 +6,27 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import trimesh
 
+from grasp_core.kinds import HANDS, RANKINGS, RankBy
+from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.planning.planner import plan
 from grasp_core.planning.result import FAMILIES
 from scenes.drawing.painting import View
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
 from scenes.example_objects import example_object
+from scenes.settings import ENDINGS, GraspFormat
+from sim_validate.datasets.config import HandName
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.kit import workers
+from sim_validate.kit.command_flags import CLIPS, PAGES, PICTURES, ProtocolName
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.flag_values import COMMAND_WORDS, EXAMPLES
 from sim_validate.main import main
+from sim_validate.protocols.published import PROTOCOLS
 from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.patience import HANGING_S
 
@@ -301,3 +309,33 @@ def test_help_on_a_command_shows_examples_that_can_be_typed(asked, capsys, words
     for line in shown:
         assert main(shlex.split(line)[1:]) == Exit.GOOD
     assert len(asked) == len(shown) > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "flag", "values"),
+    [
+        ("plan", "--rank-by", get_args(RankBy)), ("run", "--rank-by", get_args(RankBy)),
+        ("plan", "{ferrari-canny,weight,task}", ("Ferrari-Canny", "weight", "task")),
+        ("plan", "STR", FORMATS),
+        ("inspect", "--picture", PICTURES), ("view", "--picture", PICTURES),
+        ("view", "--page", PAGES), ("view", "--clip", CLIPS), ("transfer", "part,", FORMATS),
+        ("hand", "STR", HANDS), ("reach", "--hand", HANDS),
+        ("export", "--to", get_args(GraspFormat)),
+        ("export", "--out", [ends[0] for ends in ENDINGS.values()]),
+    ],
+)  # fmt: skip
+def test_the_help_of_a_flag_names_every_value(capsys, words, flag, values):
+    assert main([words, "--help"]) == Exit.GOOD
+    shown = capsys.readouterr().out.partition("examples:")[0].partition("positional")[2]
+    said = " ".join(shown.replace("│", "").split())
+    part = re.split(r"\((?:default|required)", said.split(f" {flag} ")[-1])[0]
+    text = re.sub(r"\{[^}]*\}", "", part)
+    for value in values:
+        assert value in text
+
+
+def test_every_ranking_is_described_wherever_rankings_are():
+    assert set(RANKINGS) == set(get_args(RankBy))
+    assert all(f"`{name}`" in (plan.__doc__ or "") for name in RANKINGS)
+    assert get_args(ProtocolName) == tuple(PROTOCOLS)
+    assert get_args(HandName) == ("", *HANDS)

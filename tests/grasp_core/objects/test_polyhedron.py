@@ -4,7 +4,7 @@ import trimesh
 
 import grasp_core as gc
 import scenes
-from grasp_core.mesh_files.reading import FORMATS
+from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.objects.polyhedron import is_convex, polyhedron_from_mesh
 
 

@@ -122,7 +122,8 @@ def test_what_a_verdict_lists_may_be_given_back(planned, verdict):
     assert verdict("--setup", "same.toml")["setup"] == settings
 
 
-def test_undecided_controls_are_counted_beside_those_that_let_go(planned, capsys):
+@pytest.mark.usefixtures("planned")
+def test_undecided_controls_are_counted_beside_those_that_let_go(capsys):
     words = ["validate", "grasps.json", "--limit", "1", "--timeout-s", "1e-9"]
     assert main(words) == Exit.NEGATIVE
     said = " ".join(capsys.readouterr().out.split())
