@@ -202,9 +202,10 @@ RANKINGS: Mapping[RankBy, str] = {
     "radius": "the largest discs, of each family in turn",
     "friction-margin": "the least critical friction",
     "ferrari-canny": "the largest Ferrari-Canny quality",
-    "payload": "the largest mass in any orientation under one squeeze with pushes up to 10 N",
-    "placement": "the largest proved chance of closure where the object is off by 2 mm and 2 "
-    "degrees",
+    "payload": "the largest mass in any orientation under one squeeze with pushes up to 10 N, less "
+    "for objects with a radius below 25 mm",
+    "placement": "the largest proved chance of closure where the object is off by 2 mm, less for "
+    "objects with a radius below 25 mm, and 2 degrees",
     "diverse": "for each next grasp, the largest distance from those before it",
 }
 """What the best grasps have by each ranking."""
@@ -445,6 +446,14 @@ def number(value: Any, name: str, **ends: Any) -> float:
 def path_of(value: Any, name: str) -> Path:
     """Check that a value names a file or folder."""
     return value_of(Path, value, name)
+
+
+def near(word: str, known: Iterable[str]) -> str:
+    """Ask whether known words are meant that are near a mistyped one; empty if none is near."""
+    import difflib  # only mistakes need it
+
+    found = [] if len(word) > SHOWN else difflib.get_close_matches(word, list(known))
+    return f"did you mean {' or '.join(found)}?" if found else ""
 
 
 def one_of(value: Any, choices: Iterable[str], name: str) -> None:

@@ -6,7 +6,6 @@ and prisms without spanning quadruples, an elongated bar without concurrent gras
 parts with holes, notches and handles.
 """
 
-import difflib
 import math
 import re
 from collections.abc import Callable
@@ -17,7 +16,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.kinds import SHOWN, shown, value_of
+from grasp_core.kinds import near, shown, value_of
 from grasp_core.objects.booleans import Solid, extrusion, hull
 from grasp_core.objects.polyhedron import Polyhedron
 
@@ -49,8 +48,7 @@ def example_object(name: str) -> Polyhedron:
     body = _built(key)
     if body is not None:
         return body
-    near = [] if len(key) > SHOWN else difflib.get_close_matches(key, example_names(), n=3)
-    hint = f"did you mean {' or '.join(near)}?" if near else "see `graspproof objects`"
+    hint = near(key, example_names()) or "see `graspproof objects`"
     if key.startswith("random"):
         hint = f"write random-FACES-SEED, FACES from {RANDOM_FACES[0]} to {RANDOM_FACES[-1]}"
     raise InputError(f"there is no built-in object {shown(name)}; {hint}")

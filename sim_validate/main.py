@@ -6,7 +6,7 @@ This module imports nothing that is slow to load, so that help and usage errors 
 import gc
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, get_args
@@ -15,7 +15,8 @@ import tyro
 from tyro.conf import FlagCreatePairsOff
 
 from grasp_core.errors import GraspError, InputError
-from grasp_core.kinds import FieldError
+from grasp_core.kinds import FieldError, near, shown
+from grasp_core.settings import types
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.flags import Baseline
 from sim_validate.datasets import flags as dataset_flags
@@ -30,7 +31,14 @@ from sim_validate.kit.exit_codes import (
     reason_of,
     steady_streams,
 )
-from sim_validate.kit.flag_values import REGISTRY, examples_for, flags_of, with_config
+from sim_validate.kit.flag_values import (
+    COMMAND_WORDS,
+    REGISTRY,
+    examples_for,
+    flags_of,
+    parts_of,
+    with_config,
+)
 from sim_validate.kit.workers import interrupts_noted
 
 Command = (
@@ -40,6 +48,8 @@ Command = (
 )  # fmt: skip
 COMMANDS = {kind.__name__.lower(): kind for kind in get_args(Command)}
 """The classes of flags, by the names of their commands."""
+PRODUCING = (flags.Plan, flags.Regions, flags.Transfer, Reach)
+"""Commands of whose results the exit code says little."""
 ACTIONS: dict[type[Any], str] = {
     flags.Run: "run:run_object",
     flags.Plan: "planning.plan:plan_file",
@@ -80,37 +90,47 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        _check_working_folder()
-        if "" in arguments:
-            said = "an argument is empty, perhaps from a variable that is not set"
-            raise FlagsError(f"{said}; leave the argument out, or give it a value")
-        words = with_config(arguments, COMMANDS)
+        if arguments == ["--version"]:
+            print(_version())  # noqa: T201 - the result itself; a closed stream takes nothing
+            return Exit.GOOD
+        command = _parsed(arguments)
+    except SystemExit as stop:
+        sys.stdout.write(examples_for(arguments))
+        return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except InputError as error:
         return _complain(str(error), exit_code(error))
+    except KeyboardInterrupt:
+        return _complain("interrupted", Exit.INTERRUPTED)
+    return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
+
+
+def _parsed(arguments: list[str]) -> Command:
+    """Turn arguments into flags; the parser exits where help is asked for, or a flag is unknown."""
+    _check_working_folder()
+    if "" in arguments:
+        said = "an argument is empty, perhaps from a variable that is not set"
+        raise FlagsError(f"{said}; leave the argument out, or give it a value")
+    _check_command(arguments)
+    words = with_config(arguments, COMMANDS)
     try:
-        command: Command = tyro.cli(
+        return tyro.cli(
             FlagCreatePairsOff[Command],  # type: ignore[valid-type]
             prog="graspproof",
             description=(
                 "Four-finger force-closure grasps, proved and simulated. Every command also takes "
-                "--config FILE.toml, whose keys are flags; flags given override it."
+                "--config FILE.toml, whose keys are flags; flags given override it. `graspproof "
+                "--version` prints versions."
             ),
             args=words,
             registry=REGISTRY,
         )
-    except SystemExit as stop:
-        sys.stdout.write(examples_for(arguments))
-        return stop.code if isinstance(stop.code, int) else Exit.USAGE
     except FieldError as error:
         names = (each.name for each in flags_of(Command)
                  if (each.owner, each.field) == (error.owner, error.name))  # fmt: skip
         flag = "--" + next(names, error.name).replace("_", "-")
-        return _complain(f"{flag} {error.fault}", Exit.USAGE)
+        raise FlagsError(f"{flag} {error.fault}") from error
     except InputError as error:  # settings that do not fit each other
-        return _complain(str(error), Exit.USAGE)
-    except KeyboardInterrupt:
-        return _complain("interrupted", Exit.INTERRUPTED)
-    return _dispatch(command.action if isinstance(command, Dataset | Baseline) else command)
+        raise FlagsError(str(error)) from error
 
 
 def _check_working_folder() -> None:
@@ -120,14 +140,43 @@ def _check_working_folder() -> None:
         raise InputError("the working folder is gone; change to one that exists") from error
 
 
+def _check_command(arguments: Sequence[str]) -> None:
+    """Refuse the name of a command that there is not, and suggest names like it."""
+    names: Iterable[str] = COMMANDS
+    most = COMMAND_WORDS.get(arguments[0], 1) if arguments else 0
+    for place, word in enumerate(arguments[:most]):
+        if word.startswith("-"):
+            return
+        if word not in names:
+            asked = " ".join(arguments[: place + 1])
+            hint = near(word, names) or f"the commands are {', '.join(names)}"
+            raise FlagsError(f"there is no command {shown(asked)}; {hint}")
+        parts = parts_of(types(COMMANDS[arguments[0]]).get("action"))
+        names = [kind.__name__.lower() for kind in parts if kind in ACTIONS]
+
+
+def _version() -> str:
+    from grasp_core.provenance import versions
+
+    found = versions()
+    return ", ".join(f"{name} {found[name.lower()]}" for name in ("graspproof", "MuJoCo", "Python"))
+
+
 def _dispatch(command: flags.Spoken) -> int:
     speech = command.speech
     try:
         with interrupts_noted():
             from sim_validate.kit.console import Reporter
 
+            reporter = Reporter(speech.quiet, speech.verbose, speech.json)
+            unseen = speech.quiet and not speech.json
+            if isinstance(command, PRODUCING) and unseen and command.out is None:
+                reporter.warn(
+                    "nothing will be written: with -q and without --out only the exit code is "
+                    "left; give --out DIR, or --json"
+                )
             action = resolve_name(f"sim_validate.{ACTIONS[type(command)]}")
-            code = action(command, Reporter(speech.quiet, speech.verbose, speech.json))
+            code = action(command, reporter)
             if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
                 sys.stdout.flush()
             return code

@@ -15,7 +15,7 @@ from tyro.conf import OmitArgPrefixes, UseAppendAction
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
 from grasp_core.errors import InputError
-from grasp_core.kinds import Vector
+from grasp_core.kinds import Vector, near
 from grasp_core.settings import types
 from sim_validate.kit.command_flags import PLAIN
 from sim_validate.kit.exit_codes import FlagsError
@@ -129,7 +129,8 @@ def flags_from(settings: Mapping[str, Any], command: Any) -> list[str]:
     for name, value in _named(settings):
         flag = known.get(name.replace("-", "_"))
         if flag is None:
-            raise FlagsError(f"{name!r}: unknown flag; keys are long flags")
+            meant = near(name.replace("-", "_"), known)
+            raise FlagsError(f"{name!r}: unknown flag; {meant or 'keys are long flags'}")
         words += _as_flags(flag, value)
     return words
 

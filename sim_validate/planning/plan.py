@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.declared import counted
 from grasp_core.errors import GraspError
 from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.text_files import write_text
@@ -218,7 +219,7 @@ def _show(body: Polyhedron, found: Plan, rank_by: RankBy, reporter: Reporter) ->
     if found.absence:
         reporter.say(found.absence)
         return code or Exit.NONE
-    reporter.records(f"{len(found.grasps)} grasps of {body.name}", found.grasps)
+    reporter.records(f"{counted(len(found.grasps), 'grasp')} of {body.name}", found.grasps)
     if rank_by == "payload":  # which is not kept with grasps
         masses = (
             carried(body, each.positions - body.center_of_mass, each.normals, found.friction,
@@ -296,6 +297,11 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
     reasons = Counter(_whoever(why) for why in found.unreached.values())
     for why, count in reasons.most_common():
         reporter.say(f"out of reach: {why}, on {count} face quadruples")
+    if found.finger is None and found.grasps:
+        reporter.say(
+            "not checked: whether fingers have room to reach the contacts (reach); give "
+            "--finger-radius-m and --approach-m to check it"
+        )
 
 
 def _whoever(why: str) -> str:

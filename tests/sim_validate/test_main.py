@@ -15,6 +15,7 @@ from grasp_core.kinds import HANDS, RANKINGS, RankBy
 from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import FAMILIES
+from grasp_core.provenance import versions
 from scenes.drawing.painting import View
 from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
 from scenes.example_objects import example_object
@@ -115,6 +116,12 @@ def test_a_scale_multiplies_what_a_mesh_file_says(here, answer, capsys):
         (["plan", "wedge", "--theta-deg", "40"], Exit.INPUT, "theta_deg must be a number from"),
         (["plan", "wedge", "--friction", "0"], Exit.USAGE, "friction"),
         (["plan", "wedge", "--fricton", "0.3"], Exit.USAGE, "--friction"),
+        (["plna", "wedge"], Exit.USAGE, "no command 'plna'; did you mean plan"),
+        (["validte"], Exit.USAGE, "did you mean validate"),
+        (["wedge"], Exit.USAGE, "the commands are run, plan, validate"),
+        (["dataset", "biuld"], Exit.USAGE, "no command 'dataset biuld'; did you mean build"),
+        (["baseline", "check-it"], Exit.USAGE, "did you mean check"),
+        (["dataset", "wedge"], Exit.USAGE, "the commands are build, import, verify, export"),
         (["plan"], Exit.USAGE, "Required options"),
         (["plan", "wedge", "--config"], Exit.USAGE, "--config"),
         (["plan", "box", "--ceiling", "10"], Exit.INPUT, "--ceiling needs --optimize"),
@@ -144,6 +151,7 @@ def test_a_config_file_sets_flags_and_flags_override_it(here, answer, capsys):
     assert json.loads(capsys.readouterr().out)["center_of_mass_m"] == [0.001, 0.0, -0.002]
     for text, said in (
         ("[friction]\nlimit = 1\n", "'friction.limit': unknown flag"),
+        ("frictn = 0.3\n", "'frictn': unknown flag; did you mean friction?"),
         ("[patches]\nmost = 3\n", "--patches.most must be a whole number from 4 up to 200"),
     ):
         (here / "bad.toml").write_text(text)
@@ -339,3 +347,31 @@ def test_every_ranking_is_described_wherever_rankings_are():
     assert all(f"`{name}`" in (plan.__doc__ or "") for name in RANKINGS)
     assert get_args(ProtocolName) == tuple(PROTOCOLS)
     assert get_args(HandName) == ("", *HANDS)
+
+
+def test_the_version_is_that_of_graspproof_mujoco_and_python(capsys):
+    assert main(["--version"]) == Exit.GOOD
+    found = versions()
+    said = f"graspproof {found['graspproof']}, MuJoCo {found['mujoco']}, Python {found['python']}\n"
+    assert capsys.readouterr().out == said
+
+
+@pytest.mark.parametrize(
+    "words", ["plan wedge", "regions p/grasps.json --max-cones 64", "transfer p/grasps.json wedge"]
+)
+def test_a_quiet_command_without_a_folder_says_that_nothing_is_written(capsys, words):
+    assert main(["plan", "wedge", "--limit", "1", "--out", "p", "-q"]) == Exit.GOOD
+    assert capsys.readouterr() == ("", "")
+    main([*words.split(), "-q"])
+    assert capsys.readouterr().err.startswith("nothing will be written: with -q and without --out")
+    main([*words.split(), "-q", "--json"])
+    assert "written" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["plan wedge --limit 1", "run wedge --limit 1 --no-report"])
+def test_it_is_said_that_the_room_for_fingers_is_not_checked_unless_it_is(capsys, command):
+    for flags, unchecked in (("", True), ("--finger-radius-m 0.004 --approach-m 0.03", False)):
+        main([*command.split(), *flags.split()])
+        said = " ".join(capsys.readouterr().out.split())
+        assert ("not checked: whether fingers have room" in said) == unchecked
+        assert ("--finger-radius-m and --approach-m" in said) == unchecked
