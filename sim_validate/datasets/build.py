@@ -139,8 +139,8 @@ class Staging:
         self._put(unit, {**tables, **others}, object_id=row.object_id, split=row.split)
 
     def quarantine(self, unit: WorkUnit, reason: str) -> None:
-        """Record that a unit cannot be computed, with the reason."""
-        self._put(unit, {}, reason=reason)
+        """Record that a unit cannot be computed, with the reason, which names no folder."""
+        self._put(unit, {}, reason=reason.replace(str(unit.path or unit.label), unit.label))
 
     def record(self, unit: WorkUnit) -> UnitRecord:
         """Look up how a unit ended: with its object and split, or with a reason for no rows."""
@@ -461,18 +461,18 @@ def _sorted_out(
 ) -> tuple[list[Finished], list[LeftOut]]:
     """List units with rows of their own, sorted by object, and the reasons why others have none."""
     good, quarantined = list[Finished](), list[LeftOut]()
-    first: dict[tuple[str | None, float], str] = {}
-    for unit in sorted(units, key=lambda each: (each.object, each.friction)):
+    first: dict[tuple[str | None, float], WorkUnit] = {}
+    for unit in sorted(units, key=lambda each: (each.label, each.source_sha256, each.friction)):
         record = staging.record(unit)
         reason = record.reason
         if reason is None:
-            other = first.setdefault((record.object_id, unit.friction), unit.object)
-            if other == unit.object:
+            other = first.setdefault((record.object_id, unit.friction), unit)
+            if other.object == unit.object:
                 good.append((unit, record))
                 continue
-            reason = f"{TWIN} {other}"
+            reason = f"{TWIN} {other.label}"
         given = tuple(each.id for each in unit.given)
-        quarantined.append(LeftOut(unit.object, unit.source_sha256, unit.friction, given, reason))
+        quarantined.append(LeftOut(unit.label, unit.source_sha256, unit.friction, given, reason))
     return sorted(good, key=lambda each: (str(each[1].object_id), each[0].friction)), quarantined
 
 

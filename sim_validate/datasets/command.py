@@ -4,6 +4,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from grasp_core.declared import counted
 from grasp_core.errors import InputError
 from grasp_core.files.records import record_of
 from grasp_core.mesh_files.limits import FORMATS
@@ -19,7 +20,7 @@ from sim_validate.datasets.config import (
     config_from_toml,
 )
 from sim_validate.datasets.isaac import export
-from sim_validate.datasets.open_dataset import splits_in_words
+from sim_validate.datasets.open_dataset import CONFIG, splits_in_words
 from sim_validate.datasets.verify import verify
 from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.kit.exit_codes import Exit
@@ -55,14 +56,15 @@ def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
 
 
 def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter: Reporter) -> int:
-    _warn_of_missing(config, reporter)
+    _warn(config, reporter)
     with reporter.progress("building") as steps, _engine(work) as engine:
         built = build(config, out, engine, steps.update, work.timeout_s)
     manifest, rows = built.manifest, built.manifest.rows
+    before, filled = manifest.units - built.made, manifest.units - manifest.quarantined
     reporter.say(
-        f"{out}: {manifest.units} units, {built.made} made now, {manifest.quarantined} "
-        f"quarantined; "
-        f"{rows['objects']} objects, {rows['grasps']} grasps and controls, {rows['trials']} trials"
+        f"{out}: {counted(manifest.units, 'unit')} ({built.made} made now, {before} before): "
+        f"{filled} with rows, {manifest.quarantined} quarantined; "
+        f"{counted(rows['objects'], 'object')}, {rows['grasps']} grasps and controls, {rows['trials']} trials"
         + (f", {rows['executions']} trials of executions" if config.execution else "")
     )
     reporter.say(splits_in_words(manifest))
@@ -113,8 +115,14 @@ def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def _warn_of_missing(config: DatasetConfig, reporter: Reporter) -> None:
-    """Warn of facts that the dataset's README.md will lack, as they cannot be added later."""
+def _warn(config: DatasetConfig, reporter: Reporter) -> None:
+    """Warn of what a dataset will lack or give away, as that cannot be changed later."""
+    absolute = [name for name in (*config.objects, config.contacts) if Path(name).is_absolute()]
+    if absolute and not reporter.quiet:
+        reporter.warn(
+            f"{CONFIG} and {CARD} will hold the path {absolute[0]}, so they differ on a machine "
+            "with other folders: give relative paths"
+        )
     missing = [name for name in CREDITS if not getattr(config, name)]
     if missing and not reporter.quiet:
         given = ", ".join(f"--{name}" for name in missing)

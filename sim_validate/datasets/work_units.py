@@ -147,6 +147,14 @@ class WorkUnit:
     """Grasps to judge; empty if grasps are to be planned."""
 
     @property
+    def label(self) -> str:
+        """Name of the object in files: as it was given, or the file's name if that is absolute.
+
+        So the files do not depend on where a machine has its meshes.
+        """
+        return Path(self.object).name if Path(self.object).is_absolute() else self.object
+
+    @property
     def id(self) -> str:
         """Name of the unit: 32 hexadecimal digits, the same wherever the mesh file lies."""
         table = as_table(self.config)

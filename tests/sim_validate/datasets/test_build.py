@@ -2,6 +2,7 @@ import dataclasses
 import json
 import shutil
 import sys
+from pathlib import Path
 
 import mujoco
 import pytest
@@ -103,9 +104,24 @@ def test_a_bad_object_is_quarantined_with_its_reason_and_the_others_are_there(tm
     assert (made.units, made.quarantined, made.rows["objects"]) == (3, 2, 1)
     lines = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
     reasons = {json.loads(line)["object"]: json.loads(line)["reason"] for line in lines}
-    assert "the same object as" in reasons[str(twin)]
-    assert reasons[str(bad)].startswith("GP-MESH-OPEN")
+    assert reasons["twin.stl"] == "the same object as again.stl"
+    assert reasons["open.stl"].startswith("GP-MESH-OPEN: open.stl: ")
     assert verify(tmp_path / "ds") == []
+
+
+def test_what_is_left_out_is_told_in_the_same_words_wherever_the_meshes_are(tmp_path, monkeypatch):
+    said = set()
+    for folder in ("one", "two/deep"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "bad.stl").write_text("solid nothing")
+        config = dataclasses.replace(CONFIG, objects=(str(tmp_path / folder / "bad.stl"),))
+        build(config, tmp_path / folder / "ds", Here(), silent)
+        said.add((tmp_path / folder / "ds" / "quarantine.jsonl").read_text())
+        monkeypatch.chdir(tmp_path / folder)
+        build(dataclasses.replace(CONFIG, objects=("bad.stl",)), Path("again"), Here(), silent)
+        said.add(Path("again/quarantine.jsonl").read_text())
+    (text,) = said
+    assert str(tmp_path) not in text
 
 
 def test_a_unit_that_ends_its_worker_is_tried_again_alone_then_quarantined(tmp_path):

@@ -84,6 +84,9 @@ def test_a_bad_mesh_is_left_out_and_said(tmp_path, capsys):
     names = ["tetrahedron", str(tmp_path / "meshes"), *LIGHT]
     code = main(["dataset", "build", *names, "--out", str(tmp_path / "ds")])
     assert code == Exit.PARTIAL
-    assert "quarantine.jsonl" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "quarantine.jsonl" in said.err
+    assert f"will hold the path {tmp_path / 'meshes' / 'bad.stl'}" in " ".join(said.err.split())
+    assert "2 units (2 made now, 0 before): 1 with rows, 1 quarantined; 1 object," in said.out
     (line,) = (tmp_path / "ds" / "quarantine.jsonl").read_text().splitlines()
     assert json.loads(line)["object"].endswith("bad.stl")
