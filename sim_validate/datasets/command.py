@@ -64,7 +64,8 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     reporter.say(
         f"{out}: {counted(manifest.units, 'unit')} ({built.made} made now, {before} before): "
         f"{filled} with rows, {manifest.quarantined} quarantined; "
-        f"{counted(rows['objects'], 'object')}, {rows['grasps']} grasps and controls, {rows['trials']} trials"
+        f"{counted(rows['objects'], 'object')}, {rows['grasps']} grasps and controls, "
+        f"{rows['trials']} trials"
         + (f", {rows['executions']} trials of executions" if config.execution else "")
     )
     reporter.say(splits_in_words(manifest))
