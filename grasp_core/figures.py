@@ -76,6 +76,9 @@ class Shown:
     """What stands for an infinite number: most figures are multiples at which something happens."""
     compared: Compared | None = BY_DEFAULT
     """How it is compared with an earlier one; None if others say the same and are compared."""
+    rounding: float = 0.0  # size up to which a number comes from rounding, and is shown as zero
+    least: float = -math.inf
+    """Number that stands for all smaller ones, too, and is shown as an infinite one is."""
 
 
 class figure(property):  # noqa: N801 - it is used as a decorator, as `property` is
@@ -193,13 +196,20 @@ def cell(value: Any, shown: Shown) -> str:
     if isinstance(value, Enum):
         return str(value.value).replace("_", " ")
     if isinstance(value, int | float):
-        return shown.infinite if math.isinf(value) else format(shown.times * value, shown.form)
+        return _number(value, shown)
     if isinstance(value, str):
         return value
     items: Sequence[Any] = value
     numbers = bool(items) and all(isinstance(item, float) for item in items)
     ends = dict.fromkeys(cell(item, shown) for item in items)
     return " to ".join(ends) if numbers else str(len(items))
+
+
+def _number(value: float, shown: Shown) -> str:
+    if math.isinf(value) or value <= shown.least:
+        return shown.infinite
+    size = 0.0 if abs(value) <= shown.rounding else shown.times * value
+    return format(size, f"z{shown.form}")  # z: zero has no sign
 
 
 def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tuple[str, ...]]]:

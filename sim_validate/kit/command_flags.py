@@ -26,6 +26,7 @@ from grasp_core.kinds import (
     Range,
     RankBy,
     Seed,
+    Share,
     Size,
     TimeLimit,
     Vector,
@@ -361,6 +362,10 @@ class Analyze(Spoken):
     the file."""
     max_normal_force_n: Quantity = 10.0
     """Largest normal force of each contact [N]."""
+    torsion_m: Share = 0.0
+    """Torsional coefficient of soft fingertips [m]: the largest torque about the normal of a
+    contact over its normal force. Figures that are defined for hard fingertips only are then left
+    out."""
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
     """An external wrench whose largest resisted multiple is wanted [N, N m], torque about the
     center; may be repeated."""

@@ -15,18 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Shape, Wrench, to_digits
-from grasp_core.closure.critical_friction import critical_friction_interval
-from grasp_core.closure.force_closure import ClosureCertificate, force_closure
+from grasp_core.closure.contacts import contact_torsions
+from grasp_core.closure.critical_friction import critical_friction, critical_friction_interval
+from grasp_core.closure.force_closure import FAR_BELOW, ClosureCertificate, force_closure
 from grasp_core.closure.friction_interval import FrictionInterval
 from grasp_core.closure.wrench_sets import Norm
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedError, about
-from grasp_core.figures import NONE, Shown, figures
+from grasp_core.figures import NONE, Shown, cell, figures
 from grasp_core.files.file_kinds import ANALYSES
 from grasp_core.files.records import FLAT, recorded
 from grasp_core.files.text_files import read_text
 from grasp_core.forces.contact_forces import contact_forces
-from grasp_core.kinds import Count, Null, OrInfinity, Quantity
+from grasp_core.kinds import Count, Null, OrInfinity, Quantity, Share
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
@@ -40,6 +41,15 @@ from sim_validate.kit.workers import each
 
 MOST_EDGES = 10_000
 """Most edges of all pyramids of a grasp, whose hull in six dimensions then takes ten seconds."""
+
+ROUNDING = 1e-12
+"""Size up to which figures of unit size come from rounding."""
+HARDLY = 1e-9
+"""Share of the largest normal force below which what contacts resist comes from rounding."""
+NO_BALANCE = "no balance"
+"""What stands for the margin of contacts of which hardly any forces balance, or none."""
+OF_HARD = "min-weight, hull volume, singular value, the lower end of mu*, least-norm forces"
+"""Figures that are not defined here for soft fingertips, in words."""
 
 Answer = TypeVar("Answer")
 Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
@@ -67,6 +77,13 @@ class Question(Declared):
     """External wrenches (force, torque) [N, N m], torque about each grasp's centre."""
     edges: Count = 8
     """Number of edges of the pyramids that stand for friction cones in metrics defined by them."""
+    torsion_m: Share = 0.0
+    """Torsional coefficient of every contact [m]; zero is a hard fingertip."""
+
+    @property
+    def soft(self) -> dict[str, float]:
+        """The argument for soft fingertips, of functions that know them; empty for hard ones."""
+        return {"torsion_m": self.torsion_m} if self.torsion_m else {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +97,8 @@ class Resisted(Declared):
     """Multiple above which the wrench is not resisted."""
     least_norm_forces_n: Forces | None = None
     """The balancing forces of least norm, in pyramids inscribed in the friction cones, (k, 3) [N];
-    None if there are none, which may happen for a limit just above 1, or if none were asked for."""
+    None if there are none, which may happen for a limit just above 1, if none were asked for, or
+    with torsion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -90,8 +108,10 @@ class Analysis(Declared):
     contacts: Annotated[ContactSet, FLAT]
     closed: Annotated[bool | None, Shown("closed")]
     """Whether the contacts are in force closure, by a certificate that was checked again."""
-    closure_margin: Annotated[Margin | None, Shown("margin")]
-    """Proved margin of force closure; None also if it is below -1e6."""
+    closure_margin: Annotated[
+        Margin | None, Shown("margin", infinite=NO_BALANCE, rounding=ROUNDING, least=FAR_BELOW)
+    ]
+    """Proved margin of force closure; -1e6 stands for smaller ones, too."""
     forces: Forces | None
     """Balancing forces that prove closure."""
     separating_wrench: Wrench | None
@@ -99,14 +119,17 @@ class Analysis(Declared):
     critical_friction: Annotated[OrInfinity | None, Shown("mu*", ".4f")]
     """Common coefficient that suffices for closure; infinite if none does."""
     critical_friction_interval: tuple[OrInfinity, OrInfinity] | None
-    """Ends between which it is proved to lie, checked again in rational arithmetic."""
-    ferrari_canny_l1_n: Annotated[Bounds | None, Shown("l1 N")]
-    ferrari_canny_linf_n: Annotated[Bounds | None, Shown("linf N")]
+    """Ends between which it is proved to lie, checked again in rational arithmetic; None with
+    torsion."""
+    ferrari_canny_l1_n: Annotated[Bounds | None, Shown("l1 N", rounding=ROUNDING)]
+    ferrari_canny_linf_n: Annotated[Bounds | None, Shown("linf N", rounding=ROUNDING)]
     verified: Mapping[str, bool]
     """Whether plain arithmetic has confirmed closure and the bounds of both qualities, by name."""
-    min_weight: Annotated[OrInfinity | None, Shown("min-weight")]
+    min_weight: Annotated[
+        Margin | None, Shown("min-weight", infinite=NO_BALANCE, rounding=ROUNDING)
+    ]
     hull_volume: Annotated[float | None, Shown("hull volume")]
-    smallest_singular_value: Annotated[float, Shown("singular value")]
+    smallest_singular_value: Annotated[float | None, Shown("singular value", rounding=ROUNDING)]
     weakest_axis_wrench: Resisted | None
     """The wrench along an axis that is resisted least, and its limit."""
     resisted_in_every_direction_n: Annotated[float | None, Shown("every direction N")]
@@ -115,6 +138,9 @@ class Analysis(Declared):
     """Results about the wrenches, in the order in which they were asked about."""
     undecided: Mapping[str, str]
     """Reasons why questions could not be decided, by the name of the question."""
+    torques: Annotated[Array, Shape(None)] | None = None
+    """Torques about the inward normals that balance with the forces, (k,) [m]; None without torsion
+    or closure."""
 
     @recorded
     def outcome(self) -> Outcome:
@@ -151,22 +177,21 @@ class Analyses(ResultFile):
 
 def analyze(contacts: ContactSet, question: Question) -> Analysis:
     """Answer every question about one grasp that can be decided."""
-    given = contacts.positions, contacts.normals, contacts.friction
-    edges, center, scale = question.edges, contacts.center, contacts.torque_scale
+    given, soft = (contacts.positions, contacts.normals, contacts.friction), question.soft
     ask = _Asking()
-    l1 = ask("ferrari_canny_l1", lambda: _quality(contacts, "l1"))
-    linf = ask("ferrari_canny_linf", lambda: _quality(contacts, "linf"))
-    proof = ask("closure", lambda: _checked(force_closure(*given)))
-    interval = ask("critical_friction", lambda: _checked(critical_friction_interval(*given[:2])))
+    l1 = ask("ferrari_canny_l1", lambda: _quality(contacts, "l1", soft))
+    linf = ask("ferrari_canny_linf", lambda: _quality(contacts, "linf", soft))
+    proof = ask("closure", lambda: _checked(force_closure(*given, **soft)))
+    critical, interval = ask("critical_friction", lambda: _critical(contacts, soft)) or (None, None)
     bounds = [None if found is None else (found.lower, found.upper) for found in (l1, linf)]
     return Analysis(
         contacts=contacts,
         closed=None if proof is None else proof.closed,
         closure_margin=None if proof is None else proof.margin,
         forces=None if proof is None else proof.forces,
-        separating_wrench=_about_center(proof, center),
-        critical_friction=None if interval is None else interval.critical_friction,
-        critical_friction_interval=None if interval is None else (interval.lower, interval.upper),
+        separating_wrench=_about_center(proof, contacts.center),
+        critical_friction=critical,
+        critical_friction_interval=interval,
         ferrari_canny_l1_n=bounds[0],
         ferrari_canny_linf_n=bounds[1],
         verified={
@@ -174,24 +199,31 @@ def analyze(contacts: ContactSet, question: Question) -> Analysis:
             "ferrari_canny_l1_n": l1 is not None and l1.verify(),
             "ferrari_canny_linf_n": linf is not None and linf.verify(),
         },
-        min_weight=ask("min_weight", lambda: min_weight(*given, edges=edges)),
-        hull_volume=ask(
-            "hull_volume",
-            lambda: hull_volume(*given, edges=edges, center=center, torque_scale=scale),
-        ),
-        smallest_singular_value=smallest_singular_value(
-            contacts.positions, center=center, torque_scale=scale
-        ),
+        **_of_hard(contacts, question, ask),
         weakest_axis_wrench=ask("weakest_axis_wrench", lambda: _weakest_axis(contacts, question)),
         resisted_in_every_direction_n=(
-            None if linf is None else max(linf.lower, 0.0) * question.max_normal_force_n
+            None if linf is None else max(0.0, linf.lower) * question.max_normal_force_n
         ),
         wrenches=tuple(
             ask(f"wrenches[{i}]", lambda load=load: _resisted(contacts, load, question))
             for i, load in enumerate(question.wrenches)
         ),
         undecided=ask.reasons,
+        torques=None if proof is None else proof.torques,
     )
+
+
+def _of_hard(contacts: ContactSet, question: Question, ask: "_Asking") -> dict[str, float | None]:
+    """Return the figures that are defined for hard fingertips only, None for soft ones."""
+    if question.soft:
+        return dict.fromkeys(("min_weight", "hull_volume", "smallest_singular_value"))
+    given, edges = (contacts.positions, contacts.normals, contacts.friction), question.edges
+    about = {"center": contacts.center, "torque_scale": contacts.torque_scale}
+    return {
+        "min_weight": ask("min_weight", lambda: min_weight(*given, edges=edges)),
+        "hull_volume": ask("hull_volume", lambda: hull_volume(*given, edges=edges, **about)),
+        "smallest_singular_value": smallest_singular_value(given[0], **about),
+    }
 
 
 @dataclass(slots=True)
@@ -224,19 +256,38 @@ def _about_center(proof: ClosureCertificate | None, center: Array) -> Array | No
     return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
 
 
-def _quality(contacts: ContactSet, norm: Norm) -> FerrariCanny:
+def _critical(contacts: ContactSet, soft: dict[str, float]) -> tuple[float, Bounds | None]:
+    """Return the critical friction, and its proved bounds for hard fingertips."""
+    given = contacts.positions, contacts.normals
+    if soft:
+        return critical_friction(*given, **soft), None
+    found = _checked(critical_friction_interval(*given))
+    return found.critical_friction, (found.lower, found.upper)
+
+
+def _quality(contacts: ContactSet, norm: Norm, soft: dict[str, float]) -> FerrariCanny:
     return ferrari_canny(
         contacts.positions, contacts.normals, contacts.friction,
-        center=contacts.center, torque_scale=contacts.torque_scale, norm=norm,
+        center=contacts.center, torque_scale=contacts.torque_scale, norm=norm, **soft,
     )  # fmt: skip
 
 
 def _limits(contacts: ContactSet, wrenches: ArrayLike, question: Question) -> list[Resisted]:
     found = wrench_limits(
         contacts.positions, contacts.normals, contacts.friction, wrenches,
-        max_normal_force=question.max_normal_force_n, center=contacts.center,
+        max_normal_force=question.max_normal_force_n, center=contacts.center, **question.soft,
     )  # fmt: skip
-    return [Resisted(each.wrench, each.limit, each.upper) for each in found]
+    rounding = [_hardly(each.wrench, contacts, question) for each in found]
+    return [
+        Resisted(each.wrench, each.limit if each.limit > hardly else 0.0, each.upper)
+        for each, hardly in zip(found, rounding, strict=True)
+    ]
+
+
+def _hardly(wrench: Array, contacts: ContactSet, question: Question) -> float:
+    """Return the multiple of a wrench below which it is rounding that resists it."""
+    largest = float(np.abs(wrench / np.repeat([1.0, contacts.torque_scale], 3)).max())
+    return HARDLY * question.max_normal_force_n / largest
 
 
 def _weakest_axis(contacts: ContactSet, question: Question) -> Resisted:
@@ -246,7 +297,7 @@ def _weakest_axis(contacts: ContactSet, question: Question) -> Resisted:
 
 def _resisted(contacts: ContactSet, wrench: ArrayLike, question: Question) -> Resisted:
     (limit,) = _limits(contacts, np.array([wrench]), question)
-    if limit.upper < 1.0:
+    if limit.upper < 1.0 or question.soft:
         return limit
     try:
         forces = contact_forces(
@@ -271,12 +322,16 @@ def analyze_file(command: command_flags.Analyze, reporter: Reporter) -> int:
         sets = contact_sets_from_json(text, overrides)
     for contacts in sets:
         count = len(contacts.positions)
+        with about(f"{command.contacts}: grasp {contacts.id}"):
+            contact_torsions(command.torsion_m, contacts.friction)
         if count * command.edges > MOST_EDGES:
             raise InputError(
                 f"grasp {contacts.id}: {count} contacts with {command.edges} edges each exceed "
                 f"{MOST_EDGES} edges; use --edges {MOST_EDGES // count} or less"
             )
-    question = Question(command.max_normal_force_n, command.wrench, command.edges)
+    question = Question(
+        command.max_normal_force_n, command.wrench, command.edges, command.torsion_m
+    )
     found = each(partial(analyze, question=question), sets, jobs=command.jobs)
 
     def told(done: tuple[Analysis, ...], *, complete: bool) -> Analyses:
@@ -300,7 +355,7 @@ def _show(analyses: Analyses, reporter: Reporter) -> None:
     else:
         reporter.records(f"{len(analyses.grasps)} grasps", analyses.grasps)
     if shown[0].wrenches:
-        rows = [row for found in shown for row in _wrench_rows(found)]
+        rows = [row for found in shown for row in _wrench_rows(found, analyses.question)]
         columns = ("grasp", "wrench", "resisted up to", "upper bound", "least-norm forces N")
         reporter.table("wrenches", columns, rows)
     for found in shown:
@@ -309,6 +364,8 @@ def _show(analyses: Analyses, reporter: Reporter) -> None:
         for name in (name for name, good in found.verified.items() if not good):
             reporter.say(f"grasp {found.contacts.id}: {name} is NOT CHECKED")
     _say_measures(shown[0].contacts, reporter)
+    if analyses.question.soft:
+        reporter.say(f"left out, because they are computed for hard fingertips only: {OF_HARD}")
     totals = analyses.summary
     reporter.say(
         f"{totals['closed']} of {totals['grasps']} grasps are in force closure, "
@@ -338,9 +395,11 @@ def _say_measures(contacts: ContactSet, reporter: Reporter) -> None:
 def _facts(found: Analysis) -> list[tuple[str, str]]:
     rows = [(figure.shown.heading, figure.cell(found)) for figure in figures(Analysis)[1:]]
     if found.critical_friction_interval is not None:
-        rows.append(("mu* is proved between", _ends(*found.critical_friction_interval)))
+        rows.append(_proved(*found.critical_friction_interval))
     if found.forces is not None:
         rows.append(("balanced forces", _listed(found.forces)))
+    if found.torques is not None:
+        rows.append(("balanced torques", _listed(found.torques)))
     if found.separating_wrench is not None:
         rows.append(("separating wrench", _listed(found.separating_wrench)))
     if found.weakest_axis_wrench is not None:
@@ -349,26 +408,30 @@ def _facts(found: Analysis) -> list[tuple[str, str]]:
     return [*rows, ("torque scale [m]", f"{found.contacts.torque_scale:.6g}")]
 
 
-def _wrench_rows(found: Analysis) -> list[tuple[str, ...]]:
-    name = found.contacts.id
-    return [
-        (name, NONE, NONE, NONE, NONE)
-        if one is None
-        else (
-            name,
-            _listed(one.wrench),
-            f"{one.limit:.6g}",
-            f"{one.upper:.6g}",
-            NONE if one.least_norm_forces_n is None else _listed(one.least_norm_forces_n),
-        )
-        for one in found.wrenches
-    ]
+def _wrench_rows(found: Analysis, question: Question) -> list[tuple[str, ...]]:
+    rows, name = list[tuple[str, ...]](), found.contacts.id
+    for one in found.wrenches:
+        if one is None:
+            rows.append((name, NONE, NONE, NONE, NONE))
+            continue
+        zero = _hardly(one.wrench, found.contacts, question)
+        shown = Shown("", ".6g", infinite="any multiple", rounding=zero)
+        forces = one.least_norm_forces_n
+        rows.append((
+            name, _listed(one.wrench), cell(one.limit, shown), cell(one.upper, shown),
+            NONE if forces is None else _listed(forces),
+        ))  # fmt: skip
+    return rows
 
 
-def _ends(lower: float, upper: float) -> str:
-    """Print a proved interval, with both ends rounded outwards so that it still holds."""
+def _proved(lower: float, upper: float) -> tuple[str, str]:
+    """Say where mu* is proved to be, with both ends rounded outwards so that it still holds."""
     low, high = np.array([np.floor(lower / STEP), np.ceil(upper / STEP)]) * STEP
-    return f"{low:.{DIGITS}f} and {high:.{DIGITS}f}"
+    if math.isinf(lower):
+        return "mu* is proved", "infinite: no friction is enough"
+    if math.isinf(upper):
+        return "mu* is proved at least", f"{low:.{DIGITS}f}"
+    return "mu* is proved between", f"{low:.{DIGITS}f} and {high:.{DIGITS}f}"
 
 
 def _listed(values: Array) -> str:

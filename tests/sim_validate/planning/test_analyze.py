@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import grasp_core as gc
 from grasp_core.errors import UndecidedError
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -309,3 +310,62 @@ def test_a_config_file_gives_wrenches(analyze):
     asked = [found["wrench"] for found in document["grasps"][0]["wrenches"]]
     assert asked == [[0, 0, -1, 0, 0, 0], [1, 0, 0, 0, 0, 0.1]]
     assert document["edges"] == 6
+
+
+@pytest.mark.parametrize(
+    ("points", "inward"),
+    [
+        (CROSS[:2], -CROSS[:2]),  # two contacts, which never are in closure
+        (np.eye(3), [[0.0, 0, 1]] * 3),  # all push one way, so that nothing balances
+        (CROSS, -CROSS),
+    ],
+)
+def test_what_is_printed_has_no_rounding_and_no_numbers_that_stand_for_words(
+    analyze, capsys, points, inward
+):
+    for friction in (0.0, 0.5):
+        analyze({"contacts": contacts(points, inward), "friction": friction})
+        main(["analyze", "contacts.json", "--wrench", "0", "0", "-3", "0", "0", "0"])
+        shown = capsys.readouterr().out
+        assert not re.search(r"\d[eE][-+]\d|\binf\b|-0\b(?!\.)", shown), shown
+
+
+def test_sentinels_and_endless_intervals_are_said_in_words(analyze, capsys):
+    grasps = [{"contacts": contacts(CROSS[:2], -CROSS[:2])},
+              {"contacts": contacts(np.eye(3), [[0.0, 0, 1]] * 3)}]  # fmt: skip
+    _, document = analyze({"grasps": grasps, "friction": 0.5})
+    assert document["grasps"][0]["weakest_axis"] == 0.0
+    assert document["grasps"][1]["closure_margin"] == -1e6
+    main(["analyze", "contacts.json"])
+    assert "no balance" in capsys.readouterr().out
+    Path("contacts.json").write_text(json.dumps({**grasps[0], "friction": 0.5}))
+    main(["analyze", "contacts.json"])
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "mu* is proved infinite: no friction is enough" in shown
+
+
+def test_soft_fingertips_are_judged_with_their_torsion(analyze, capsys):
+    """Two soft contacts resist torques about their line: 0.01 m times twice 10 N."""
+    file = {"contacts": contacts(0.05 * CROSS[:2], -CROSS[:2]), "friction": 0.5}
+    turn = ["--wrench", "1", "0", "0", "0", "0", "0", "--wrench", "0", "0", "0", "1", "0", "0"]
+    code, document = analyze(file, "--torsion-m", "0.01", *turn)
+    (grasp,) = document["grasps"]
+    assert (code, document["torsion_m"]) == (Exit.GOOD, 0.01)
+    assert grasp["closed"] is True
+    assert grasp["verified"] == dict.fromkeys(grasp["verified"], True)
+    proof = gc.force_closure(0.05 * CROSS[:2], -CROSS[:2], 0.5, torsion_m=0.01)
+    assert grasp["closure_margin"] == pytest.approx(proof.margin)
+    assert len(grasp["torques"]) == 2
+    assert grasp["wrenches"][1]["limit"] == pytest.approx(0.2, rel=1e-6)
+    assert grasp["ferrari_canny_l1_n"][0] > 0.0
+    left_out = ("min_weight", "hull_volume", "smallest_singular_value",
+                "critical_friction_interval")  # fmt: skip
+    assert [grasp[name] for name in left_out] == [None] * 4
+    assert grasp["wrenches"][0]["least_norm_forces_n"] is None
+    assert json.loads(analysis.Analyses.of_text(json.dumps(document)).text()) == document
+    assert main(["analyze", "contacts.json", "--torsion-m", "0.01"]) == Exit.GOOD
+    assert "left out, because they are computed for hard fingertips" in capsys.readouterr().out
+    assert "torsion_m must be zero where friction is" in refused(
+        file | {"friction": 0.0}, capsys, "--torsion-m", "0.01"
+    )
+    assert main(["analyze", "contacts.json", "--torsion-m", "-1"]) == Exit.USAGE
