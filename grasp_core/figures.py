@@ -10,6 +10,7 @@ import ast
 import inspect
 import math
 import operator
+import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ UNITS = {
     "m_per_s": "m/s", "n_per_m": "N/m", "kg_m2": "kg m^2", "n_nm": "N, N m", "n_s": "N s",
 }  # fmt: skip
 """Units by the ends of names; the longest end counts."""
+IN_BRACKETS = re.compile(r" \[[^]]*\]")
+"""Pattern of the unit in a meaning, such as ` [m]`."""
 
 Worse = Callable[[Any, Any], bool]
 """A function that tells whether a change is for the worse, of the figure before and after."""
@@ -100,6 +103,11 @@ class Figure(NamedTuple):
     def called(self) -> str:
         """What messages call the figure."""
         return (self.compared and self.compared.words) or self.name
+
+    @property
+    def explained(self) -> str:
+        """Its meaning beside its heading, which names the unit of a number that is shown scaled."""
+        return self.meaning if self.shown.times == 1.0 else IN_BRACKETS.sub("", self.meaning)
 
     def of(self, record: Any) -> Any:
         """Return the figure of a record; None where the record lacks the part that has it."""

@@ -102,7 +102,7 @@ def _show(found: Executions, reporter: Reporter) -> None:
     reporter.records("executions", found.grasps)
     for figure in figures(ExecutedGrasp):
         if figure.name in EXPLAINED:
-            reporter.say(f"{figure.shown.heading}: {figure.meaning}")
+            reporter.say(f"{figure.shown.heading}: {figure.explained}")
     for title, cell in (("trials survived", _survived), (SLIPS, _slips)):
         rows = [(each.id, *(cell(each.execution, kind) for kind in kinds)) for each in shown]
         reporter.table(title, ("grasp", *kinds), rows)

@@ -342,8 +342,8 @@ def _certified(
 def _show(found: Regions, reporter: Reporter) -> None:
     reporter.records("independent regions", found.grasps)
     for figure in figures(GraspRegions):
-        if figure.meaning:
-            reporter.say(f"{figure.shown.heading}: {figure.meaning}")
+        if figure.explained:
+            reporter.say(f"{figure.shown.heading}: {figure.explained}")
     reasons = Counter(each.reason for each in found.grasps if each.reason)
     for reason, count in reasons.most_common():
         reporter.say(f"no regions for {count} of {len(found.grasps)} grasps: {reason}")

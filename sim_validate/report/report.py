@@ -200,7 +200,7 @@ def grasp_page(
             "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
             "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
         },
-        trial_columns=[(each.shown.heading, each.meaning) for each in TRIAL_FIGURES],
+        trial_columns=[(each.shown.heading, each.explained) for each in TRIAL_FIGURES],
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
         commands=list(_commands(found)),
         drawing=as_text(grasp_data(Drawing(run.saved.body, found.shown, run.friction, found.held))),
@@ -323,7 +323,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 
         controls=_controls(verdicts),
         executions=[sections.described_executions(each) for each in executed],
         executed_columns=[
-            (each.shown.heading, each.meaning) for each in sections.EXECUTION_FIGURES
+            (each.shown.heading, each.explained) for each in sections.EXECUTION_FIGURES
         ],
         judged=_judged(runs),
         possible=[

@@ -141,7 +141,7 @@ def facts_of(record: object, but: Sequence[str]) -> Iterable[Fact]:
     """Yield the figures that a record has, but for those that the page says in other places."""
     for each in figures(type(record)):
         if each.name not in but and each.of(record) is not None:
-            yield each.shown.heading, each.cell(record), each.meaning
+            yield each.shown.heading, each.cell(record), each.explained
 
 
 def _of_hand(record: object, part: str = "") -> Iterable[Fact]:
@@ -232,7 +232,7 @@ def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Ite
     sizes = ", ".join(f"{size:.3g}" for size in np.linalg.norm(execution.squeeze, axis=1))
     yield "Squeeze, finger by finger", f"{sizes} N", ""
     for figure in EXECUTION_FIGURES:
-        yield figure.shown.heading, figure.cell(found), figure.meaning
+        yield figure.shown.heading, figure.cell(found), figure.explained
     yield from _enough(found)
 
 
@@ -245,7 +245,7 @@ def records_table(records: Sequence[object], kind: type) -> Record:
     listed = [each for each in figures(kind) if any(each.of(one) is not None for one in records)]
     tones = {True: GOOD, False: BAD}
     return {
-        "columns": [(figure.shown.heading, figure.meaning) for figure in listed],
+        "columns": [(figure.shown.heading, figure.explained) for figure in listed],
         "rows": [
             [
                 (figure.cell(one), tones[value] if isinstance(value, bool) else "")
