@@ -215,6 +215,9 @@ class ScaledScene(Settings):
     pads where the faces are patches of a curved surface, else the object."""
 
 
+SAMPLE_S = 0.005
+"""Duration of a sample of an execution: what is applied changes, and motion is recorded, once per
+sample [s]."""
 UPRIGHT = (0.0, 0.0, -1.0)
 WATER_KG_M3 = 1000.0
 """Density of an object of which neither mass nor density is given."""

@@ -23,7 +23,7 @@ from grasp_core.kinds import (
     Share,
 )
 from grasp_core.settings import Settings
-from scenes.settings import HeldSettings
+from scenes.settings import SAMPLE_S, HeldSettings
 
 Duration = Annotated[float, Range(least=0.05, most=60.0)]
 Settling = Annotated[float, Range(least=1.0, most=100.0)]
@@ -172,6 +172,8 @@ KNOCK_M_PER_S = 1.0 / 6.0
 """Speed that the usual knock gives a free object [m/s], 0.05 N s for 0.3 kg. So its load grows with
 the mass, as those of all other trials do, and a screw is not shot away."""
 
+ROUNDING = 1e-9
+"""Relative size of differences that are rounding."""
 LONGEST_S = 100.0
 """Longest duration of a lift or a stop [s]."""
 
@@ -205,7 +207,7 @@ class ChosenExecution(Holding):
     shake_hz: Annotated[float, Range(least=0.1, most=25.0)] = 5.0
     """Frequency of a shake [Hz]."""
     stop_m_per_s2: Quantity = 10.0
-    """Deceleration of a stop [m/s^2]."""
+    """Deceleration of a stop [m/s^2], which takes at least 0.005 s: at most 200 times the speed."""
     stop_from_m_per_s: Quantity = 0.5
     """Speed before a stop [m/s]."""
     knock_n_s: NotNegative | None = None
@@ -235,6 +237,12 @@ class ChosenExecution(Holding):
             raise InputError(
                 f"stop_from_m_per_s over stop_m_per_s2 is the duration of a stop, at most "
                 f"{LONGEST_S:g} s, got {stopping:.3g} s; start slower, or stop harder"
+            )
+        if stopping < SAMPLE_S * (1.0 - ROUNDING):
+            raise InputError(
+                f"stop_from_m_per_s over stop_m_per_s2 is the duration of a stop, at least the "
+                f"{SAMPLE_S:g} s of a sample, got {stopping:.3g} s; start faster, or stop with at "
+                f"most {self.stop_from_m_per_s / SAMPLE_S:.6g} m/s^2"
             )
 
 

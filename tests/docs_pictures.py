@@ -46,7 +46,7 @@ from scenes.drawing.sheets import (
     outlined,
     png_of,
 )
-from scenes.mujoco.held_scene import SAMPLE_S
+from scenes.settings import SAMPLE_S
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, Setup

@@ -33,7 +33,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText
 from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import HeldSettings, PhysicsSettings
+from scenes.settings import SAMPLE_S, HeldSettings, PhysicsSettings
 
 if TYPE_CHECKING:
     from scenes.mujoco.chains import StandingHand
@@ -46,8 +46,6 @@ TRUE_MASS = (
 )
 SPRINGS = ("a", "b", "c")
 """Endings of the names of a fingertip's three slides."""
-SAMPLE_S = 0.005
-"""Duration of a sample: what is applied changes, and motion is recorded, once per sample [s]."""
 FEWEST_STEPS, MOST_STEPS = 4, 128
 """Least and largest number of steps in a sample."""
 STEP_RAD = 0.2

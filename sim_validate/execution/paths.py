@@ -24,8 +24,8 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH, contact_frames
 from grasp_core.execution.loads import GRAVITY_M_PER_S2
-from scenes.mujoco.held_scene import SAMPLE_S
 from scenes.mujoco.mjcf_text import quaternion
+from scenes.settings import SAMPLE_S
 from sim_validate.engine import simulate
 from sim_validate.engine.simulate import smooth
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenes.mujoco.held_scene import SAMPLE_S
+from scenes.settings import SAMPLE_S
 from sim_validate.execution import paths
 from tests.sim_validate.execution.held_rigs import G
 

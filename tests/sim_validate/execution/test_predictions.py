@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import grasp_core as gc
 import scenes
 from grasp_core.closure.contacts import cross_matrix
-from scenes.mujoco.held_scene import SAMPLE_S
+from scenes.settings import SAMPLE_S
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Table, idle
 from sim_validate.execution.predictions import HeldDynamics

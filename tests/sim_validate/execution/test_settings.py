@@ -6,12 +6,15 @@
 from dataclasses import replace
 from typing import get_args
 
+import numpy as np
 import pytest
 
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.settings import as_table
 from scenes.example_objects import example_object
+from scenes.settings import SAMPLE_S
+from sim_validate.execution.paths import stop
 from sim_validate.hands.trials import hand_execution_settings
 from sim_validate.kit.command_flags import Execute
 from sim_validate.kit.flag_values import flags_from
@@ -46,6 +49,17 @@ def test_the_duration_of_a_stop_is_limited():
     assert sv.ExecutionSettings(0.1, stop_m_per_s2=0.01, stop_from_m_per_s=1.0).seed == 0
     with pytest.raises(gc.InputError, match=r"stop_from_m_per_s .* at most 100 s, got 200 s"):
         sv.ExecutionSettings(0.1, stop_m_per_s2=0.01, stop_from_m_per_s=2.0)
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.5, 0.7, 3.0])
+def test_a_stop_has_the_deceleration_asked_for_or_is_refused(speed):
+    most = speed / SAMPLE_S
+    for asked in (0.3 * most, most, float(f"{most:.12g}")):
+        settings = sv.ExecutionSettings(0.1, stop_m_per_s2=asked, stop_from_m_per_s=speed)
+        drive = stop(np.zeros(3), np.eye(3)[0], settings.stop_m_per_s2, speed)
+        assert np.abs(drive.accelerations).max() == pytest.approx(asked, rel=1e-6)
+    with pytest.raises(gc.InputError, match=f"or stop with at most {most:.6g} m/s"):
+        sv.ExecutionSettings(0.1, stop_m_per_s2=2.0 * most, stop_from_m_per_s=speed)
 
 
 @pytest.mark.parametrize(("mass_kg", "impulse"), [(0.3, 0.05), (0.0003, 5e-5), (6.0, 1.0)])

@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 import scenes
-from scenes.mujoco.held_scene import SAMPLE_S
+from scenes.settings import SAMPLE_S
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Table
 from sim_validate.execution.simulate import HeldBench
