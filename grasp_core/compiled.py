@@ -24,8 +24,8 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -125,16 +125,39 @@ def copy_of(module: str, path: str) -> Path | None:
     name = f"{module}-{_stamp(module, Path(path))}.py"
     for folder in folders(Path(path)):
         try:
-            folder.mkdir(parents=True, exist_ok=True)
             # made even where a copy is there, to see that numba can write
-            with tempfile.TemporaryDirectory(dir=folder) as own:
+            with _written_to(folder) as own:
                 if not (folder / name).exists():
-                    written = shutil.copyfile(path, Path(own) / name)
+                    written = shutil.copyfile(path, own / name)
                     written.replace(folder / name)
         except OSError:
             continue
         return folder / name
     return None
+
+
+@contextmanager
+def _written_to(folder: Path) -> Generator[Path]:
+    """Yield a folder of its own for the block in a folder, which is made if needed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as own:
+        yield Path(own)
+
+
+def why_not_kept() -> str:
+    """Say why no folder keeps compiled loops, with the faults of all; empty if one does.
+
+    It is also empty where numba is told to compile nothing.
+    """
+    faults = list[str]()
+    for folder in folders(Path(__file__)):
+        try:
+            with _written_to(folder):
+                return ""
+        except OSError as error:
+            faults.append(f"{folder}: {error.strerror}")
+    compiles = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+    return "; ".join(faults) if compiles else ""
 
 
 def folders(path: Path) -> Iterator[Path]:

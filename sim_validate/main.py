@@ -9,11 +9,12 @@ import traceback
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
+from grasp_core.compiled import why_not_kept
 from grasp_core.errors import GraspError, InputError
 from grasp_core.kinds import FieldError, near, shown
 from grasp_core.settings import types
@@ -40,6 +41,9 @@ from sim_validate.kit.flag_values import (
     with_config,
 )
 from sim_validate.kit.workers import interrupts_noted
+
+if TYPE_CHECKING:
+    from sim_validate.kit.console import Reporter
 
 Command = (
     flags.Run | flags.Plan | flags.Validate | flags.Execute | flags.Scene | flags.Export
@@ -169,12 +173,7 @@ def _dispatch(command: flags.Spoken) -> int:
             from sim_validate.kit.console import Reporter
 
             reporter = Reporter(speech.quiet, speech.verbose, speech.json)
-            unseen = speech.quiet and not speech.json
-            if isinstance(command, PRODUCING) and unseen and command.out is None:
-                reporter.warn(
-                    "nothing will be written: with -q and without --out only the exit code is "
-                    "left; give --out DIR, or --json"
-                )
+            _warn(command, reporter)
             action = resolve_name(f"sim_validate.{ACTIONS[type(command)]}")
             code = action(command, reporter)
             if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison] - may be closed
@@ -188,6 +187,22 @@ def _dispatch(command: flags.Spoken) -> int:
         if speech.verbose:
             traceback.print_exc()
         return _complain(f"internal error: {error!r}; -v shows where", Exit.INTERNAL)
+
+
+def _warn(command: flags.Spoken, reporter: "Reporter") -> None:
+    """Warn of loops that are compiled again and again, and of results that nobody will see."""
+    if type(command) not in (flags.Objects, flags.Doctor) and (faults := why_not_kept()):
+        reporter.warn(
+            "compiled loops cannot be kept, so that each process compiles them anew, which takes "
+            f"up to a minute ({faults}); let the environment variable NUMBA_CACHE_DIR name a "
+            "folder that takes files"
+        )
+    unseen = command.speech.quiet and not command.speech.json
+    if isinstance(command, PRODUCING) and unseen and command.out is None:
+        reporter.warn(
+            "nothing will be written: with -q and without --out only the exit code is left; give "
+            "--out DIR, or --json"
+        )
 
 
 def _complain(message: str, code: Exit) -> int:

@@ -8,7 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from grasp_core.compiled import compiled, copy_of, folders, is_kept, loop, state_of
+from grasp_core.compiled import (
+    compiled,
+    copy_of,
+    folders,
+    is_kept,
+    loop,
+    state_of,
+    why_not_kept,
+)
 from grasp_core.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -147,6 +155,12 @@ def test_where_nothing_can_be_written_nothing_is_kept(monkeypatch, tmp_path):
     nowhere = [Path(NOWHERE), Path("/dev/null")]
     monkeypatch.setattr("grasp_core.compiled.folders", lambda _: nowhere)
     assert copy_of.__wrapped__("own_kernel", str(module)) is None
+    said = why_not_kept()
+    assert all(f"{folder}: " in said for folder in nowhere)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert why_not_kept() == ""
+    monkeypatch.setattr("grasp_core.compiled.folders", lambda _: [Path(NOWHERE), tmp_path / "new"])
+    assert why_not_kept() == ""
 
 
 def test_the_chosen_folder_comes_first_and_the_users_before_the_module(monkeypatch, tmp_path):

@@ -375,3 +375,14 @@ def test_it_is_said_that_the_room_for_fingers_is_not_checked_unless_it_is(capsys
         said = " ".join(capsys.readouterr().out.split())
         assert ("not checked: whether fingers have room" in said) == unchecked
         assert ("--finger-radius-m and --approach-m" in said) == unchecked
+
+
+def test_loops_that_cannot_be_kept_are_told_once_with_what_helps(monkeypatch, capsys):
+    monkeypatch.setattr("grasp_core.compiled.folders", lambda _: [Path("/dev/null/cache")])
+    assert main(["plan", "wedge", "--limit", "1", "--jobs", "2"]) == Exit.GOOD
+    said = " ".join(capsys.readouterr().err.split())
+    assert said.count("compiled loops cannot be kept") == 1
+    assert "/dev/null/cache: Not a directory" in said
+    assert "NUMBA_CACHE_DIR" in said
+    assert main(["objects"]) == Exit.GOOD
+    assert not capsys.readouterr().err
