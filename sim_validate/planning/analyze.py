@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -81,7 +81,7 @@ class Question(Declared):
     """Torsional coefficient of every contact [m]; zero is a hard fingertip."""
 
     @property
-    def soft(self) -> dict[str, float]:
+    def soft(self) -> dict[str, Any]:
         """The argument for soft fingertips, of functions that know them; empty for hard ones."""
         return {"torsion_m": self.torsion_m} if self.torsion_m else {}
 
@@ -218,7 +218,7 @@ def _of_hard(contacts: ContactSet, question: Question, ask: "_Asking") -> dict[s
     if question.soft:
         return dict.fromkeys(("min_weight", "hull_volume", "smallest_singular_value"))
     given, edges = (contacts.positions, contacts.normals, contacts.friction), question.edges
-    about = {"center": contacts.center, "torque_scale": contacts.torque_scale}
+    about: dict[str, Any] = {"center": contacts.center, "torque_scale": contacts.torque_scale}
     return {
         "min_weight": ask("min_weight", lambda: min_weight(*given, edges=edges)),
         "hull_volume": ask("hull_volume", lambda: hull_volume(*given, edges=edges, **about)),
@@ -256,7 +256,7 @@ def _about_center(proof: ClosureCertificate | None, center: Array) -> Array | No
     return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
 
 
-def _critical(contacts: ContactSet, soft: dict[str, float]) -> tuple[float, Bounds | None]:
+def _critical(contacts: ContactSet, soft: dict[str, Any]) -> tuple[float, Bounds | None]:
     """Return the critical friction, and its proved bounds for hard fingertips."""
     given = contacts.positions, contacts.normals
     if soft:
@@ -265,7 +265,7 @@ def _critical(contacts: ContactSet, soft: dict[str, float]) -> tuple[float, Boun
     return found.critical_friction, (found.lower, found.upper)
 
 
-def _quality(contacts: ContactSet, norm: Norm, soft: dict[str, float]) -> FerrariCanny:
+def _quality(contacts: ContactSet, norm: Norm, soft: dict[str, Any]) -> FerrariCanny:
     return ferrari_canny(
         contacts.positions, contacts.normals, contacts.friction,
         center=contacts.center, torque_scale=contacts.torque_scale, norm=norm, **soft,
