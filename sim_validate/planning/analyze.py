@@ -218,11 +218,11 @@ def _of_hard(contacts: ContactSet, question: Question, ask: "_Asking") -> dict[s
     if question.soft:
         return dict.fromkeys(("min_weight", "hull_volume", "smallest_singular_value"))
     given, edges = (contacts.positions, contacts.normals, contacts.friction), question.edges
-    about: dict[str, Any] = {"center": contacts.center, "torque_scale": contacts.torque_scale}
+    measured: dict[str, Any] = {"center": contacts.center, "torque_scale": contacts.torque_scale}
     return {
         "min_weight": ask("min_weight", lambda: min_weight(*given, edges=edges)),
-        "hull_volume": ask("hull_volume", lambda: hull_volume(*given, edges=edges, **about)),
-        "smallest_singular_value": smallest_singular_value(given[0], **about),
+        "hull_volume": ask("hull_volume", lambda: hull_volume(*given, edges=edges, **measured)),
+        "smallest_singular_value": smallest_singular_value(given[0], **measured),
     }
 
 
