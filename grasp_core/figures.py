@@ -190,7 +190,7 @@ def keeps(listed: Iterable[Figure], digits: int | None = None) -> Callable[[type
         own.FIGURES, own.DIGITS = {each.name: each for each in listed}, digits
         kinds = {name: each.kind for name, each in own.FIGURES.items()}
         own.__annotations__ = {**inspect.get_annotations(own), **kinds}
-        return dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)(own)
+        return dataclass(frozen=True, slots=True, eq=False, repr=False)(own)
 
     return made
 

@@ -51,8 +51,6 @@ def in_baselines(kind: type) -> Iterator[Figure]:
 class VerdictFigures(Kept):
     """The figures of a verdict."""
 
-    controls_undecided = 0  # baselines of earlier versions count these among those that held
-
 
 @keeps(in_baselines(Execution), DIGITS)
 class ExecutionFigures(Kept):

@@ -107,12 +107,11 @@ def _show(verdicts: Verdicts, setup: Setup, reporter: Reporter) -> None:
     reporter.records("verdicts", verdicts.verdicts)
     _show_robustness(verdicts.verdicts, reporter)
     totals = verdicts.summary
-    undecided = totals["controls"] - totals["controls_let_go"] - totals["controls_held"]
     reporter.say(
         f"{totals['grasps_held']} of {totals['grasps']} grasps held all wrenches, at "
         f"{100.0 * setup.hold.load_share:g} % of what they resist; {totals['controls_let_go']} of "
         f"{totals['controls']} negative controls were let go (all should), "
-        f"{totals['controls_held']} held" + (f", {undecided} undecided" if undecided else "")
+        f"{totals['controls_held']} were not"
     )
     warn_of(_surprises(verdicts.verdicts), Verdicts.FILE, reporter)
     if not totals["controls"]:

@@ -188,8 +188,7 @@ LOST_WITH_NOISE = Compared(
     items=("repeats with noise no longer held", "repeats with noise held now"), close="noisy_close"
 )
 CONTROLS = Compared(less, "negative controls", of_part=True)
-CONTROLS_HELD = Compared(more, "negative controls that held")
-CONTROLS_UNDECIDED = Compared(more, "undecided negative controls")
+CONTROLS_HELD = Compared(more, "negative controls that were not let go")
 CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
 """How the figures of a verdict are shown, and compared with those of an earlier one."""
 
@@ -282,17 +281,12 @@ class Verdict(HoldsWrenches, InNotebooks):
     @recorded
     def controls_let_go(self) -> Annotated[bool, Shown("controls let go", compared=None)]:
         """Whether every negative control let go of the object, as it must."""
-        return all(each.let_go for each in self.controls)
+        return not self.controls_held
 
     @figure
     def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
-        """Names of the negative controls that held a load, which none must."""
-        return tuple(each.control.name for each in self.controls if each.held)
-
-    @figure
-    def controls_undecided(self) -> Annotated[tuple[str, ...], CONTROLS_UNDECIDED]:
-        """Names of the negative controls that neither held a load nor let go in every trial."""
-        return tuple(each.control.name for each in self.controls if not (each.held or each.let_go))
+        """Names of the negative controls that did not let go: they held, or are undecided."""
+        return tuple(each.control.name for each in self.controls if not each.let_go)
 
     @recorded
     def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
@@ -387,7 +381,7 @@ class Verdicts(AboutGrasps[Verdict]):
 
     @recorded
     def summary(self) -> Mapping[str, int]:
-        """Numbers of grasps that held, of negative controls that let go, and contradictions."""
+        """Numbers of grasps that held, of controls that let go and did not, and contradictions."""
         controls = [control for verdict in self.verdicts for control in verdict.controls]
         return {
             "grasps": len(self.verdicts),

@@ -135,7 +135,7 @@ def said_of(verdict: Verdict | None) -> tuple[str, str]:
         return outcome, BAD
     if verdict.mismatches:
         return "contradicts the analysis", BAD
-    if verdict.controls_held:
+    if any(control.held for control in verdict.controls):
         return "a negative control held", BAD
     if not verdict.controls_let_go:
         return "a negative control is undecided", BAD
