@@ -44,12 +44,16 @@ def met(body, starts, ways):
     return starts + nearest[:, None] * ways, found
 
 
-def share_closed(body, found, count, seed):
-    """Return the share of draws in which the contacts that fingers meet are force-closed."""
+def share_closed(body, found, count, seed, *, landed=False):
+    """Return the share of draws in which the contacts that fingers meet are force-closed.
+
+    With `landed`, all of them must also be on their landings.
+    """
     behind = 2.0 * float(found.slides.max())
     moves, turns, shifts, friction = draws_of(found.off, found.normals, count, seed)
     back = turns.inv().as_matrix()
     points, normals = np.empty((count, 4, 3)), np.empty((count, 4, 3))
+    there = friction > 0.0
     for i, (x, n) in enumerate(zip(found.positions, found.normals, strict=True)):
         start = x + shifts[:, i] - behind * n - found.center - moves
         start = np.einsum("nij,nj->ni", back, start) + found.center

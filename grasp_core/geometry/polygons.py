@@ -62,7 +62,7 @@ def edge_rows(polygon: Array) -> tuple[Array, Array]:
 
 
 def clip(polygon: Array, rows: Array, limits: Array) -> Array:
-    """Cut a convex polygon to rows @ y <= limits; the result is (0, 2) if nothing is left."""
+    """Cut a convex polygon (k, m) to rows @ y <= limits; it is (0, m) if nothing is left."""
     for row, limit in zip(rows, limits, strict=True):
         height = polygon @ row - limit
         height[np.abs(height) <= ON_LINE * np.abs(polygon).max(initial=0.0)] = 0.0
@@ -74,7 +74,7 @@ def clip(polygon: Array, rows: Array, limits: Array) -> Array:
             if height[here] * height[after] < 0.0:
                 share = height[here] / (height[here] - height[after])
                 kept.append(polygon[here] + share * (polygon[after] - polygon[here]))
-        polygon = np.array(kept).reshape(-1, 2)
+        polygon = np.array(kept).reshape(-1, polygon.shape[1])
     return polygon
 
 

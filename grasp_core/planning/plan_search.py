@@ -9,9 +9,10 @@ At the end it is selected which of the grasps found are returned, in which order
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import chain, combinations, islice, repeat, zip_longest
 from typing import TypeAlias, TypeVar
@@ -93,6 +94,8 @@ class PlanSearch:
     """Other processes that search parts; None where this one is alone."""
     stop: Callable[[], bool] = never
     """Whether to end the search with what was found by then."""
+    unranked: Counter[str] = field(default_factory=Counter)
+    """Numbers of grasps without a figure to rank by, by the reason."""
 
     @classmethod
     def of(
@@ -392,11 +395,15 @@ def _measure(search: PlanSearch) -> tuple[Callable[[Certified], float], float]:
 
     if request.rank_by == "placement":
         # slow to import, and other rankings have no use for it
-        from grasp_core.regions.certify_placement import usual_chance
+        from grasp_core.regions.certify_placement import usual_bound
 
         def risk(found: Certified) -> float:
             grasp = to_grasp(body, request.friction, found, search.on)
-            return 1.0 - usual_chance(body, grasp, request.friction)
+            bounded = usual_bound(body, grasp, request.friction)
+            if isinstance(bounded, str):
+                search.unranked[bounded] += 1
+                return math.inf
+            return 1.0 - bounded.lower
 
         return risk, SAME_SHARE
 

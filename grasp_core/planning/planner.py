@@ -68,9 +68,10 @@ def plan(  # noqa: PLR0913 - the contract's keywords
             friction), `ferrari-canny` (the largest quality), `payload` (the largest mass in any
             orientation under one squeeze with pushes up to 10 N; grasps that no such squeeze holds
             come last), `placement` (the largest proved chance of closure where the object is off by
-            2 mm and 2 degrees, see `placement_probability`) and `diverse` (each next one is the
-            farthest from those before it) all grasps that are found compete. For objects with a
-            radius below 25 mm, the 2 mm are as much less as the radius, the 10 N as its square.
+            2 mm and 2 degrees, see `placement_probability`; those without a bound come last, and
+            `Plan.unranked` says why) and `diverse` (each next one is the farthest from those before
+            it) all grasps that are found compete. For objects with a radius below 25 mm, the 2 mm
+            are as much less as the radius, the 10 N as its square.
         seed: Seed of the free method's restarts.
         max_face_parts: Most parts into which the free method may cut the faces of one quadruple.
         complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
@@ -211,6 +212,7 @@ def _planned(search: PlanSearch, best: Sequence[Certified], ended: Ended) -> Pla
             for faces, share in each.gathered.undecided.items()
         },
         unreached={given(faces): why for faces, why in search.unreached.items()},
+        unranked=dict(search.unranked),
         seconds={method: each.seconds for method, each in methods.items()},
     )
 

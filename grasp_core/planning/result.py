@@ -254,6 +254,8 @@ class Plan(Declared, ById[Grasp], InNotebooks):
         default_factory=dict[FaceQuadruple, str]
     )
     """Face quadruples whose grasps the fingers cannot reach, with the reason."""
+    unranked: Annotated[Mapping[str, Number], UNRECORDED] = field(default_factory=dict[str, int])
+    """Numbers of grasps without a figure to rank by, which come last, by the reason."""
     moves: Annotated[tuple[Moved, ...], Key("optimization")] = ()
     """How optimisation changed each grasp; empty if it was not asked for."""
     seconds: Annotated[Mapping[Method, float], UNRECORDED] = field(

@@ -7,10 +7,11 @@ more to translations, and both make a cover harder.
 Fingers must meet their own faces first. Where other parts of the object are in front of a face, no
 higher than fingers come from, a finger that is turned by up to T against the face passes beside a
 point at height h within h tan T. For a direction u in the plane, no finger that lands where
-u.y <= min over corners of (u.c - h tan T) meets a triangle with corners c at heights h; nor does
-one where u.y <= min u.c - H tan T, if fingers come from height H. Corners behind the plane only
-make the first sum, linear in the point, larger. The landings are faces, cut by
-such a half-plane for each triangle in front of them.
+u.y <= min over corners of (u.c - h tan T) meets a polygon with corners c at heights h; nor does
+one where u.y <= min u.c - H tan T, if fingers come from height H. The landings are faces, cut by
+such a half-plane for each triangle in front of them. What is behind the plane is met later than the
+face, so only the part of a triangle in front of it counts: where rounding lifted a corner that a
+neighbour shares with the face, that is a strip beside their edge and not the whole neighbour.
 """
 
 import math
@@ -40,6 +41,7 @@ from grasp_core.regions.placement import (
 )
 from grasp_core.regions.proof import TwistCover
 from grasp_core.small_objects import fitted
+from grasp_core.solvers.ties import first_best
 from grasp_core.values import FINGERS, Grasp, four
 
 OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
@@ -58,6 +60,10 @@ ENOUGH = 0.005
 """Chance of too large turns below which a smaller one is not sought."""
 IN_FRONT = 1e-9
 """Height above a face from which the surface is in the way of fingers, in object radii."""
+NARROWED = 1e-4
+"""Distance by which an edge is moved inwards rather than that another edge is added, in levers of
+the contacts, since each edge costs chance."""
+IN_FRONT_ROW = np.array([[0.0, 0.0, -1.0]])
 ROUNDED = 1e-9
 """Chance by which the bound is lowered, since other processors round it otherwise."""
 
@@ -91,12 +97,25 @@ def placement_probability(
 
     Returns:
         The bound with its proof; None where other parts of the object hide a contact from its
-        finger, where the surface is curved, or where no proof is found.
+        finger, where the surface is curved, or where no proof is found. `placement_bound` returns
+        the reason.
 
     Raises:
         InputError: The contacts are not on the faces, or a number is out of its range.
     """
-    check_on_faces(body, grasp)
+    off = misplacement(friction, pose_sigma_m, pose_sigma_rad, pose_covariance, contact_sigma_m)
+    found = placement_bound(body, grasp, off, value_of(MaxCones, max_cones, "max_cones"))
+    return None if isinstance(found, str) else found
+
+
+def misplacement(
+    friction: float | tuple[float, float],
+    pose_sigma_m: float | Sequence[float] = 0.0,
+    pose_sigma_rad: float | Sequence[float] = 0.0,
+    pose_covariance: ArrayLike | None = None,
+    contact_sigma_m: float = 0.0,
+) -> Misplacement:
+    """Gather errors that are given as `placement_probability` takes them."""
     axes = [
         value_of(Deviations, frozen_each(each, 3, name), name)
         for name, each in (("pose_sigma_m", pose_sigma_m), ("pose_sigma_rad", pose_sigma_rad))
@@ -107,18 +126,24 @@ def placement_probability(
     mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
     value_of(Friction, mean, "friction")
     shift = number(contact_sigma_m, "contact_sigma_m", least=0.0, most=LARGEST)
-    off = Misplacement(covariance, shift, mean, sigma)
-    return _searched(body, grasp, off, value_of(MaxCones, max_cones, "max_cones"))
+    return Misplacement(covariance, shift, mean, sigma)
 
 
-def _searched(
-    body: Polyhedron, grasp: Grasp, off: Misplacement, cones: int
-) -> PlacementProbability | None:
-    """Return the best bound of all prisms and frictions that are tried, if a proof is found."""
+def placement_bound(
+    body: Polyhedron, grasp: Grasp, off: Misplacement, cones: int = CONES
+) -> PlacementProbability | str:
+    """Return the best bound of all prisms and frictions that are tried, or why there is none.
+
+    Raises:
+        InputError: The contacts are not on the faces.
+    """
+    check_on_faces(body, grasp)
+    if body.patches is not None:
+        return "the surface is curved, where nothing is proved of misplaced contacts"
     unit = Unit(body, grasp.positions)
     pieces = pieces_under(body, grasp, unit, 0.0)
-    if pieces is None or body.patches is not None:
-        return None
+    if pieces is None:
+        return "a contact is on a part of its face that is too narrow"
     # contacts may be off their faces by rounding
     feet = [piece.in_plane(x) for piece, x in zip(pieces, unit.at(grasp.positions), strict=True)]
     feet = [p.origin + p.frame @ y for p, y in zip(pieces, feet, strict=True)]
@@ -135,8 +160,8 @@ def _searched(
         _seen(piece, x, surface, slack, height, math.tan(off.turn))
         for piece, x in zip(pieces, feet, strict=True)
     ]
-    if min(map(len, seen)) == 0:
-        return None
+    if hidden := [str(finger) for finger, corners in enumerate(seen) if not len(corners)]:
+        return f"other parts of the object may hide a contact from finger {' and '.join(hidden)}"
     landings = [
         unit.back(piece.origin + corners @ piece.frame.T)
         for piece, corners in zip(pieces, seen, strict=True)
@@ -165,19 +190,17 @@ def _searched(
                 best = found
             if chance_of_turning(found) <= ENOUGH:
                 return best
-    return best
+    return best or f"no proof of closure around the contacts was found with {cones} cones"
 
 
-def usual_chance(body: Polyhedron, grasp: Grasp, friction: float) -> float:
-    """Return the proved chance of closure if the object is off as rankings assume, 0 without one.
+def usual_bound(body: Polyhedron, grasp: Grasp, friction: float) -> PlacementProbability | str:
+    """Bound the chance of closure if the object is off as rankings assume, or say why not.
 
     Raises:
         InputError: The contacts are not on the faces.
     """
-    proved = placement_probability(
-        body, grasp, friction, pose_sigma_m=fitted(OFF_M, body.radius), pose_sigma_rad=OFF_RAD
-    )
-    return 0.0 if proved is None else proved.lower
+    off = misplacement(friction, fitted(OFF_M, body.radius), OFF_RAD)
+    return placement_bound(body, grasp, off)
 
 
 def _covers(sites: Sites, angle: float, cones: int) -> Iterator[tuple[float, TwistCover]]:
@@ -208,15 +231,19 @@ def _seen(
     ahead = (heights.max(axis=1) > IN_FRONT) & (heights.min(axis=1) < height)
     ahead &= np.abs(heights).max(axis=1) > slack
     flat = (surface[ahead] - piece.origin) @ piece.frame
-    for at, above in zip(flat, heights[ahead], strict=True):
+    for triangle in np.concatenate([flat, heights[ahead][..., None]], axis=2):
+        part = clip(triangle, IN_FRONT_ROW, np.array([-IN_FRONT]))
+        at, above = part[:, :2], part[:, 2]
         sides = at - np.roll(at, 1, axis=0)
         across = np.column_stack([-sides[:, 1], sides[:, 0]])
         ways = np.vstack([at - y, across, -across])
         ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), THINNEST)
+        ways = np.vstack([piece.E, ways])
         along = ways @ at.T
         limits = np.maximum((along - slope * above).min(1), along.min(1) - slope * height)
-        best = int(np.argmax(limits - ways @ y))
-        if limits[best] <= ways[best] @ y:
+        left, moved = limits - ways @ y, piece.b - limits[: len(piece.b)]
+        best = first_best(-moved) if moved.min() <= NARROWED else first_best(left, 0.0)
+        if left[best] <= 0.0:
             return np.empty((0, 2))
         corners = tidy(clip(corners, ways[best : best + 1], limits[best : best + 1]))
     return corners

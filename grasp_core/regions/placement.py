@@ -180,7 +180,11 @@ class PlacementProbability(Declared):
 
     @property
     def estimate(self) -> float:
-        """Share of `DRAWS` draws, always the same, in which contacts on the landings are closed."""
+        """Share of `DRAWS` draws in which fingers meet their landings and are closed there.
+
+        The draws are always the same. Fingers that meet the object beside their landings count as
+        not closed, although they often are, so that more draws may be closed than this.
+        """
         spatial: Any = importlib.import_module("scipy.spatial.transform")
         rng, n, d = np.random.default_rng(0), self.normals, self.positions - self.center
         moves = rng.normal(size=(DRAWS, 6)) @ self.off.root.T

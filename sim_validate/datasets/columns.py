@@ -209,7 +209,9 @@ class GraspRow(Declared):
     """Least singular value of the grasp map."""
     closed_share: Annotated[Share | None, Asked("placement")] = None
     """Proved lower bound of the chance of force closure where the object is off by 2 mm and 2
-    degrees (standard deviations); null where the grasp is not in force closure."""
+    degrees (standard deviations); null where no bound was proved."""
+    closed_share_reason: Annotated[str | None, Asked("placement")] = None
+    """Why no bound was proved of a grasp in force closure."""
     witness_forces_n: Annotated[Points | None, Asked("closure")] = None
     """Balanced forces on the object, normal parts sum to one."""
 

@@ -36,7 +36,7 @@ from grasp_core.objects.on_faces import within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import Seated, grasp_of, seat
 from grasp_core.quality.metrics import smallest_singular_value
-from grasp_core.regions.certify_placement import usual_chance
+from grasp_core.regions.certify_placement import usual_bound
 from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
 from sim_validate.closure.controls import LEAST_FRICTION, negative_controls, try_control
 from sim_validate.closure.validate import validate
@@ -158,7 +158,9 @@ def placement_cells(
     """Return the proved chance of closure of a misplaced grasp, if it is asked for."""
     if "placement" not in config.asked.figures:
         return {}
-    return {"closed_share": usual_chance(body, grasp, friction)}
+    bounded = usual_bound(body, grasp, friction)
+    missing = isinstance(bounded, str)
+    return {"closed_share_reason": bounded} if missing else {"closed_share": bounded.lower}
 
 
 def hand_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:

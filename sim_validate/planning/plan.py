@@ -227,6 +227,13 @@ def _show(body: Polyhedron, found: Plan, rank_by: RankBy, reporter: Reporter) ->
         )  # fmt: skip
         payloads = [(each.id, f"{kg:.4g}") for each, kg in zip(found.grasps, masses, strict=False)]
         reporter.table("what one squeeze carries", ("grasp", "payload kg"), payloads)
+    if rank_by == "placement":
+        from grasp_core.regions.certify_placement import usual_bound
+
+        bounds = [usual_bound(body, each, found.friction) for each in found.grasps[:TABLE_ROWS]]
+        shown = ["not proved" if isinstance(one, str) else f"{one.lower:.3f}" for one in bounds]
+        chances = zip((each.id for each in found.grasps), shown, strict=False)
+        reporter.table("if the object is off", ("grasp", "closed at least"), list(chances))
     if found.moves:
         show_gains(found.moves, reporter)
     return code
@@ -294,6 +301,8 @@ def say_counts(body: Polyhedron, found: Plan, reporter: Reporter) -> None:
                  for faces, share in found.undecided.items()]  # fmt: skip
         reporter.say(f"undecided face quadruples: {', '.join(named[:TABLE_ROWS])}")
         say_cut(len(named), reporter)
+    for why, count in found.unranked.items():
+        reporter.say(f"{counted(count, 'grasp')} without a figure to rank by come last: {why}")
     reasons = Counter(_whoever(why) for why in found.unreached.values())
     for why, count in reasons.most_common():
         reporter.say(f"out of reach: {why}, on {count} face quadruples")

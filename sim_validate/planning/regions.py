@@ -27,7 +27,7 @@ from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
 from grasp_core.kinds import Count, Family, NotNegative, Share, number, path_of
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.regions.certify_placement import placement_probability
+from grasp_core.regions.certify_placement import misplacement, placement_bound
 from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.stopping import Stop
@@ -110,7 +110,9 @@ class GraspRegions(Declared):
     """The file with the proof; None if nothing was proved, or no folder was given."""
     closed_share: Annotated[Share | None, Shown("closed at least", ".3f")] = None
     """Proved lower bound of the chance that the grasp is closed when object, fingers and friction
-    are off by the deviations that were asked for; None if none were."""
+    are off by the deviations that were asked for; None if none were, or if nothing was proved."""
+    closed_share_reason: str = ""
+    """Why no chance of closure was proved; empty if one was, or none was asked for."""
 
     @classmethod
     def of(
@@ -140,6 +142,8 @@ class GraspRegions(Declared):
                 f"{self.id}: expected either regions with all of their figures, or a reason why "
                 "there are none"
             )
+        if self.closed_share is not None and self.closed_share_reason:
+            raise InputError(f"{self.id}: expected a closed_share or a reason for none, got both")
         if any(len(each.polygon) < FEWEST_CORNERS for each in self.regions or ()):
             raise InputError(
                 f"{self.id}: expected regions with at least {FEWEST_CORNERS} corners each"
@@ -299,9 +303,9 @@ def certified(
     proofs = each(partial(_certify, body, friction, asked), grasps, jobs=jobs, stop=stop)
 
     def recorded() -> Iterator[GraspRegions]:
-        for grasp, (proved, share) in zip(grasps, proofs, strict=False):  # fewer if stopped
+        for grasp, (proved, chance) in zip(grasps, proofs, strict=False):  # fewer if stopped
             found = GraspRegions.of(grasp, proved, write_proof(folder, body, grasp, proved))
-            yield replace(found, closed_share=share)
+            yield replace(found, **chance)
 
     return reporter.collected(
         "certifying", recorded(), len(grasps), ("proved", lambda one: one.regions is not None),
@@ -311,16 +315,18 @@ def certified(
 
 def _certify(
     body: Polyhedron, friction: float, asked: Certifying, grasp: Grasp
-) -> tuple[CertifiedRegions | str, float | None]:
+) -> tuple[CertifiedRegions | str, dict[str, Any]]:
     """Certify the regions of a grasp, and bound the chance of closure if anything may be off."""
-    share = None
+    chance = dict[str, Any]()
     if asked.misplacing:
-        bounded = placement_probability(
-            body, grasp, (friction, asked.friction_sigma), pose_sigma_m=asked.off_mm / MILLI,
-            pose_sigma_rad=math.radians(asked.off_deg), contact_sigma_m=asked.finger_mm / MILLI,
+        off = misplacement(
+            (friction, asked.friction_sigma), asked.off_mm / MILLI, math.radians(asked.off_deg),
+            contact_sigma_m=asked.finger_mm / MILLI,
         )  # fmt: skip
-        share = 0.0 if bounded is None else bounded.lower
-    return _certified(body, friction, asked, grasp), share
+        bounded = placement_bound(body, grasp, off)
+        missing = isinstance(bounded, str)
+        chance = {"closed_share_reason": bounded} if missing else {"closed_share": bounded.lower}
+    return _certified(body, friction, asked, grasp), chance
 
 
 def _certified(
@@ -347,6 +353,11 @@ def _show(found: Regions, reporter: Reporter) -> None:
     reasons = Counter(each.reason for each in found.grasps if each.reason)
     for reason, count in reasons.most_common():
         reporter.say(f"no regions for {count} of {len(found.grasps)} grasps: {reason}")
+    unknown = Counter(each.closed_share_reason for each in found.grasps if each.closed_share_reason)
+    for reason, count in unknown.most_common():
+        reporter.say(
+            f"no chance of closure proved for {count} of {len(found.grasps)} grasps: {reason}"
+        )
     counted = [each.friction.min() for each in found.grasps if each.friction is not None]
     left = found.friction * (1.0 - found.certifying.reserve)
     if counted and min(counted) < left:

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
 from grasp_core.geometry.polygons import plane_frame
+from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.regions.placement import REACH, _chances_beyond, _limits
 from scenes import example_object
 from tests.placements import met, share_closed
@@ -120,6 +121,59 @@ def test_faces_off_their_planes_by_rounding_are_not_in_the_way_of_fingers():
     )
     assert rounded == pytest.approx(exact, abs=1e-3)
     assert exact > 0.99
+
+
+DECIMALS = (6, 8, 9)
+
+
+def truncated_pyramid():
+    """A triangular frustum whose sides lean over its base, turned out of its axes."""
+    angles = np.array([0.25, 1.69, 3.99])
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    base, top = 0.030 * ring, 0.019 * ring + 0.001
+    points = np.vstack([np.c_[base, np.zeros(3)], np.c_[top, np.full(3, 0.04)]])
+    triangles = [[0, 2, 1], [3, 4, 5]]
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        triangles += [[i, j, 3 + j], [i, 3 + j, 3 + i]]
+    return points @ Rotation.from_rotvec([0.3, -0.7, 0.4]).as_matrix().T, triangles
+
+
+def read_with(path, points, triangles, form):
+    """The object that a text file holds whose coordinates are written in a form."""
+    lines = [f"v {x:{form}} {y:{form}} {z:{form}}" for x, y, z in points.tolist()]
+    lines += ["f " + " ".join(str(corner + 1) for corner in each) for each in triangles]
+    path.write_text("\n".join(lines))
+    return gc.load_polyhedron(path)
+
+
+def test_corners_that_rounding_lifts_hide_no_face_behind_them(tmp_path):
+    """A neighbour that shares a lifted corner and leans over the face covers a strip only."""
+    points, triangles = truncated_pyramid()
+    single = points.astype(np.float32).astype(float)
+    exact = read_with(tmp_path / "exact.obj", points, triangles, ".17g")
+    rounded = [read_with(tmp_path / f"{n}.obj", points, triangles, f".{n}f") for n in DECIMALS]
+    rounded.append(read_with(tmp_path / "single.obj", single, triangles, ".9g"))
+    off, compared = {"pose_sigma_m": 1e-3, "pose_sigma_rad": 0.0175}, 0
+    for grasp in gc.plan(exact, 0.5, families=("concurrent", "pencil"), limit=4).grasps:
+        bound = gc.placement_probability(exact, grasp, 0.6, **off).lower
+        for body in rounded:
+            seated = grasp_of(seat(body, grasp.positions, grasp.normals), 0.5, grasp.id)
+            found = gc.placement_probability(body, seated, 0.6, **off)
+            assert found.lower == pytest.approx(bound, abs=0.01)
+            rate = share_closed(body, found, 500, seed=3)
+            assert found.lower <= rate + 4.0 * math.sqrt(rate * (1.0 - rate) / 500) + 1e-3
+            compared += 1
+        assert bound > 0.9
+    assert compared == 16
+
+
+def test_the_estimate_is_the_share_of_draws_that_end_on_landings_and_are_closed():
+    """The definition with other draws: on a convex object, rays that end within a landing."""
+    (body, _), (_, found), *_ = bounds("wedge", "concurrent", shift=5e-4)
+    rate = share_closed(body, found, 4000, seed=5, landed=True)
+    luck = 4.0 * math.sqrt(rate * (1.0 - rate) * (1 / 4000 + 1 / 2000))
+    assert abs(found.estimate - rate) <= luck + 1e-3
+    assert found.lower - 1e-3 <= rate < 1.0
 
 
 @pytest.mark.parametrize(
