@@ -41,6 +41,8 @@ REAL = "iuf"
 """Numpy's letters for kinds of integers and floats; no other entries are accepted."""
 UNIT_SLACK = 1e-9
 """How far the length of a unit vector may be from 1: the rounding of a file with ten digits."""
+ROUNDED_UNIT = 1e-6
+"""How far it may be where it is set to 1: the rounding of single precision, and of seven digits."""
 
 
 def frozen(
@@ -201,12 +203,19 @@ def real_array(value: ArrayLike, name: str) -> Array:
 
 
 def frozen_units(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
-    """Copy `value` into a read-only array of unit vectors along the last axis (see `frozen`)."""
+    """Copy `value` into a read-only array of unit vectors along the last axis (see `frozen`).
+
+    Vectors that are of unit length but for the rounding of single precision are divided by it.
+    """
     array = frozen(value, shape, name)
     lengths = np.linalg.norm(array, axis=-1)
-    if (np.abs(lengths - 1.0) > UNIT_SLACK).any():
-        worst = float(lengths.flat[int(np.argmax(np.abs(lengths - 1.0)))])
+    off = np.abs(lengths - 1.0)
+    if (off > ROUNDED_UNIT).any():
+        worst = float(lengths.flat[int(np.argmax(off))])
         raise InputError(f"{name} must have length 1, got {worst:.12g}; divide it by its length")
+    if (off > UNIT_SLACK).any():
+        array = array / np.where(off > UNIT_SLACK, lengths, 1.0)[..., None]
+        array.flags.writeable = False
     return array
 
 

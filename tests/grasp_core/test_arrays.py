@@ -74,3 +74,22 @@ def test_certificates_with_other_types_are_none(kind):
     wrenches = forged(quality.wrenches, G=quality.wrenches.G.astype(kind))
     assert forged(quality, wrenches=wrenches).verify() is False
     assert forged(quality, direction=quality.direction.astype(kind)).verify() is False
+
+
+def test_normals_of_single_precision_are_taken_as_units():
+    """They are the same as in double precision but for their own rounding."""
+    unit = np.array([1.0, 2.0, 2.0]) / 3.0
+    normals = np.array([-unit, -unit * [1, -1, 1], unit, unit * [1, -1, 1]])
+    points = np.array([[3, 2, 0], [3, -2, 0], [-3, 2, 1], [-3, -2, -1]]) / 64.0
+    single = normals.astype(np.float32)
+    assert np.abs(np.linalg.norm(single.astype(float), axis=1) - 1.0).min() > 1e-8
+    rounded = gc.force_closure(points.astype(np.float32), single, friction=0.9)
+    exact = gc.force_closure(points, normals, friction=0.9)
+    assert rounded.closed is exact.closed
+    assert rounded.verify()
+    assert np.abs(np.linalg.norm(rounded.normals, axis=1) - 1.0).max() < 1e-15
+    assert not rounded.normals.flags.writeable
+    contact = gc.Contact(points[0].astype(np.float32), single[0])
+    assert contact.normal == pytest.approx(normals[0], abs=1e-7)
+    with pytest.raises(gc.InputError, match="length 1"):
+        gc.force_closure(points, 1.00001 * normals, friction=0.9)

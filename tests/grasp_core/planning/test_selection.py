@@ -5,6 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.planning import plan_search as selection
+from grasp_core.regions import certify_placement
 from scenes.example_objects import example_object
 
 
@@ -120,3 +121,19 @@ def test_with_everything_found_families_take_turns_largest_first():
         kept = [grasp.radius for grasp in few if grasp.family == family]
         assert len(kept) >= 2
         np.testing.assert_allclose(kept, sorted(radii, reverse=True)[: len(kept)], rtol=1e-5)
+
+
+def test_grasps_without_a_proved_chance_come_last_and_are_counted(small, monkeypatch):
+    """The search for a bound is made to fail on grasps that use face 0."""
+    bound = certify_placement.placement_bound
+
+    def failing(body, grasp, off):
+        return "hidden" if 0 in grasp.faces else bound(body, grasp, off)
+
+    monkeypatch.setattr(certify_placement, "placement_bound", failing)
+    found = gc.plan(small, 0.5, families="concurrent", rank_by="placement")
+    last = [0 in grasp.faces for grasp in found.grasps]
+    assert last == sorted(last)
+    assert 0 < sum(last) < len(last)
+    assert found.unranked == {"hidden": sum(last)}
+    assert not gc.plan(small, 0.5, families="concurrent").unranked

@@ -10,6 +10,7 @@ import grasp_core as gc
 import sim_validate as sv
 from grasp_core.records.grasps_json import grasps_from_json
 from grasp_core.regions.proof import TwistCover
+from scenes.example_objects import example_object
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning.regions import Regions
@@ -176,3 +177,24 @@ def test_the_chance_of_closure_is_proved_where_errors_are_named(folder, capsys):
     assert 0.9 < found.lower <= found.estimate
     kept = json.loads((folder / "regions.json").read_text())["grasps"]
     assert [each["closed_share"] for each in kept] == [None, None, None]
+    assert {each["closed_share_reason"] for each in (told, *kept)} == {""}
+
+
+def test_a_chance_that_is_not_proved_is_missing_with_its_reason(tmp_path, capsys):
+    """Nothing is proved of patches, whose contacts are off their planes."""
+    body, mesh = example_object("icosahedron"), tmp_path / "curved.obj"
+    lines = ["v " + " ".join(map(repr, point)) for point in body.vertices.tolist()]
+    lines += ["f " + " ".join(map(str, each)) for each in (body.triangles + 1).tolist()]
+    mesh.write_text("\n".join(lines))
+    flags = ["--faces", "patches", "--families", "concurrent", "--limit", "1"]
+    assert main(["plan", str(mesh), *flags, "--out", str(tmp_path), "-q"]) == Exit.GOOD
+    asked = ["regions", str(tmp_path / "grasps.json"), "--max-cones", "64", "--off-mm", "1"]
+    main([*asked, "--json"])
+    printed = capsys.readouterr()
+    (told,) = json.loads(printed.out)["grasps"]
+    assert told["closed_share"] is None
+    assert "curved" in told["closed_share_reason"]
+    main(asked)
+    said = capsys.readouterr().out
+    assert "no chance of closure proved for 1 of 1 grasps: the surface is curved" in said
+    assert "0.000" not in said
