@@ -58,7 +58,11 @@ def share_closed(body, found, count, seed, *, landed=False):
         start = x + shifts[:, i] - behind * n - found.center - moves
         start = np.einsum("nij,nj->ni", back, start) + found.center
         points[:, i], normals[:, i] = met(body, start, back @ n)
-    there = np.isfinite(normals).all(axis=(1, 2)) & (friction > 0.0)
+        there &= np.isfinite(normals[:, i]).all(axis=1)
+        if landed:
+            corners = found.landings[i]
+            inward = np.cross(n, np.roll(corners, -1, axis=0) - corners)
+            there &= (np.einsum("nkj,kj->nk", points[:, i, None] - corners, inward) >= 0.0).all(1)
     arms, _, _ = unit_size(points[there])
     mu = np.broadcast_to(friction[there, None], (there.sum(), 4))
     closed, *_ = decided_at_once(ContactCones.at(arms, normals[there], mu))
