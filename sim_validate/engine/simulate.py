@@ -40,6 +40,9 @@ FEWEST = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CHUNK = 5
 """Simulation steps per sample of a closure trial."""
+WRONG_FACTOR = "4.0.0"
+"""Version of MuJoCo whose Newton solver factors sparse Hessians wrongly, so that accelerations are
+wrong; 4.0.1 has it right."""
 CLOCK_SLACK_S = 1e-9
 """Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
 reset would change it by milliseconds."""
@@ -49,9 +52,19 @@ def compiled(xml: str) -> mujoco.MjModel:
     """Compile the text of a scene."""
     try:
         with unlogged():
-            return mujoco.MjModel.from_xml_string(xml)
+            model = mujoco.MjModel.from_xml_string(xml)
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile the scene: {error}") from error
+    newton = model.opt.solver == mujoco.mjtSolver.mjSOL_NEWTON
+    # the Jacobian `auto` is sparse in large models
+    if newton and mujoco.mj_isSparse(model) and mujoco.mj_versionString() == WRONG_FACTOR:
+        raise InputError(
+            "physics.jacobian must be dense with the solver Newton, got a sparse Jacobian of "
+            f"{model.nv} degrees of freedom, with which MuJoCo {WRONG_FACTOR} gives wrong "
+            "accelerations; set jacobian to dense, or solver to CG or PGS, or install MuJoCo 4.0.1 "
+            "or later"
+        )
+    return model
 
 
 def state_parts(model: mujoco.MjModel) -> dict[str, slice]:

@@ -97,7 +97,7 @@ class PublishedProtocol(Declared):
     weld: Weld | None = None
     """What holds the root of a hand; None where its palm is fixed."""
     physics: PhysicsSettings = field(default_factory=PhysicsSettings)
-    """Settings of MuJoCo, as published."""
+    """Settings of MuJoCo, as published; the Jacobian is dense whatever the size of a hand."""
 
     def __repr__(self) -> str:
         return summary("PublishedProtocol", self.name, self.version, runs=len(self.runs))
@@ -143,7 +143,7 @@ def _pulls(acceleration: float, seconds: float, look_s: float) -> tuple[Run, ...
 
 DEX_PHYSICS = PhysicsSettings(
     timestep=0.004, integrator="implicitfast", impratio=10.0, noslip_iterations=2, torsion_m=0.02,
-    tolerance=1e-8, jacobian="auto", solref=(0.0125, 1.0), solimp=(0.7, 0.97, 0.00055, 0.5, 2.0),
+    tolerance=1e-8, solref=(0.0125, 1.0), solimp=(0.7, 0.97, 0.00055, 0.5, 2.0),
     ccd_iterations=50, multiccd=False,
 )  # fmt: skip
 """Settings of DexGraspBench and Dexonomy. Contacts of a hand's geoms (solref 0.005 1, solimp 0.5
@@ -258,7 +258,7 @@ MJ_GRASP_SIM = PublishedProtocol(
     passing=Passing(fingers=1),
     physics=PhysicsSettings(
         timestep=0.001, integrator="implicitfast", impratio=3.0, noslip_iterations=2,
-        noslip_tolerance=1e-8, tolerance=1e-8, torsion_m=0.3, jacobian="auto",
+        noslip_tolerance=1e-8, tolerance=1e-8, torsion_m=0.3,
         solref=(0.001, 1.0), solimp=(0.998, 0.998, 0.001, 0.5, 2.0),
     ),
 )  # fmt: skip
@@ -282,6 +282,8 @@ MOLMOSPACES = PublishedProtocol(
         "Shakes and the turn are forces on the object, by its mass and the palm's acceleration.",
         "Both fingers of a gripper are two fingers here, whichever they are.",
         "Looks are at all four quarters of a shake, where theirs leave out two.",
+        "The Jacobian is dense, where theirs is sparse: the same but for rounding, and right in "
+        "MuJoCo 4.0.0, too.",
         "Friction and contacts are MuJoCo's defaults, as theirs come with each object's file; "
         "objects have the density of water.",
     ),
@@ -305,7 +307,7 @@ MOLMOSPACES = PublishedProtocol(
     passing=Passing(fingers=2),
     physics=PhysicsSettings(
         timestep=0.002, integrator="implicitfast", impratio=10.0, noslip_iterations=3,
-        tolerance=1e-8, jacobian="sparse", solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001, 0.5, 2.0),
+        tolerance=1e-8, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001, 0.5, 2.0),
     ),
 )  # fmt: skip
 PROTOCOLS = {

@@ -7,6 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.arrays import to_digits
 from scenes.mujoco.silent_mujoco import unlogged
+from sim_validate.engine import simulate
 from sim_validate.engine.limits_and_friction import part
 from sim_validate.engine.simulate import CHUNK, Bench, Load, compiled
 from sim_validate.engine.traces import Outcome, judge
@@ -88,3 +89,30 @@ def test_warnings_leave_no_file_behind(tmp_path, monkeypatch):
     assert data.warning.number.sum() > 0
     assert not list(tmp_path.iterdir())
     assert mujoco.MjLogConfig.get().logto_file == before
+
+
+@pytest.mark.parametrize(
+    ("jacobian", "solver", "joints", "is_wrong"),
+    [
+        ("sparse", "Newton", 1, True),
+        ("auto", "Newton", 60, True),
+        ("auto", "Newton", 59, False),
+        ("dense", "Newton", 60, False),
+        ("sparse", "CG", 1, False),
+    ],
+)
+def test_the_newton_solver_is_refused_where_its_factor_is_wrong(
+    monkeypatch, jacobian, solver, joints, is_wrong
+):
+    """In one version of MuJoCo sparse Jacobians, which `auto` gives large models, are wrong."""
+    body = "<body><joint/><geom size='.1'/></body>" * joints
+    option = f"<option jacobian='{jacobian}' solver='{solver}'/>"
+    scene = f"<mujoco>{option}<worldbody>{body}</worldbody></mujoco>"
+    monkeypatch.setattr(simulate, "WRONG_FACTOR", "none")
+    assert compiled(scene).nv == joints
+    monkeypatch.setattr(simulate, "WRONG_FACTOR", mujoco.mj_versionString())
+    if is_wrong:
+        with pytest.raises(gc.InputError, match="set jacobian to dense"):
+            compiled(scene)
+    else:
+        assert compiled(scene).nv == joints

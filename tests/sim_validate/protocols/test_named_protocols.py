@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_validate.protocols.published import protocol
+from sim_validate.protocols.published import protocol, protocol_names
 
 AXES = {(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)}
 
@@ -37,3 +37,9 @@ def test_contacts_of_dexgraspbench_are_the_mean_of_a_hands_and_an_objects():
     assert physics.solref == pytest.approx(np.mean([[0.005, 1.0], [0.02, 1.0]], axis=0))
     both = [[0.5, 0.99, 0.0001, 0.5, 2.0], [0.9, 0.95, 0.001, 0.5, 2.0]]
     assert physics.solimp == pytest.approx(np.mean(both, axis=0))
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_tests_have_dense_jacobians(name):
+    """So the Newton solver is right in MuJoCo 4.0.0, however many joints a hand has."""
+    assert protocol(name).physics.jacobian == "dense"
