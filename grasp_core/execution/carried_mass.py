@@ -293,7 +293,7 @@ class CarryingHand(Declared):
         # facets of any length mean the same
         facet, multipliers = of_order_one(facet, multipliers)
         a, b = self.sides(facet, multipliers)
-        h = self.body.support(facet, multipliers) + rounding * self._lost(facet, multipliers)
+        h = self.body.support(facet, multipliers) + rounding * self.body.lost(facet, multipliers)
         size = max(float(np.linalg.norm(a)), float(np.linalg.norm(b)), abs(h))
         if size == 0.0:
             return np.inf
@@ -305,15 +305,6 @@ class CarryingHand(Declared):
             return np.inf
         # the form without a difference of near numbers
         return left / (along + root) if along > 0.0 else (root - along) / square
-
-    def _lost(self, facet: Array, multipliers: Array) -> float:
-        """Return how much of h may be lost to rounding."""
-        body, sizes = self.body, np.abs(multipliers)
-        twist = np.abs(facet * body.scale)
-        twist[:3] += np.linalg.norm(facet[3:]) * np.linalg.norm(body.middle)
-        terms = float((twist @ np.abs(body.G) + sizes @ np.abs(body.levers)).sum())
-        pushed = body.max_normal_force * (1.0 + float(self.friction.max())) * terms
-        return LOST * (pushed + float(sizes @ self.motors.limits))
 
     def holds(self, mass: float, gravities: Array, forces: Array) -> bool:
         """Return whether forces (n, k, 3) hold a mass and the links under gravities (n, 3)."""
@@ -403,8 +394,9 @@ def _ray(hand: CarryingHand, mass: float, way: Array) -> Ray:
     weight = np.append(GRAVITY_M_PER_S2 * mass * way, np.zeros(3))
     found = hand.body.largest(weight, hand.weights @ way)
     most = hand.most(found.facet, found.multipliers, rounding=2.0)
+    forces, _ = hand.body.in_space(found.local)
     return Ray(
-        mass, way, max(found.multiple, 0.0), found.forces, found.facet, found.multipliers, most,
+        mass, way, max(found.multiple, 0.0), forces, found.facet, found.multipliers, most,
         hand.push_n,
     )  # fmt: skip
 

@@ -23,8 +23,9 @@ Soft contacts also transmit a torque m about their normal. It enters as a fourth
 local force, u = m mu / mu_t [N] with the torsional coefficient mu_t, so that the cone is
 |(f_t, u)| <= mu f_n and all of the above stays as it is.
 
-Forces that balance the multiple prove that it is resisted, and a facet, (2) and (3), that no larger
-one is. No wrench of unit size has a limit below f_max times the `linf` quality of the contacts (see
+Forces that balance the multiple prove that it is resisted, see `allowed_forces`, and a facet, (2)
+and (3), that no larger one is: rounding of its support and power is added to the upper bound. No
+wrench of unit size has a limit below f_max times the `linf` quality of the contacts (see
 `ferrari_canny`), which is the bound over all directions.
 
 The weakest wrench. The wrench -y / |y| meets a limiting facet squarely, so
@@ -64,6 +65,7 @@ from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
+from grasp_core.quality.allowed_forces import ROUNDING, AllowedForces, Mixture
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import minimize
@@ -71,18 +73,9 @@ from grasp_core.solvers.ties import first_best, smallest_first
 from grasp_core.values import Contact, Grasp
 
 HELD = 1e-7
-"""How far forces at a limit may leave cones and balance, relative to the largest wrench of a unit
-normal force: the accuracy of conic programs."""
-FACET_SLACK = 1e-9
-"""Slack of the upper bound, relative to it."""
-LAST_DIGITS = 1e-12
-"""Slack of an upper bound near zero, relative to the largest that the facet's length allows, and
-`HELD` of the largest force at most, however long the facet is."""
+"""How well programs know forces, relative to the largest wrench of a unit normal force."""
 MOST_OFF = 1e-6
 """Largest error of the facet's power."""
-LONGEST = 1e8
-"""Most that the lengths of facet and load, or of multipliers, levers and load, may be together:
-rounding takes about `HELD` from factors that are longer."""
 SETTLED = 1e-3
 """The search for the weakest wrench ends when a step lowers the limit by less than this share."""
 MAX_STEPS = 30
@@ -97,10 +90,8 @@ class Farthest(NamedTuple):
 
     multiple: float
     """Negative, if at all, by rounding."""
-    forces: Array
-    """Contact forces that resist it, (k, 3) [N]."""
-    torques: Array | None
-    """Torques about the inward normals with them, (k,) [N m]; None without torsion."""
+    local: Array
+    """Contact forces that resist it, in the contacts' frames, (k, w), over the largest push."""
     facet: Array
     """Twist y of the limiting facet about the centre, (6,)."""
     multipliers: Array
@@ -119,6 +110,7 @@ class WrenchBody:
         self.count = k = len(arms)
         self.motors = motors_for(motors, k)
         # at the contacts' own middle and at unit size all numbers are of order one
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         units, self.middle, size = unit_size(arms)  # a far centre would swamp the levers
         self.size = float(size)
         self.scale = np.array([1.0] * 3 + [self.size] * 3)
@@ -135,6 +127,10 @@ class WrenchBody:
         forces, multiple = np.eye(n, n + 1), np.eye(n + 1)[n]
         shares = self.max_normal_force * (self.levers @ forces) / self.motors.limits[:, None]
         pushes = forces[:: self.width]
+        self.allowed = AllowedForces(
+            self.G, friction, cones.sliding, shares[:, :n], carried,
+            1.0 + float(np.linalg.norm(self.middle)) / self.size,
+        )  # fmt: skip
         self.program = contact_program(
             -multiple, friction, self.width, [(self.G @ forces, 0.0)],
             [(pushes, 1.0), (-pushes, 0.0), (shares, 1.0 - carried), (-shares, 1.0 + carried)],
@@ -167,11 +163,26 @@ class WrenchBody:
                 f"against it ({power:.3g}), so that they bound nothing"
             )
         multipliers = self.max_normal_force * (more - less) / (power * -self.motors.limits)
-        local = self.max_normal_force * answer.x[:-1].reshape(k, self.width)
-        forces = np.einsum("kij,kj->ki", self.frames, local[:, :3])
-        torques = None if self.lengths is None else self.lengths * local[:, 3]
+        local = answer.x[:-1].reshape(k, self.width)
         facet = to_origin(answer.z[:6] / power, self.middle, self.size)
-        return Farthest(share * float(answer.x[-1]), forces, torques, facet, multipliers)
+        return Farthest(share * float(answer.x[-1]), local, facet, multipliers)
+
+    def in_space(self, local: Array) -> tuple[Array, Array | None]:
+        """Return forces (k, 3) [N], and torques about the normals (k,) [N m] with torsion."""
+        local = self.max_normal_force * local
+        forces = np.einsum("kij,kj->ki", self.frames, local[:, :3])
+        return forces, None if self.lengths is None else self.lengths * local[:, 3]
+
+    def in_frames(self, forces: Array, torques: Array | None) -> Array:
+        """Return forces and torques in the contacts' frames, (k, w), over the largest push."""
+        local = np.einsum("kij,ki->kj", self.frames, forces) / self.max_normal_force
+        if self.lengths is None or torques is None:
+            return local
+        turns = torques / self.max_normal_force
+        # a torque that a contact cannot transmit is in no cone
+        lacking = np.where(turns == 0.0, 0.0, np.inf)
+        turns = np.divide(turns, self.lengths, out=lacking, where=self.lengths > 0.0)
+        return np.column_stack([local, turns])
 
     def support(self, facet: Array, multipliers: Array) -> float:
         """Bound the support of the body by (3), for a twist about the centre, (6,)."""
@@ -179,6 +190,37 @@ class WrenchBody:
         slopes = twist @ self.G - multipliers @ self.levers
         pushed = self.max_normal_force * self.bounded.reach(slopes)[0]
         return pushed + self.motors.relaxed(multipliers)
+
+    def lost(self, facet: Array, multipliers: Array) -> float:
+        """Return how much of the support (3) may be lost to rounding."""
+        twist, sizes = np.abs(facet * self.scale), np.abs(multipliers)
+        twist[:3] += np.linalg.norm(facet[3:]) * np.linalg.norm(self.middle)
+        terms = float((twist @ np.abs(self.G) + sizes @ np.abs(self.levers)).sum())
+        pushed = self.max_normal_force * (1.0 + float(self.bounded.friction.max())) * terms
+        return ROUNDING * (pushed + float(sizes @ self.motors.limits))
+
+    def bound(
+        self, wrench: Array, facet: Array, multipliers: Array, rounding: float = 1.0
+    ) -> float:
+        """Return the multiple of a wrench that is not exceeded, by (3); infinite without power."""
+        power = -float(facet @ wrench) - rounding * ROUNDING * float(np.abs(facet) @ np.abs(wrench))
+        support = self.support(facet, multipliers) + rounding * self.lost(facet, multipliers)
+        return max(support, 0.0) / power if power > 0.0 else np.inf
+
+    def felt(self, wrench: Array) -> float:
+        """Return the size of the terms of which `about_middle` makes a wrench."""
+        force, torque = np.linalg.norm(wrench.reshape(2, 3), axis=1)
+        moved = (float(torque) + 2.0 * float(np.linalg.norm(self.middle) * force)) / self.size
+        return float(force) + moved
+
+    def settled(self, found: Farthest, wrench: Array) -> Mixture:
+        """Find the multiple of a wrench next to the largest that local forces prove."""
+        load = self.about_middle(wrench) / self.max_normal_force
+        size = float(np.linalg.norm(load))
+        felt = self.felt(wrench) / self.max_normal_force / size
+        start = Mixture(found.local, found.multiple * size)
+        forces, multiple = self.allowed.settled(start, load / size, felt)
+        return Mixture(forces, multiple / size)
 
     def holds(self, shares: Array, loads: Array, slack: float | Array) -> bool:
         """Return whether forces, (n, 3k) or (n, 4k), are allowed and balance loads, (n, 6)."""
@@ -218,11 +260,11 @@ class WrenchLimit(Declared):
     """Largest multiple of `wrench` that is resisted; `forces` prove it by balancing that multiple.
     """
     upper: Figure
-    """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic.
-    """
+    """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic,
+    and its rounding."""
     forces: Points
     """Contact forces that resist the wrench at the limit, (k, 3) [N]: in their cones, with normal
-    parts up to the largest, and balanced, all to within `HELD`."""
+    parts up to the largest, and so near balance that forces exactly in balance are there, too."""
     facet: Annotated[Array, Shape(WRENCH)]
     """Twist y of the facet that limits the wrench, (6,), with y.wrench = -1, about the stated
     centre."""
@@ -298,45 +340,31 @@ def body_of(
 def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
     """Find the largest multiple of an external wrench, (6,), that a body holds, with its proof."""
     found = body.largest(wrench, np.zeros(len(body.levers)))
-    limit = max(found.multiple, 0.0)
-    upper = max(limit, body.support(found.facet, found.multipliers))
+    upper = body.bound(wrench, found.facet, found.multipliers, rounding=2.0)
+    if not upper < np.inf:
+        raise SolverError(
+            "the facet that limits a wrench is too long for its power to be known, so that it "
+            "bounds nothing"
+        )
+    local, limit = body.settled(found, wrench)
+    forces, torques = body.in_space(local)
     return WrenchLimit(
-        wrench, limit, upper, found.forces, found.facet, found.multipliers, found.torques
+        wrench, limit, max(limit, upper), forces, found.facet, found.multipliers, torques
     )
 
 
 def attains(body: WrenchBody, found: WrenchLimit) -> bool:
-    """Return whether the forces are allowed and balance the limit's multiple of the wrench."""
-    shares = np.einsum("kij,ki->kj", body.frames, found.forces) / body.max_normal_force
-    if body.lengths is not None and found.torques is not None:
-        turns = found.torques / body.max_normal_force
-        # a torque that a contact cannot transmit is in no cone
-        lacking = np.where(turns == 0.0, 0.0, np.inf)
-        turns = np.divide(turns, body.lengths, out=lacking, where=body.lengths > 0.0)
-        shares = np.column_stack([shares, turns])
-    load = found.limit / body.max_normal_force * body.about_middle(found.wrench)
-    torques = body.motors.torques(found.forces)
-    # rows of torques are met as all rows of the program are, by shares of the motors' limits
-    balanced = body.holds(shares.reshape(1, -1), load[None], HELD * body.bounded.size)
-    return balanced and body.is_strong_enough(torques[None], HELD * np.maximum(1.0, body.strongest))
+    """Return whether the forces prove that the limit's multiple of the wrench is resisted."""
+    local, share = body.in_frames(found.forces, found.torques), found.limit / body.max_normal_force
+    load = share * body.about_middle(found.wrench)
+    return body.allowed.balance(local, load, share * body.felt(found.wrench))
 
 
 def bounds(body: WrenchBody, found: WrenchLimit) -> bool:
     """Return whether the facet proves that no multiple above the upper one is resisted."""
-    load = body.about_middle(found.wrench)
-    twist = to_center(found.facet, body.middle, body.size)
-    power, length = float(twist @ load), float(np.linalg.norm(load))
-    # facet and multipliers have to be short enough for rounding
-    long, middle = np.abs(found.facet * body.scale), float(np.linalg.norm(body.middle))
-    moved = float(np.linalg.norm(long) + np.linalg.norm(found.facet[3:]) * middle)
-    pulled = float((np.abs(found.motor_multipliers) @ np.abs(body.levers)).max(initial=0.0))
-    if not ((moved + pulled) * length <= LONGEST and abs(power + 1.0) <= MOST_OFF):
+    if not abs(float(found.facet @ found.wrench) + 1.0) <= MOST_OFF:
         return False
-    # (3): h(y) is at most the upper limit times -y.w, but for rounding
-    bound = body.support(found.facet, found.motor_multipliers)
-    largest = body.max_normal_force * body.bounded.size
-    slack = largest * min(LAST_DIGITS * float(np.linalg.norm(twist)), HELD / length)
-    return bound <= found.upper * min(1.0, -power) * (1.0 + FACET_SLACK) + slack
+    return body.bound(found.wrench, found.facet, found.motor_multipliers) <= found.upper
 
 
 def wrench_limits(

@@ -1,0 +1,210 @@
+"""Contact forces that are proved to balance a load, exactly, within all limits.
+
+*The proof.* Forces f of any origin leave r = G f + w of a load w. The correction -A^+ r, with A the
+columns of G for all that can act at contacts that push, balances them, and is no longer than
+
+    c = |r| / sigma,   sigma the least singular value of A.                               (1)
+
+So forces that balance w exactly are allowed if cones, pushes and torques of joints have room for
+changes of length c, in which rounding is included. Directions in which A has no range are left to
+rounding alone: no forces change what is left in them.
+
+*The search.* Programs know forces to a share of the largest push, and near the critical friction
+that is a multiple of the load. Their forces are mixed with forces deep within all limits that
+balance nothing, or else a multiple of the load,
+
+    (1 - s) f + s g   balances   (1 - s) w + s m w,                                       (2)
+
+with the least share s for which (1) holds. Where no forces are within all limits by a margin,
+contacts that cannot push in any balance are left out.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_core.arrays import Array
+from grasp_core.closure.proofs import RANK
+from grasp_core.closure.wrench_sets import contact_program
+from grasp_core.errors import SolverError
+from grasp_core.solvers.conic import minimize
+
+ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
+"""Rounding of sums of products, relative to the sizes of their terms."""
+MOVED = 8.0 * float(np.finfo(np.float64).eps)
+"""Rounding of arms and loads that are moved from afar, relative to the sizes of their terms."""
+BALANCED = 1e-9
+"""Largest part of forces by which they may miss balance, although (1) may allow more."""
+PUSHING = 1e-3
+"""Least push, over the largest, of contacts that can push where all do so as much as they can."""
+CAUTION = 2.0
+"""How much more than rounding the search leaves to it, as forces are turned into the object's frame
+and back."""
+
+
+class Mixture(NamedTuple):
+    """Forces that balance a multiple of a load."""
+
+    forces: Array  # in the contacts' frames, (k, w), over the largest push
+    multiple: float
+
+
+@dataclass(frozen=True, eq=False)
+class AllowedForces:
+    """The forces that contacts can apply, in units of the largest push, in their frames (k, w)."""
+
+    G: Array  # from forces to their wrench at unit size, (6, k w)
+    friction: Array  # Coulomb coefficients, (k,)
+    acting: Array  # which components can act, (k, w)
+    shares: Array  # from forces to torques of joints, over their limits, (joints, k w)
+    carried: Array  # torques of the joints without forces, over their limits, (joints,)
+    far: float  # one, and the distance of the stated centre from the contacts over their size
+
+    @property
+    def count(self) -> int:
+        """Return the number of contacts."""
+        return len(self.friction)
+
+    @cached_property
+    def rates(self) -> Array:
+        """How much of each room a change of the forces of length one takes at most, (rows,)."""
+        joints = np.linalg.norm(self.shares, axis=1)
+        return np.concatenate([1.0 + self.friction, np.ones(self.count), joints, joints])
+
+    def rooms(self, forces: Array) -> Array:
+        """Compute the room to each cone, to the largest push, and to both torques, (rows,)."""
+        torques = self.shares @ forces.ravel()
+        pushes, across = forces[:, 0], np.linalg.norm(forces[:, 1:], axis=1)
+        cones = np.where(self.friction > 0.0, self.friction * pushes - across, pushes)
+        return np.concatenate(
+            [cones, 1.0 - pushes, 1.0 - self.carried - torques, 1.0 + self.carried + torques]
+        )
+
+    def range_of(self, pushing: Array) -> tuple[Array, Array, Array]:
+        """Return the range of A, (6, m), its singular values, and A^+, (k w, 6), for contacts."""
+        key = pushing.tobytes()
+        if key not in self._ranges:
+            able = np.where((self.acting & pushing[:, None]).ravel(), self.G, 0.0)
+            left, sizes, right = np.linalg.svd(able, full_matrices=False)
+            known = sizes > max(RANK, 2.0 * ROUNDING * self.far * self.count)
+            left, sizes, right = left[:, known], sizes[known], right[known]
+            self._ranges[key] = left, sizes, (right.T / sizes) @ left.T
+        return self._ranges[key]
+
+    @cached_property
+    def _ranges(self) -> dict[bytes, tuple[Array, Array, Array]]:
+        return {}
+
+    def needed(self, forces: Array, load: Array, felt: float, rounding: float = 1.0) -> Array:
+        """Return the room that forces need to prove by (1) that a load is balanced, (rows,).
+
+        The load's terms have the size `felt`. The room is infinite where the load is out of range,
+        or the forces are far from balance.
+        """
+        pushing, lost = forces.any(axis=1), rounding * ROUNDING
+        ways, sizes, _ = self.range_of(pushing)
+        left, total = self.G @ forces.ravel() + load, float(np.abs(forces).sum())
+        rounded = lost * total + rounding * MOVED * (self.far * total + felt)
+        within = ways.T @ left
+        beyond, missed = np.linalg.norm(left - ways @ within), np.linalg.norm(within)
+        if not (beyond <= rounded and missed <= BALANCED * total + rounded):
+            return np.full(len(self.rates), np.inf)
+        # half of sigma is left to rounding of it
+        least = 0.5 * float(sizes.min(initial=np.inf))
+        changed = (float(missed) + rounded) / least + lost * total
+        needed = changed * self.rates
+        needed[: self.count] *= pushing
+        needed[2 * self.count :] += lost
+        return needed
+
+    def balance(self, forces: Array, load: Array, felt: float) -> bool:
+        """Return whether forces prove by (1) that a load, of terms of the size `felt`, is held."""
+        if not forces.any():
+            return not load.any()
+        acting, lost = np.where(self.acting, forces, 0.0), np.where(self.acting, 0.0, forces)
+        return bool(
+            float(np.abs(lost).sum()) <= ROUNDING * float(np.abs(acting).sum())
+            and (self.rooms(acting) >= self.needed(acting, load, felt)).all()
+        )
+
+    def deepest(self, load: Array | None, pushing: Array) -> Mixture | None:
+        """Find forces with the most room that balance nothing, or a multiple of a unit load.
+
+        None where the forces of contacts that may push, (k,), have no room at all.
+        """
+        k, width = self.acting.shape
+        n, more = width * k, 1 if load is None else 2
+        forces, room, multiple = np.eye(n, n + more), np.eye(n + more)[n], np.eye(n + more)[-1]
+        pushes, shares = forces[::width], self.shares @ forces
+        balance = self.G @ forces + (0.0 if load is None else np.outer(load, multiple))
+        still = forces[np.repeat(~pushing, width)]
+        joints = np.outer(np.linalg.norm(self.shares, axis=1), room)
+        free = [] if load is None else [(-multiple[None], 0.0)]
+        program = contact_program(
+            -room, self.friction, width, [(balance, 0.0), (still, 0.0)],
+            [(pushes + room, 1.0), (shares + joints, 1.0 - self.carried),
+             (joints - shares, 1.0 + self.carried), *free],
+            room=(1.0 + self.friction) * pushing,
+        )  # fmt: skip
+        try:
+            found = minimize(program).x
+        except SolverError:
+            return None
+        return Mixture(found[:n].reshape(k, width), 0.0 if load is None else float(found[-1]))
+
+    @cached_property
+    def _at_rest(self) -> Mixture | None:
+        return self.deepest(None, np.ones(self.count, dtype=bool))
+
+    def anchors(self, load: Array) -> Iterator[tuple[Mixture, Array]]:
+        """Find forces g of (2) with room, and the contacts that push, (k,), fewer each time."""
+        pushing = np.ones(self.count, dtype=bool)
+        if self._at_rest is not None:
+            yield self._at_rest, pushing
+        while pushing.any():
+            found = self.deepest(load, pushing)
+            if found is None:
+                return
+            yield found, pushing
+            pushes = found.forces[:, 0]
+            fewer = pushing & (pushes > PUSHING * pushes.max())
+            if (fewer == pushing).all():
+                return
+            pushing = fewer
+
+    def settled(self, found: Mixture, load: Array, felt: float) -> Mixture:
+        """Find a multiple of a unit load that is balanced by (1), the most near that of a program.
+
+        No forces, and the multiple zero, where none is proved.
+        """
+        for anchor, pushing in self.anchors(load) if found.multiple > 0.0 else ():
+            ends = [self._balanced(each, load, pushing) for each in (found, anchor)]
+            needed = np.maximum(*(self._needed(each, load, felt) for each in ends))
+            lacking, room = needed - self.rooms(ends[0].forces), self.rooms(ends[1].forces) - needed
+            if not (room >= 0.0).all():
+                continue
+            # the room of a mixture is no less than the mixture of rooms, but for rounding
+            lacks = lacking > 0.0
+            share = float((lacking[lacks] / (lacking + room)[lacks]).max(initial=ROUNDING))
+            for grown in (share, min(2.0 * share, 1.0)):
+                mixed = Mixture(
+                    *((1.0 - grown) * a + grown * b for a, b in zip(*ends, strict=True))
+                )
+                if (self.rooms(mixed.forces) >= self._needed(mixed, load, felt)).all():
+                    return mixed
+        return Mixture(np.zeros(self.acting.shape), 0.0)
+
+    def _needed(self, mixed: Mixture, load: Array, felt: float) -> Array:
+        multiple = mixed.multiple
+        return self.needed(mixed.forces, multiple * load, multiple * felt, CAUTION)
+
+    def _balanced(self, found: Mixture, load: Array, pushing: Array) -> Mixture:
+        """Correct the forces of contacts that push by (1), and leave the others out."""
+        multiple, chosen = max(found.multiple, 0.0), self.acting & pushing[:, None]
+        forces = np.where(chosen, found.forces, 0.0)
+        left = self.G @ forces.ravel() + multiple * load
+        corrected = forces.ravel() - self.range_of(pushing)[2] @ left
+        return Mixture(corrected.reshape(forces.shape), multiple)
