@@ -17,7 +17,7 @@ from grasp_core.hands.collisions import overlapping_pairs
 from grasp_core.hands.hand import PALM, Coupling, Hand, HandFinger, Joint, Link, LinkShape
 from grasp_core.hands.hand_arrays import rotation_about
 from scenes.hand_files.fingers import Chains, chains, followers, joint_name, tip_of
-from scenes.hand_files.model import HandModel, compiled_hand
+from scenes.hand_files.model import NO_MASS_KG, HandModel, compiled_hand
 from scenes.hand_files.model_text import model_text, note
 
 AS_BOXES = "shapes other than boxes, capsules and spheres are taken as their boxes"
@@ -51,6 +51,9 @@ def hand_from_file(path: Path, fingertips: tuple[str, ...]) -> Hand:
         couplings=couplings,
         notes=(
             *read.notes, *model.notes, *coupled,
+            *note("links without a mass weigh nothing", list(dict.fromkeys(
+                link.name for finger in fingers for link in finger.links if link.mass_kg == 0.0
+            ))),
             *note("links that fingers have in common", sorted(set(originals.values()))),
             *note("fingertips without shapes are the nearest shape of their link", [
                 tip.name for tip in found.tips if tip.name not in
@@ -163,6 +166,7 @@ def _mass(model: HandModel, found: Chains, joint: int) -> tuple[float, Array]:
     """Sum the masses of the bodies that a joint moves, and find their middle in its frame."""
     bodies = [b for b, owner in enumerate(found.owners) if owner == joint]
     masses = model.raw.body_mass[bodies]
+    masses = np.where(masses > NO_MASS_KG, masses, 0.0)
     total = float(masses.sum())
     if total == 0.0:
         return 0.0, np.zeros(3)

@@ -1,7 +1,8 @@
 """Compiles the text of a hand with MuJoCo and hands out plain arrays.
 
-Links on fixed joints are kept, because their names are those of fingertips. Inertias that no body
-can have are balanced: of a link only its mass and centre of mass are used.
+Links on fixed joints are kept, because their names are those of fingertips. Of a link only its mass
+and centre of mass are used: inertias that no body can have are replaced, and links without a mass
+are given one that counts as none, as MuJoCo compiles no others.
 """
 
 # pyright: basic, reportAttributeAccessIssue=false
@@ -18,6 +19,9 @@ from grasp_core.errors import InputError
 from scenes.hand_files.model_text import ModelText, note
 from scenes.mujoco.silent_mujoco import mujoco, unlogged
 
+NO_MASS_KG, NO_INERTIA_KG_M2 = 1e-12, 1e-14
+"""Mass and inertia up to which there are none; MuJoCo compiles no joint that moves less than
+1e-15."""
 EVERY_BIT = 2**31 - 1
 """Bits of geoms that are made to collide with all others."""
 POWERS = 5
@@ -71,8 +75,11 @@ def compiled_hand(text: ModelText) -> HandModel:
         with unlogged(), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about textures and the like
             spec = mujoco.MjSpec.from_string(text.xml, assets=dict(text.files))
-            odd = _impossible(spec)
-            spec.compiler.fusestatic, spec.compiler.balanceinertia = False, True
+            odd = _replaced(spec)
+            compiler = spec.compiler
+            compiler.fusestatic, compiler.balanceinertia = False, True
+            compiler.boundmass = max(compiler.boundmass, NO_MASS_KG)
+            compiler.boundinertia = max(compiler.boundinertia, NO_INERTIA_KG_M2)
             model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())[:300]
@@ -126,17 +133,28 @@ def _lent(model: mujoco.MjModel, bits: Indices) -> list[int]:
     return sorted(set(shown.tolist()) - moving - {0, *marks})
 
 
-def _impossible(spec: mujoco.MjSpec) -> list[str]:
-    """Return the names of the bodies whose principal inertias violate A + B >= C."""
+def _replaced(spec: mujoco.MjSpec) -> list[str]:
+    """Replace stated inertias that are not positive or violate A + B >= C; return whose they are.
+
+    Links without a mass may have any: nothing of them counts.
+    """
     found = list[str]()
     for body in spec.bodies:
+        if body.mass < 0.0:
+            raise InputError(
+                f"the mass of {body.name or '?'} must not be negative, got {body.mass:.6g}; give "
+                "its mass, or 0 for a link that is only a frame"
+            )
         xx, yy, zz, xy, xz, yz = body.fullinertia.tolist()
         if math.isfinite(xx):
             own = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         else:
             own = np.sort(body.inertia)
-        if own[0] + own[1] < own[2]:
+        if not body.explicitinertial or (own[0] > 0.0 and own[0] + own[1] >= own[2]):
+            continue
+        if body.mass > 0.0:
             found.append(body.name or "?")
+        body.fullinertia, body.inertia = [math.nan] * 6, [NO_INERTIA_KG_M2] * 3
     return found
 
 

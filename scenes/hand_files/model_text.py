@@ -1,13 +1,15 @@
 """Reads the text of a hand's file and the files that it names, within bounds, for MuJoCo.
 
 MuJoCo's compiler reads any file that a model names. Here the model's files are read first, up to a
-size and only from its own folder and the package that it is in, and handed over in memory; the text
-that is compiled names nothing on disk. Elements that read other models, run code or copy parts are
-refused.
+size, and handed over in memory; the text that is compiled names nothing on disk. They are read from
+the model's own folder and the package that it is in, and where no package is known, models and
+shapes also from folders beside the model's, as in `urdf` and `meshes`. Elements that attach other
+models, run code or copy parts are refused.
 """
 
 import importlib
 import re
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +23,7 @@ LARGEST_MANIFEST = 2**16
 MOST_FILES, MOST_ELEMENTS = 500, 20_000
 REFUSED = ("include", "model", "plugin", "extension", "replicate", "composite", "flexcomp",
            "attach")  # fmt: skip
-"""Elements that read other models, run code or make copies in any number."""
+"""Elements that attach other models, run code or make copies in any number."""
 MOST_PIXELS = 4096
 """Largest value of the attributes that say how large pictures and fields of heights are."""
 COUNTED, COUNTS = ("texture", "hfield"), ("width", "height", "nrow", "ncol")
@@ -33,6 +35,8 @@ PACKAGE = re.compile(r"(?:package|model)://([^/]*)/+")
 """What begins the names of files in URDF, with the name of a package."""
 MESHES = (".stl", ".obj", ".msh")
 """Files that MuJoCo reads as meshes."""
+BESIDE = (*MESHES, ".png", ".xml", ".mjcf")
+"""Files that may lie in folders beside the model's."""
 ABOVE = 4
 """Number of folders above the model's that may be the package's."""
 MANIFEST = "package.xml"
@@ -57,14 +61,13 @@ class ModelText:
 
 def model_text(path: Path) -> ModelText:
     """Read a model's text and the files that it names."""
-    raw = _bytes(path, LARGEST_TEXT)
-    if b"<!DOCTYPE" in raw or b"<!ENTITY" in raw:
-        raise InputError("a hand's file must not declare entities; remove <!DOCTYPE ...>")
     etree: Any = importlib.import_module("xml.etree.ElementTree")
-    try:
-        root = etree.fromstring(raw)
-    except etree.ParseError as error:
-        raise InputError(f"expected an MJCF or URDF file, but it is no XML: {error}") from error
+    raw = _bytes(path, LARGEST_TEXT)
+    root = _parsed(raw, etree)
+    folders = [path.parent]
+    if root.tag == "mujoco":
+        with about("<include>"):
+            folders = _with_includes(root, path, LARGEST_TEXT - len(raw), etree)
     for other in [each for each in root if each.tag in OTHERS and root.tag == "robot"]:
         root.remove(other)
     kinds = {joint.get("name"): joint.get("type") for joint in root.findall("joint")}
@@ -75,6 +78,10 @@ def model_text(path: Path) -> ModelText:
                 f"joint {joint.get('name')} must follow a joint that moves, got <mimic> "
                 f"of {mimic.get('joint')}; name another joint there, or remove it"
             )
+    for inertial in root.iterfind("link/inertial"):
+        if inertial.find("inertia") is None:  # as of a point; masses are all that counts
+            axes = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+            inertial.append(etree.Element("inertia", dict.fromkeys(axes, "0")))
     notes = _with_shapes(root)
     elements = list(root.iter())
     if root.tag not in {"mujoco", "robot"} or len(elements) > MOST_ELEMENTS:
@@ -84,7 +91,49 @@ def model_text(path: Path) -> ModelText:
         )
     for element in elements:
         _check_element(element)
-    return ModelText(*_with_files(path.parent, root, elements, etree), notes)
+    return ModelText(*_with_files(folders, root, elements, etree), notes)
+
+
+def _parsed(raw: bytes, etree: Any) -> Any:
+    """Parse a text to its root element."""
+    if b"<!DOCTYPE" in raw or b"<!ENTITY" in raw:
+        raise InputError("a hand's file must not declare entities; remove <!DOCTYPE ...>")
+    try:
+        return etree.fromstring(raw)
+    except etree.ParseError as error:
+        raise InputError(f"expected an MJCF or URDF file, but it is no XML: {error}") from error
+
+
+def _with_includes(root: Any, path: Path, left: int, etree: Any) -> list[Path]:
+    """Put the elements of included files in the place of <include>, and return all folders.
+
+    Names are relative to the folder of the model, the first of these, or of the including file.
+    """
+    folders, known, parents = [path.parent], {path.resolve()}, deque([(root, path.parent)])
+    while parents:
+        parent, folder = parents.popleft()
+        waiting, kept = deque((each, folder) for each in parent), list[Any]()
+        while waiting:
+            element, folder = waiting.popleft()
+            if element.tag != "include":
+                kept.append(element)
+                parents.append((element, folder))
+                continue
+            given = element.get("file", "")
+            found = _found(given, [path.parent, folder])
+            if found in known or len(known) > MOST_FILES:
+                raise InputError(
+                    f"names the file {given[:80]!r} once more, but a model includes a file once, "
+                    f"and {MOST_FILES} files at most; write out what further ones stand for"
+                )
+            content = _bytes(found, left)
+            left -= len(content)
+            known.add(found)
+            folders.append(found.parent)
+            inner = [(each, found.parent) for each in _parsed(content, etree)]
+            waiting.extendleft(reversed(inner))
+        parent[:] = kept
+    return folders
 
 
 def _with_shapes(root: Any) -> tuple[str, ...]:
@@ -135,10 +184,10 @@ def _check_element(element: Any) -> None:
 
 
 def _with_files(
-    folder: Path, root: Any, elements: list[Any], etree: Any
+    folders: list[Path], root: Any, elements: list[Any], etree: Any
 ) -> tuple[str, dict[str, bytes]]:
     """Read the files that elements name, and give them names of their own."""
-    places = [folder, *_places(folder, elements)]
+    places = _places(folders, elements)
     files, names, left = dict[str, bytes](), dict[str, str](), LARGEST_FILES
     for element in elements:
         for key in [key for key in element.attrib if key.startswith("file")]:
@@ -161,41 +210,65 @@ def _with_files(
     return etree.tostring(root, encoding="unicode"), files
 
 
-def _places(folder: Path, elements: list[Any]) -> list[Path]:
-    """Return the folders in which the model says that its files are, and forget them there."""
-    found = list[Path]()
+def _places(folders: list[Path], elements: list[Any]) -> list[Path]:
+    """Return where files are: the model's folder, those that the model states, and other folders.
+
+    Stated folders are relative to the model's, or to those of included files; they are forgotten.
+    """
+    stated = list[str]()
     for element in elements:
         if element.tag == "compiler":
             for key in FOLDERS & set(element.attrib):
                 value = element.attrib.pop(key)
                 if key != "strippath":
-                    found.append(folder / value)
-    return found
+                    stated.append(value)
+    inside = [folder / value for folder in folders for value in stated]
+    return list(dict.fromkeys([folders[0], *inside, *folders]))
 
 
 def _found(given: str, places: list[Path]) -> Path:
-    """Find a named file in the folder of the model, or in the package that the name begins with.
+    """Find a named file near the model, or in the package that the name begins with.
 
     The model's folder is the first of the places.
     """
     home, package = places[0].resolve(), PACKAGE.match(given)
     name = given[package.end() :] if package else given
-    tried = [(home, place / name) for place in places]
+    tried = [(None, place / name) for place in places]
     if package:
         tried += [(root, root / name) for root in _roots(home, package[1])]
-    tried += [(home, place / Path(name).name) for place in places]
+    tried += [(None, place / Path(name).name) for place in places]
+    around = _package_around(home)
     for root, each in tried:
         try:
             whole = each.resolve()
-            if whole.is_relative_to(root) and whole.is_file():
+            inside = whole.is_relative_to(root) if root else _is_near(whole, home, around)
+            if inside and whole.is_file():
                 return whole
         except (OSError, ValueError, RuntimeError):
             continue
-    around = f", and not in a package {package[1]} around it" if package else ""
+    said = f", and not in a package {package[1]} around it" if package else ""
     raise InputError(
-        f"names the file {given[:80]!r}, which is not in the folder of the model{around}; put it "
-        "there"
+        f"names the file {given[:80]!r}, which is not in the folder of the model nor in one beside "
+        f"it{said}; put it there, or a {MANIFEST} into the folder that holds all files of the hand"
     )
+
+
+def _is_near(whole: Path, home: Path, around: Path | None) -> bool:
+    """Return whether a file is in the model's folder or package, or may lie in a folder beside."""
+    if whole.is_relative_to(home) or (around is not None and whole.is_relative_to(around)):
+        return True
+    above = home.parent
+    if above in (Path(home.anchor), Path.home()) or not whole.is_relative_to(above):
+        return False
+    folder, *inner = whole.relative_to(above).parts
+    hidden = any(part.startswith(".") for part in (folder, *inner))
+    return bool(inner) and not hidden and whole.suffix.lower() in BESIDE
+
+
+def _package_around(home: Path) -> Path | None:
+    """Return the nearest folder with a manifest that a model is in."""
+    around = (home, *home.parents[:ABOVE])
+    return next((above for above in around if (above / MANIFEST).is_file()), None)
 
 
 def _roots(home: Path, package: str) -> list[Path]:

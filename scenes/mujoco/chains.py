@@ -4,9 +4,9 @@ Each link is a body on a hinge, turned as in the pose, so that all hinges stand 
 fingertip is the ball that the analysis knows, or a block with its corners. Shapes of links may
 touch those of other fingers and of the palm, except pairs that the hand lets overlap.
 
-Masses and inertias of links, where no source states them, are estimated from their shapes. Shapes
-are taken as solid and of one density, and as apart where they overlap. A shape with rounded edges
-has its true volume, and the inertia of the box around it.
+Masses and inertias of links, where no source states them or the mass is none, are estimated from
+their shapes. Shapes are taken as solid and of one density, and as apart where they overlap. A shape
+with rounded edges has its true volume, and the inertia of the box around it.
 
 Servos turn the joints: one of stiffness k_q is told to go to the angle u = tau / k_q beyond that of
 the pose, which makes it apply the torque tau as long as the joint stands still, and never more than
@@ -84,6 +84,8 @@ def hand_inertials(hand: Hand) -> dict[str, dict[str, object]]:
 
 
 def _inertial(shapes: Sequence[LinkShape], link: Link | None) -> dict[str, object]:
+    if link is not None and link.mass_kg == 0.0 and shapes:
+        link = None  # what has a shape is not as light as a frame
     shapes = shapes or (BALL,)
     known = None if link is None else link.mass_kg
     center = None if link is None else link.center_of_mass
@@ -193,7 +195,7 @@ class Chains(ByValue):
     def _link(self, parent: Element, link: Link, angle: float) -> Element:
         mass, center, joint = self.light_kg, np.zeros(3), link.joint
         if self.weighs and link.mass_kg is not None and link.center_of_mass is not None:
-            mass, center = link.mass_kg, link.center_of_mass
+            mass, center = max(link.mass_kg, LEAST_KG), link.center_of_mass
         turned = joint.rotation @ rotation_about(joint.axis, angle)
         place = placed(to_digits(joint.position), turned)
         lifted = {"gravcomp": 0.0 if self.weighs else 1.0}

@@ -1,5 +1,7 @@
 """The scene of a hand is the hand: its places, limits and masses, and nothing touches but tips."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -92,3 +94,13 @@ def test_another_hand_than_that_of_the_pose_is_refused():
     other = gc.load_hand("leap").with_torque_limits(0.35, "a test")
     with pytest.raises(InputError, match="hand must be the one of the pose"):
         scenes.build_hand_scene(other, body, reach, FRICTION)
+
+
+def test_a_link_without_a_mass_is_next_to_none_where_links_weigh():
+    """MuJoCo compiles no link of no mass."""
+    reach, hand = standing_hand("leap")
+    first, *others = hand.fingers
+    frame = replace(first.links[0], mass_kg=0.0, center_of_mass=np.zeros(3))
+    light = replace(hand, fingers=(replace(first, links=(frame, *first.links[1:])), *others))
+    scene = scenes.build_hand_scene(light, scaled(OBJECT, RADIUS), reach, FRICTION, down=DOWN)
+    assert 0.0 < compiled(scene)[0].body(frame.name).mass[0] < 1e-5

@@ -38,3 +38,10 @@ def test_a_known_mass_is_shared_by_volume_and_its_centre_is_kept():
     assert shared["pos"] == pytest.approx([0.01, 0.0, 0.06])
     moved = hand_inertials(hand(BOX, mass_kg=0.2, center_of_mass=[0.0, 0.0, 0.05]))["a"]
     assert moved["pos"] == pytest.approx([0.0, 0.0, 0.05])
+
+
+def test_a_shape_without_a_mass_has_that_of_water_and_a_frame_next_to_none():
+    light = {"mass_kg": 0.0, "center_of_mass": [0.0, 0.0, 0.0]}
+    box, alike = (hand_inertials(each)["a"] for each in (hand(BOX, **light), hand(BOX)))
+    assert all(np.array_equal(box[name], alike[name]) for name in ("mass", "pos", "fullinertia"))
+    assert 0.0 < hand_inertials(hand(**light))["a"]["mass"] < 1e-5
