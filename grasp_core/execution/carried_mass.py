@@ -47,8 +47,7 @@ much, so that last digits do not decide. All slacks are then relative to forces 
 *Rounding of (5).* A product of sums with n terms is off by less than n rounding units of the sum of
 its terms' sizes. h is raised by more than these, `LOST` times such a sum.
 
-*What forces prove.* They meet (1) to within `HELD` of the largest contact force, and in any case to
-within `MOST_LEFT` of the weight and of the motors' limits.
+*What forces prove.* Forces that meet (1) exactly are next to them; see `allowed_forces`.
 
 *The search.* A ray along a direction d at a mass m finds the largest t with t (m d, d) in C. Its
 end t d is a point of S(m), and its dual y and u bound the mass by (5).
@@ -64,8 +63,8 @@ through the nearest facet of the hull of points of S, and either the hull grows 
 falls. Rays are cast at falling masses, so that (7) is for smaller ones.
 
 Programs know forces to a share of the largest push. Where fingers may push much harder than is of
-use, and motors do not limit them, forces that hold the mass may not pass the check of a
-certificate. Then they are sought among smaller ones, which are allowed as well.
+use, and motors do not limit them, little of the mass may be proved. Then forces are sought among
+smaller ones, which are allowed as well.
 
 *Contacts alone.* What forces that are chosen anew for each orientation hold is what a hand holds
 whose links have no weight. What one squeeze holds, which is chosen beforehand and never replanned,
@@ -110,7 +109,7 @@ from grasp_core.kinds import SMALLEST, Quantity, Range, number, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import InnerPolytope
 from grasp_core.quality.motors import Motors, motors_for
-from grasp_core.quality.wrench_limits import HELD, WrenchBody
+from grasp_core.quality.wrench_limits import WrenchBody
 from grasp_core.solvers.ties import first_best, on_grid
 from grasp_core.values import Contact, Grasp
 
@@ -119,16 +118,13 @@ FIRST = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt
 ROUNDING = 1e-9
 """Slack of the unit ball and of the upper bound, relative to them: a thousand times what sums and
 square roots lose of either."""
-MOST_LEFT = 1e-4
-"""What forces may lack of (1) at most, over the weight and the motors' limits: a tenth of the usual
-gap between the bounds."""
 LOST = 64.0 * float(np.finfo(np.float64).eps)
 """Rounding of heights of corners, and of products in (5) and (6): sums in them have six components
 of a wrench, three of each contact or one of each joint, a few tens in all."""
 GAP = 1e-3
 """Gap between the bounds, relative to the lower one, at which no more rays follow."""
 FINEST_GAP = 1e-4
-"""Smallest gap that may be asked for: what forces may lack of the weight where they are large."""
+"""Smallest gap that may be asked for: more rays than are cast would be needed below it."""
 RAYS = 500
 """Most rays, ten times as many as are usual: twenty to forty bring the bounds to 1e-3 of each
 other, and to 1e-4, with motors and without."""
@@ -136,9 +132,9 @@ NOTHING, HARDLY = 1e-6, 1e-9
 """Weight that is none, over the largest of the forces that hold it, and over the largest push:
 programs' forces are balanced to a tenth of the former, and known to a tenth of the latter."""
 WEAKER, TIMES = 1e-3, 3
-"""Share of the largest push with which forces are sought again that are not balanced well enough,
-and how often: a thousand times smaller ones are known a thousand times better, and after three
-times the largest push that is taken, 1e9 N, is one newton."""
+"""Share of the largest push with which forces are sought again that leave a gap, and how often: a
+thousand times smaller ones are known a thousand times better, and after three times the largest
+push that is taken, 1e9 N, is one newton."""
 
 
 def nearest_facet(points: Array) -> tuple[Array, float, Indices]:
@@ -204,10 +200,8 @@ class HandPayload(Declared):
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.
 
-        The upper bound is exact but for rounding, 1e-9 of it. Forces hold the lower mass to within
-        1e-7 of the largest of them, the accuracy of conic programs: balance, friction cones and
-        torques are met to that, whatever the largest push, and to 1e-4 of the weight and of the
-        motors' limits where forces are more than a thousand times the weight.
+        The upper bound is exact but for rounding, 1e-9 of it. Forces hold the lower mass in exact
+        cones and limits, but for rounding.
 
         Whether the contacts are those of an object can only be checked with it, and whether joints
         and links are those of a hand only with the hand.
@@ -308,20 +302,16 @@ class CarryingHand(Declared):
 
     def holds(self, mass: float, gravities: Array, forces: Array) -> bool:
         """Return whether forces (n, k, 3) hold a mass and the links under gravities (n, 3)."""
-        body = self.body
-        local = np.einsum("kij,nki->nkj", body.frames, forces) / body.max_normal_force
-        weights = GRAVITY_M_PER_S2 * mass * gravities / body.max_normal_force
-        loads = np.hstack([weights, -cross(body.middle, weights)]) / body.scale
-        largest = np.linalg.norm(local, axis=2).max(axis=1)
-        slack = np.minimum(
-            HELD * body.bounded.size * largest, MOST_LEFT * np.linalg.norm(weights, axis=1)
+        body, each = self.body, zip(gravities, forces, strict=True)
+        return all(
+            body.allowed.balance(body.in_frames(f, None), body.load(*self.load(mass, gravity)))
+            for gravity, f in each
         )
-        torques = forces.reshape(len(forces), -1) @ body.motors.levers.T
-        torques += gravities @ self.weights.T
-        spare = np.minimum(HELD * np.maximum(1.0, np.outer(largest, body.strongest)), MOST_LEFT)
-        return body.holds(local.reshape(len(local), -1), loads, slack) and body.is_strong_enough(
-            torques, spare
-        )
+
+    def load(self, mass: float, gravity: Array) -> tuple[Array, Array]:
+        """Return the weight of a mass, (6,), and the torques of the links, (joints,) [N m]."""
+        weight = np.append(GRAVITY_M_PER_S2 * mass * gravity, np.zeros(3))
+        return weight, self.weights @ gravity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -347,17 +337,17 @@ class Ray:
 def carried_mass(hand: CarryingHand, gap: float = GAP) -> HandPayload:
     """Bound the mass that a hand holds in every orientation, by rays until the bounds meet."""
     number(gap, "gap", least=FINEST_GAP, below=1.0)
-    first, weakest = _searched(hand, gap)
-    found, push = first, hand.push_n
+    found, weakest = _searched(hand, gap)
+    push, none = hand.push_n, _nothing_held(hand, weakest)
     for _ in range(TIMES):
-        if found.lower == 0.0 or hand.holds(found.lower, found.gravities, found.forces):
-            return found
+        if found.upper <= max((1.0 + 2.0 * gap) * found.lower, HARDLY * push / GRAVITY_M_PER_S2):
+            break
         push = max(WEAKER * push, SMALLEST)
         lower, _ = _searched(replace(hand, max_push_n=push), gap)
-        found = replace(lower, upper=max(first.upper, lower.lower), facet=first.facet,
-                        motor_multipliers=first.motor_multipliers, hand=hand)  # fmt: skip
-    known = found.lower > 0.0 and hand.holds(found.lower, found.gravities, found.forces)
-    return found if known else _nothing_held(hand, weakest)
+        if lower.lower > found.lower:
+            found = replace(lower, upper=max(none.upper, lower.lower), facet=none.facet,
+                            motor_multipliers=none.motor_multipliers, hand=hand)  # fmt: skip
+    return found if hand.holds(found.lower, found.gravities, found.forces) else none
 
 
 def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
@@ -391,14 +381,12 @@ def _searched(hand: CarryingHand, gap: float) -> tuple[HandPayload, Ray]:
 
 def _ray(hand: CarryingHand, mass: float, way: Array) -> Ray:
     """Find how far a mass and the links are held along a direction, a unit vector (3,)."""
-    weight = np.append(GRAVITY_M_PER_S2 * mass * way, np.zeros(3))
-    found = hand.body.largest(weight, hand.weights @ way)
+    load = hand.load(mass, way)
+    found = hand.body.largest(*load)
     most = hand.most(found.facet, found.multipliers, rounding=2.0)
-    forces, _ = hand.body.in_space(found.local)
-    return Ray(
-        mass, way, max(found.multiple, 0.0), forces, found.facet, found.multipliers, most,
-        hand.push_n,
-    )  # fmt: skip
+    local, multiple = hand.body.settled(found, *load)
+    forces, _ = hand.body.in_space(local)
+    return Ray(mass, way, multiple, forces, found.facet, found.multipliers, most, hand.push_n)
 
 
 def _weakest(rays: list[Ray]) -> Ray:

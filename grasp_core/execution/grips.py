@@ -133,10 +133,19 @@ class Grip(Declared):
         return len(self.friction) >= FEWEST and are_springs(self.stiffness) and plain.balanced
 
     @property
+    def left(self) -> Array:
+        """The wrench that is left of (1), (6,) [N, N m]."""
+        return grasp_map(self.arms) @ self.squeeze.ravel()
+
+    @property
     def imbalance(self) -> float:
         """Largest part of the wrench that is left of (1), torques over `size` [N]."""
-        left = grasp_map(self.arms) @ self.squeeze.ravel() / np.repeat([1.0, self.size], 3)
-        return float(np.abs(left).max())
+        return float(np.abs(self.left / np.repeat([1.0, self.size], 3)).max())
+
+    @property
+    def settled(self) -> Array:
+        """Forces in the contacts' frames once the object has moved into balance, (k, 3) [N]."""
+        return self.local_squeeze + self.response @ self.left
 
     @property
     def balanced(self) -> bool:

@@ -285,11 +285,11 @@ class BestSqueeze(Declared):
     def verify(self) -> bool:
         """Re-check every field in plain arithmetic; False if they are no certificate.
 
-        The check is that the squeeze balances, to a millionth of its forces, and is stable, that
-        its S-lemma multipliers, pushes and torques prove the scale, that the worst load is one, and
-        that the multipliers of rows prove the upper bound. Whether the contacts are those of an
-        object can only be checked with it, and whether the joints are those of a hand only with the
-        hand.
+        The check is that the squeeze is stable and balances, to a millionth of its forces, that
+        S-lemma multipliers, pushes and torques prove the scale once the object has moved into exact
+        balance, that the worst load is one, and that the multipliers of rows prove the upper bound.
+        Whether the contacts are those of an object can only be checked with it, and whether the
+        joints are those of a hand only with the hand.
         """
         with np.errstate(all="ignore"):
             if not (self.is_sound() and self.scale <= self.upper):
@@ -309,7 +309,7 @@ class BestSqueeze(Declared):
         return (
             self._survives(survival, rows)
             and self._ends(survival, rows)
-            and upper <= self.upper * (1.0 + ROUNDING) + no_scale(survival, self.max_push_n)
+            and upper <= self.upper * (1.0 + ROUNDING)
         )
 
     def _fits(self, survival: Survival) -> bool:
@@ -331,7 +331,7 @@ class BestSqueeze(Declared):
         )
 
     def _survives(self, survival: Survival, rows: Rows) -> bool:
-        local = self.grip.local_squeeze
+        local = self.grip.settled
         most = rows.limits(self.max_push_n) * (1.0 + ROUNDING)
         within = (rows.reached(local, self.scale) <= most)[rows.limited]
         # the S-lemma proves all else: cones, and pushes from below
@@ -340,10 +340,10 @@ class BestSqueeze(Declared):
     def _ends(self, survival: Survival, rows: Rows) -> bool:
         further = self.scale * (1.0 + NEAR) + no_scale(survival, self.max_push_n)
         if self.joint >= 0:
-            under = rows.reached(self.grip.local_squeeze) + rows.way @ (further * self.direction)
+            under = rows.reached(self.grip.settled) + rows.way @ (further * self.direction)
             beyond = survival.torques(under) >= survival.motors.limits
             return bool(beyond[:, 0, self.joint].any())
-        reactions = survival.reactions(self.grip.local_squeeze)
+        reactions = survival.reactions(self.grip.settled)
         start, change = reactions.start[self.contact], reactions.change[self.contact]
         normal, *across = (start + further * change @ self.direction).tolist()
         slipping = float(np.hypot(*across)) >= reactions.friction[self.contact] * normal

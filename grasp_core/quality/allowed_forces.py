@@ -25,6 +25,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_core.arrays import Array
 from grasp_core.closure.proofs import RANK
@@ -45,6 +46,18 @@ CAUTION = 2.0
 and back."""
 
 
+class Load(NamedTuple):
+    """A wrench, and torques of joints that come with it, as those of links that turn with it do."""
+
+    wrench: Array  # at unit size over the largest push, (6,)
+    torques: Array  # over the joints' limits, (joints,)
+    felt: float  # size of the terms of which the wrench is made
+
+    def times(self, multiple: float) -> "Load":
+        """Return a multiple of the load."""
+        return Load(multiple * self.wrench, multiple * self.torques, multiple * self.felt)
+
+
 class Mixture(NamedTuple):
     """Forces that balance a multiple of a load."""
 
@@ -58,7 +71,7 @@ class AllowedForces:
 
     G: Array  # from forces to their wrench at unit size, (6, k w)
     friction: Array  # Coulomb coefficients, (k,)
-    acting: Array  # which components can act, (k, w)
+    acting: NDArray[np.bool_]  # which components can act, (k, w)
     shares: Array  # from forces to torques of joints, over their limits, (joints, k w)
     carried: Array  # torques of the joints without forces, over their limits, (joints,)
     far: float  # one, and the distance of the stated centre from the contacts over their size
@@ -74,16 +87,14 @@ class AllowedForces:
         joints = np.linalg.norm(self.shares, axis=1)
         return np.concatenate([1.0 + self.friction, np.ones(self.count), joints, joints])
 
-    def rooms(self, forces: Array) -> Array:
+    def rooms(self, forces: Array, load: Load) -> Array:
         """Compute the room to each cone, to the largest push, and to both torques, (rows,)."""
-        torques = self.shares @ forces.ravel()
+        torques = self.carried + load.torques + self.shares @ forces.ravel()
         pushes, across = forces[:, 0], np.linalg.norm(forces[:, 1:], axis=1)
         cones = np.where(self.friction > 0.0, self.friction * pushes - across, pushes)
-        return np.concatenate(
-            [cones, 1.0 - pushes, 1.0 - self.carried - torques, 1.0 + self.carried + torques]
-        )
+        return np.concatenate([cones, 1.0 - pushes, 1.0 - torques, 1.0 + torques])
 
-    def range_of(self, pushing: Array) -> tuple[Array, Array, Array]:
+    def range_of(self, pushing: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
         """Return the range of A, (6, m), its singular values, and A^+, (k w, 6), for contacts."""
         key = pushing.tobytes()
         if key not in self._ranges:
@@ -98,16 +109,16 @@ class AllowedForces:
     def _ranges(self) -> dict[bytes, tuple[Array, Array, Array]]:
         return {}
 
-    def needed(self, forces: Array, load: Array, felt: float, rounding: float = 1.0) -> Array:
+    def needed(self, forces: Array, load: Load, rounding: float = 1.0) -> Array:
         """Return the room that forces need to prove by (1) that a load is balanced, (rows,).
 
-        The load's terms have the size `felt`. The room is infinite where the load is out of range,
-        or the forces are far from balance.
+        It is infinite where the load is out of range, or the forces are far from balance.
         """
-        pushing, lost = forces.any(axis=1), rounding * ROUNDING
+        pushing: NDArray[np.bool_] = np.asarray(forces.any(axis=1), dtype=np.bool_)
+        lost = rounding * ROUNDING
         ways, sizes, _ = self.range_of(pushing)
-        left, total = self.G @ forces.ravel() + load, float(np.abs(forces).sum())
-        rounded = lost * total + rounding * MOVED * (self.far * total + felt)
+        left, total = self.G @ forces.ravel() + load.wrench, float(np.abs(forces).sum())
+        rounded = lost * total + rounding * MOVED * (self.far * total + load.felt)
         within = ways.T @ left
         beyond, missed = np.linalg.norm(left - ways @ within), np.linalg.norm(within)
         if not (beyond <= rounded and missed <= BALANCED * total + rounded):
@@ -120,17 +131,19 @@ class AllowedForces:
         needed[2 * self.count :] += lost
         return needed
 
-    def balance(self, forces: Array, load: Array, felt: float) -> bool:
-        """Return whether forces prove by (1) that a load, of terms of the size `felt`, is held."""
-        if not forces.any():
-            return not load.any()
+    def balance(self, forces: Array, load: Load) -> bool:
+        """Return whether forces prove by (1) that a load is balanced within all limits."""
         acting, lost = np.where(self.acting, forces, 0.0), np.where(self.acting, 0.0, forces)
+        if not acting.any():
+            return not (lost.any() or load.wrench.any()) and bool(
+                (self.rooms(acting, load) >= 0.0).all()
+            )
         return bool(
             float(np.abs(lost).sum()) <= ROUNDING * float(np.abs(acting).sum())
-            and (self.rooms(acting) >= self.needed(acting, load, felt)).all()
+            and (self.rooms(acting, load) >= self.needed(acting, load)).all()
         )
 
-    def deepest(self, load: Array | None, pushing: Array) -> Mixture | None:
+    def deepest(self, load: Load | None, pushing: NDArray[np.bool_]) -> Mixture | None:
         """Find forces with the most room that balance nothing, or a multiple of a unit load.
 
         None where the forces of contacts that may push, (k,), have no room at all.
@@ -138,10 +151,12 @@ class AllowedForces:
         k, width = self.acting.shape
         n, more = width * k, 1 if load is None else 2
         forces, room, multiple = np.eye(n, n + more), np.eye(n + more)[n], np.eye(n + more)[-1]
-        pushes, shares = forces[::width], self.shares @ forces
-        balance = self.G @ forces + (0.0 if load is None else np.outer(load, multiple))
+        pushes, shares, balance = forces[::width], self.shares @ forces, self.G @ forces
+        if load is not None:
+            shares = shares + load.torques[:, None] * multiple
+            balance = balance + load.wrench[:, None] * multiple
         still = forces[np.repeat(~pushing, width)]
-        joints = np.outer(np.linalg.norm(self.shares, axis=1), room)
+        joints = np.linalg.norm(self.shares, axis=1)[:, None] * room
         free = [] if load is None else [(-multiple[None], 0.0)]
         program = contact_program(
             -room, self.friction, width, [(balance, 0.0), (still, 0.0)],
@@ -159,7 +174,7 @@ class AllowedForces:
     def _at_rest(self) -> Mixture | None:
         return self.deepest(None, np.ones(self.count, dtype=bool))
 
-    def anchors(self, load: Array) -> Iterator[tuple[Mixture, Array]]:
+    def anchors(self, load: Load) -> Iterator[tuple[Mixture, NDArray[np.bool_]]]:
         """Find forces g of (2) with room, and the contacts that push, (k,), fewer each time."""
         pushing = np.ones(self.count, dtype=bool)
         if self._at_rest is not None:
@@ -175,15 +190,15 @@ class AllowedForces:
                 return
             pushing = fewer
 
-    def settled(self, found: Mixture, load: Array, felt: float) -> Mixture:
+    def settled(self, found: Mixture, load: Load) -> Mixture:
         """Find a multiple of a unit load that is balanced by (1), the most near that of a program.
 
         No forces, and the multiple zero, where none is proved.
         """
         for anchor, pushing in self.anchors(load) if found.multiple > 0.0 else ():
             ends = [self._balanced(each, load, pushing) for each in (found, anchor)]
-            needed = np.maximum(*(self._needed(each, load, felt) for each in ends))
-            lacking, room = needed - self.rooms(ends[0].forces), self.rooms(ends[1].forces) - needed
+            needed = np.maximum(*(self._needed(each, load) for each in ends))
+            lacking, room = needed - self._rooms(ends[0], load), self._rooms(ends[1], load) - needed
             if not (room >= 0.0).all():
                 continue
             # the room of a mixture is no less than the mixture of rooms, but for rounding
@@ -193,18 +208,20 @@ class AllowedForces:
                 mixed = Mixture(
                     *((1.0 - grown) * a + grown * b for a, b in zip(*ends, strict=True))
                 )
-                if (self.rooms(mixed.forces) >= self._needed(mixed, load, felt)).all():
+                if (self._rooms(mixed, load) >= self._needed(mixed, load)).all():
                     return mixed
         return Mixture(np.zeros(self.acting.shape), 0.0)
 
-    def _needed(self, mixed: Mixture, load: Array, felt: float) -> Array:
-        multiple = mixed.multiple
-        return self.needed(mixed.forces, multiple * load, multiple * felt, CAUTION)
+    def _rooms(self, mixed: Mixture, load: Load) -> Array:
+        return self.rooms(mixed.forces, load.times(mixed.multiple))
 
-    def _balanced(self, found: Mixture, load: Array, pushing: Array) -> Mixture:
+    def _needed(self, mixed: Mixture, load: Load) -> Array:
+        return self.needed(mixed.forces, load.times(mixed.multiple), CAUTION)
+
+    def _balanced(self, found: Mixture, load: Load, pushing: NDArray[np.bool_]) -> Mixture:
         """Correct the forces of contacts that push by (1), and leave the others out."""
         multiple, chosen = max(found.multiple, 0.0), self.acting & pushing[:, None]
         forces = np.where(chosen, found.forces, 0.0)
-        left = self.G @ forces.ravel() + multiple * load
+        left = self.G @ forces.ravel() + multiple * load.wrench
         corrected = forces.ravel() - self.range_of(pushing)[2] @ left
         return Mixture(corrected.reshape(forces.shape), multiple)

@@ -65,15 +65,13 @@ from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
-from grasp_core.quality.allowed_forces import ROUNDING, AllowedForces, Mixture
+from grasp_core.quality.allowed_forces import ROUNDING, AllowedForces, Load, Mixture
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import minimize
 from grasp_core.solvers.ties import first_best, smallest_first
 from grasp_core.values import Contact, Grasp
 
-HELD = 1e-7
-"""How well programs know forces, relative to the largest wrench of a unit normal force."""
 MOST_OFF = 1e-6
 """Largest error of the facet's power."""
 SETTLED = 1e-3
@@ -207,36 +205,20 @@ class WrenchBody:
         support = self.support(facet, multipliers) + rounding * self.lost(facet, multipliers)
         return max(support, 0.0) / power if power > 0.0 else np.inf
 
-    def felt(self, wrench: Array) -> float:
-        """Return the size of the terms of which `about_middle` makes a wrench."""
-        force, torque = np.linalg.norm(wrench.reshape(2, 3), axis=1)
-        moved = (float(torque) + 2.0 * float(np.linalg.norm(self.middle) * force)) / self.size
-        return float(force) + moved
+    def load(self, wrench: Array, carried: Array) -> Load:
+        """Return a wrench and the torques [N m] that joints carry with it, (joints,), as a load."""
+        force, torque = np.linalg.norm(wrench.reshape(2, 3), axis=1).tolist()
+        moved = (torque + 2.0 * float(np.linalg.norm(self.middle)) * force) / self.size
+        unit = self.about_middle(wrench) / self.max_normal_force
+        return Load(unit, carried / self.motors.limits, (force + moved) / self.max_normal_force)
 
-    def settled(self, found: Farthest, wrench: Array) -> Mixture:
+    def settled(self, found: Farthest, wrench: Array, carried: Array) -> Mixture:
         """Find the multiple of a wrench next to the largest that local forces prove."""
-        load = self.about_middle(wrench) / self.max_normal_force
-        size = float(np.linalg.norm(load))
-        felt = self.felt(wrench) / self.max_normal_force / size
+        load = self.load(wrench, carried)
+        size = float(np.linalg.norm(load.wrench))
         start = Mixture(found.local, found.multiple * size)
-        forces, multiple = self.allowed.settled(start, load / size, felt)
+        forces, multiple = self.allowed.settled(start, load.times(1.0 / size))
         return Mixture(forces, multiple / size)
-
-    def holds(self, shares: Array, loads: Array, slack: float | Array) -> bool:
-        """Return whether forces, (n, 3k) or (n, 4k), are allowed and balance loads, (n, 6)."""
-        left = np.linalg.norm(shares @ self.G.T + loads, axis=1)
-        return bool((left <= slack).all()) and self.bounded.holds(shares, slack)
-
-    def is_strong_enough(self, torques: Array, slack: float | Array) -> bool:
-        """Return whether motors have torques, (n, joints) [N m], to a slack over their limits."""
-        return bool((np.abs(torques) / self.motors.limits <= 1.0 + slack).all())
-
-    @property
-    def strongest(self) -> Array:
-        """Return how many times its limit each joint's torque is at most under one push, (j,)."""
-        each = self.levers.reshape(len(self.levers), self.count, 3)
-        longest = np.linalg.norm(each, axis=2).max(axis=1)
-        return self.max_normal_force * longest / self.motors.limits
 
     def pushed(self, torque_scale: float) -> WrenchSet:
         """Return the wrenches of unit pushes about the centre, with torques over a scale [m]."""
@@ -339,14 +321,15 @@ def body_of(
 
 def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
     """Find the largest multiple of an external wrench, (6,), that a body holds, with its proof."""
-    found = body.largest(wrench, np.zeros(len(body.levers)))
+    nothing = np.zeros(len(body.levers))
+    found = body.largest(wrench, nothing)
     upper = body.bound(wrench, found.facet, found.multipliers, rounding=2.0)
     if not upper < np.inf:
         raise SolverError(
             "the facet that limits a wrench is too long for its power to be known, so that it "
             "bounds nothing"
         )
-    local, limit = body.settled(found, wrench)
+    local, limit = body.settled(found, wrench, nothing)
     forces, torques = body.in_space(local)
     return WrenchLimit(
         wrench, limit, max(limit, upper), forces, found.facet, found.multipliers, torques
@@ -355,9 +338,8 @@ def limit_of(body: WrenchBody, wrench: Array) -> WrenchLimit:
 
 def attains(body: WrenchBody, found: WrenchLimit) -> bool:
     """Return whether the forces prove that the limit's multiple of the wrench is resisted."""
-    local, share = body.in_frames(found.forces, found.torques), found.limit / body.max_normal_force
-    load = share * body.about_middle(found.wrench)
-    return body.allowed.balance(local, load, share * body.felt(found.wrench))
+    load = body.load(found.wrench, np.zeros(len(body.levers))).times(found.limit)
+    return body.allowed.balance(body.in_frames(found.forces, found.torques), load)
 
 
 def bounds(body: WrenchBody, found: WrenchLimit) -> bool:

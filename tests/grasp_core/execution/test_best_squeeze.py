@@ -8,6 +8,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.execution import best_squeeze as module
 from grasp_core.execution.loads import Reactions
+from scenes.example_objects import example_object
 from tests.grasp_core.execution.held import (
     ASIDE,
     HALF,
@@ -139,3 +140,21 @@ def test_a_squeeze_that_is_not_found_or_proved_is_an_error(monkeypatch):
     monkeypatch.setattr(module, "ROUNDS", 0)
     with pytest.raises(gc.SolverError, match="no squeeze was found to survive the loads"):
         gc.best_squeeze(box(), opposed(), 0.5, ANY, max_push_n=10.0)
+
+
+@pytest.mark.parametrize("above", [0.5, 1e-2, 1e-4])
+def test_false_claims_are_small_beside_scales_near_the_critical_friction(above):
+    """Scales are small beside the largest push there: no slack is a share of that."""
+    body = example_object("wedge")
+    (grasp,) = gc.plan(body, 0.5, limit=1).grasps
+    mu = gc.critical_friction(grasp) * (1.0 + above)
+    axes = np.diag(np.repeat([1.0, body.radius], 3))
+    found = gc.best_squeeze(body, grasp, mu, gc.LoadSet(np.zeros(6), axes), max_push_n=10.0)
+    assert found.verify()
+    lower = dataclasses.replace(found, scale=0.99 * found.scale, upper=found.upper * (1.0 - 1e-6))
+    assert not lower.verify()
+    # a squeeze that is off balance counts as that into which the object moves by itself
+    off = forged(found.grip, squeeze=found.grip.squeeze + 1e-7 * found.grip.normals)
+    assert np.abs(off.left).max() > 1e-9
+    settled = np.einsum("kij,kj->ki", off.frames, off.settled)
+    assert np.abs(forged(off, squeeze=settled).left).max() < 1e-3 * np.abs(off.left).max()

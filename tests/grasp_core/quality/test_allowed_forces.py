@@ -3,11 +3,14 @@
 from dataclasses import replace
 from fractions import Fraction
 from math import isqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import grasp_core as gc
+from grasp_core.execution.loads import GRAVITY_M_PER_S2
+from scenes.example_objects import example_object
 from tests.grasp_core.execution.jointed import hand_of
 from tests.judges import random_contacts
 
@@ -44,7 +47,7 @@ def wrenches(x):
     ])  # fmt: skip
 
 
-def is_resisted(found, x, n, mu, motors=None):
+def is_resisted(found, x, n, mu, motors=None, most=LARGEST):
     """Whether forces balance the limit's multiple exactly, in exact cones, limits and torques."""
     x, n, mu = exact(x), exact(n), Fraction(mu)
     G, f = wrenches(x), exact(found.forces).ravel()
@@ -55,7 +58,7 @@ def is_resisted(found, x, n, mu, motors=None):
         along, square, length = each @ normal, each @ each, normal @ normal
         if along < 0 or square * length - along**2 > mu**2 * along**2:
             return False
-        if along**2 > Fraction(LARGEST) ** 2 * length:
+        if along**2 > Fraction(most) ** 2 * length:
             return False
     if motors is None:
         return True
@@ -124,3 +127,21 @@ def test_a_wrench_just_out_of_range_is_not_resisted():
         (found,) = gc.wrench_limits(x, n, 0.3, load, **given)
         assert found.limit == pytest.approx(limit, rel=1e-8, abs=1e-4)
         assert found.verify(x, n, 0.3, **given)
+
+
+@pytest.mark.parametrize("above", [0.5, 1e-2, 1e-4])
+def test_payloads_near_the_critical_friction_are_held_in_exact_arithmetic(above):
+    body = example_object("wedge")
+    for grasp in gc.plan(body, 0.5, limit=2).grasps:
+        mu = gc.critical_friction(grasp) * (1.0 + above)
+        found = gc.payload(body, grasp, mu, max_push_n=10.0).free
+        assert found.lower > 0.0
+        for gravity, forces in zip(found.gravities, found.forces, strict=True):
+            weight = np.append(GRAVITY_M_PER_S2 * found.lower * gravity, np.zeros(3))
+            held = SimpleNamespace(limit=1.0, wrench=weight, forces=forces)
+            x, n = grasp.positions - body.center_of_mass, grasp.normals
+            assert is_resisted(held, x, n, mu, most=10.0)
+        assert found.verify()
+        assert not replace(found, forces=found.forces * (1.0 + 1e-8)).verify()
+        more = replace(found, lower=found.lower * (1.0 + 1e-6), upper=2.0 * found.upper)
+        assert not more.verify()
