@@ -53,8 +53,9 @@ class PhysicsSettings(Softness):
     The defaults were measured to reproduce Coulomb friction to about 0.1 %: elliptic cones
     (pyramids are up to 29 % too weak along their diagonals), the `discrete` integrator (under the
     others, hard contacts slip when they should hold), a high ratio of friction to normal impedance
-    (resting contacts otherwise creep), hard and constant contact impedance, and a dense Jacobian
-    (the sparse Newton solver of MuJoCo 4.0.0 has a bug).
+    (resting contacts otherwise creep), hard and constant contact impedance, and a dense Jacobian.
+    Under MuJoCo 4.0.0, whose sparse Newton solver gives wrong accelerations, scenes with the solver
+    `Newton` and a sparse Jacobian, which `auto` is from 60 degrees of freedom on, are refused.
 
     Raises:
         InputError: A number is out of its range, or MuJoCo does not know a word.

@@ -223,5 +223,5 @@ class AllowedForces:
         multiple, chosen = max(found.multiple, 0.0), self.acting & pushing[:, None]
         forces = np.where(chosen, found.forces, 0.0)
         left = self.G @ forces.ravel() + multiple * load.wrench
-        corrected = forces.ravel() - self.range_of(pushing)[2] @ left
-        return Mixture(corrected.reshape(forces.shape), multiple)
+        changed = (self.range_of(pushing)[2] @ left).reshape(forces.shape)
+        return Mixture(np.where(chosen, forces - changed, 0.0), multiple)

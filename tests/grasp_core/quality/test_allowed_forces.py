@@ -145,3 +145,23 @@ def test_payloads_near_the_critical_friction_are_held_in_exact_arithmetic(above)
         assert not replace(found, forces=found.forces * (1.0 + 1e-8)).verify()
         more = replace(found, lower=found.lower * (1.0 + 1e-6), upper=2.0 * found.upper)
         assert not more.verify()
+
+
+def test_what_some_contacts_resist_alone_is_resisted_with_others_beside():
+    """Contacts at random, of which one or two push inside their cones, and the rest cannot."""
+    rng, tested = np.random.default_rng(5), 0
+    for _ in range(50):
+        count = int(rng.integers(2, 7))
+        x, n = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
+        n /= np.linalg.norm(n, axis=1, keepdims=True)
+        forces = np.zeros((count, 3))
+        for i in range(int(rng.integers(1, 3))):
+            across = np.cross(n[i], rng.normal(size=3))
+            forces[i] = n[i] + 0.2 * across / np.linalg.norm(across)
+        load = -np.append(forces.sum(axis=0), np.cross(x, forces).sum(axis=0))
+        (found,) = gc.wrench_limits(x, n, 0.4, load[None], max_normal_force=LARGEST)
+        assert found.limit >= LARGEST * (1.0 - 1e-6)
+        assert found.upper <= found.limit * (1.0 + 1e-6)
+        assert found.verify(x, n, 0.4, max_normal_force=LARGEST)
+        tested += not gc.force_closure(x, n, 0.4).closed
+    assert tested >= 35
