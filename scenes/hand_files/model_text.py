@@ -258,7 +258,8 @@ def _is_near(whole: Path, home: Path, around: Path | None) -> bool:
     if whole.is_relative_to(home) or (around is not None and whole.is_relative_to(around)):
         return True
     above = home.parent
-    if above in (Path(home.anchor), Path.home()) or not whole.is_relative_to(above):
+    # what holds the home folder, or is it, holds more than hands
+    if Path.home().resolve().is_relative_to(above) or not whole.is_relative_to(above):
         return False
     folder, *inner = whole.relative_to(above).parts
     hidden = any(part.startswith(".") for part in (folder, *inner))

@@ -77,6 +77,16 @@ def test_nothing_else_is_read(case, tmp_path):
         loaded(tmp_path / "hand" / "urdf", robot(middle=meshed(name)), TIPS)
 
 
+@pytest.mark.parametrize("home", ["hand", "hand/someone"])
+def test_nothing_beside_the_model_is_read_in_a_home_folder(home, tmp_path, monkeypatch):
+    box_at(tmp_path / "hand" / "meshes" / "middle.obj")
+    text = robot(middle=meshed("../meshes/middle.obj"))
+    assert loaded(tmp_path / "hand" / "urdf", text, TIPS)
+    monkeypatch.setenv("HOME", str(tmp_path / home))
+    with pytest.raises(InputError, match="nor in one beside it"):
+        loaded(tmp_path / "hand" / "urdf", text, TIPS)
+
+
 def test_included_files_are_read_with_their_settings_and_files(tmp_path):
     """They name others in the folder of the model or in their own, and may state folders."""
     box_at(tmp_path / "assets" / "palm.obj")
