@@ -19,7 +19,7 @@ WRENCH_FILE, CONTACTS_FILE = "wrench file", "contacts file"
 WRITTEN: Mapping[str, str] = {
     BASELINE: "grasps_file", VERDICTS: "verdicts", REGIONS: "reserve", EXECUTIONS: "executions",
     REACHES: "reaches", JUDGEMENTS: "judgements", TRANSFER: "old", MANIFEST: "units_sha256",
-    UNIT: "object_id", GRASPS: "theta_rad", BEST: "ended", ANALYSES: "source",
+    UNIT: "object_id", GRASPS: "theta_rad", BEST: "history", ANALYSES: "source",
 }  # fmt: skip
 """The kinds of files that graspproof writes, each with a key that no other kind has."""
 GIVEN = {"wrenches": WRENCH_FILE, "contacts": CONTACTS_FILE, "grasps": CONTACTS_FILE}

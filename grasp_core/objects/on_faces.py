@@ -32,6 +32,13 @@ from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6
 """Largest distance of a contact from its face [object radii]: six digits of a file keep it."""
+ROUNDED = 1e-3
+"""Most that the rounding of a mesh adds to that [object radii]: a larger flatness is the user's."""
+
+
+def on_face_slack(body: Polyhedron) -> float:
+    """Return the distance within which a point is on a face [m], also where its mesh is rounded."""
+    return max(ON_FACE * body.radius, min(body.surface.flatness_m, ROUNDED * body.radius))
 
 
 def check_body(body: Polyhedron) -> None:
@@ -56,7 +63,7 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
         grasp, Grasp, "grasp", "gc.plan makes grasps; of contacts of your own, seat and grasp_of "
         "in grasp_core.planning.given_contacts make one, as docs/python.md shows",
     )  # fmt: skip
-    slack = ON_FACE * body.radius
+    slack = on_face_slack(body)
     for finger, (face, contact) in enumerate(zip(grasp.faces, grasp.contacts, strict=True)):
         where = f"grasp {grasp.id}: contact {finger}"
         if not 0 <= face < len(body.faces):
@@ -77,7 +84,7 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
 @lru_cache(maxsize=32)
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
     """Find the face on which a contact lies with its normal; kept, as controls repeat it."""
-    slack = ON_FACE * body.radius
+    slack = on_face_slack(body)
     # planar faces that lean otherwise are left out at once; patches have many normals
     turned = np.abs(body.normals - contact.normal).max(axis=1)
     flat = body.patches is None
@@ -91,7 +98,7 @@ def face_under(body: Polyhedron, contact: Contact) -> Face | None:
 
 def _on_surface(body: Polyhedron, face: Face, contact: Contact) -> bool:
     """Return whether a contact is in the plane of a face, or on a triangle of a curved patch."""
-    slack = ON_FACE * body.radius
+    slack = on_face_slack(body)
     if not len(face.facets):
         off = abs(float(face.normal @ (contact.position - face.centroid)))
         return off <= slack and float(np.abs(contact.normal - face.normal).max()) <= ON_FACE

@@ -94,7 +94,7 @@ class PlanSearch:
     """Other processes that search parts; None where this one is alone."""
     stop: Callable[[], bool] = never
     """Whether to end the search with what was found by then."""
-    unranked: Counter[str] = field(default_factory=Counter)
+    unranked: Counter[str] = field(default_factory=Counter[str])
     """Numbers of grasps without a figure to rank by, by the reason."""
 
     @classmethod

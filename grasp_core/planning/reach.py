@@ -23,13 +23,11 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.kinds import Quantity
-from grasp_core.objects.on_faces import nearest_on_triangles
+from grasp_core.objects.on_faces import nearest_on_triangles, on_face_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.settings import Settings
 from grasp_core.values import FaceQuadruple
 
-TOUCHING = 1e-6
-"""Overlap that is ignored, in object radii: the rounding of six digits in a file."""
 RINGS_DEG = (30.0, 60.0)
 """Angles to the normal at which fingers may approach, besides straight along it [deg]."""
 RING_DIRECTIONS = 6
@@ -57,7 +55,7 @@ def reach(
 
     Gives unit vectors from each tip along its rod, (k, 3), or the reason why there are none.
     """
-    slack = TOUCHING * body.radius
+    slack = on_face_slack(body)
     tips = positions - finger.radius_m * normals
     for i, j in combinations(range(len(tips)), 2):
         if np.linalg.norm(tips[i] - tips[j]) < 2.0 * finger.radius_m - slack:

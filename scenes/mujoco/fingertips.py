@@ -15,10 +15,10 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.objects.on_faces import (
-    ON_FACE,
     face_under,
     nearest_on_surface,
     nearest_on_triangles,
+    on_face_slack,
 )
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import areas_and_normals
@@ -117,7 +117,7 @@ def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: fl
 
 def _touched(body: Polyhedron, radius: float) -> float:
     """Return the distance from which on a surface touches a fingertip but does not meet it [m]."""
-    return radius * (1.0 - TOUCHING) - ON_FACE * body.radius
+    return radius * (1.0 - TOUCHING) - on_face_slack(body)
 
 
 def _clear_radius(

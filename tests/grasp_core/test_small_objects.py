@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.planning.plan_search import carried
-from grasp_core.regions.certify_placement import usual_chance
+from grasp_core.regions.certify_placement import usual_bound
 from grasp_core.small_objects import SMALL_M, fitted
 from scenes.example_objects import example_object
 
@@ -23,7 +23,7 @@ def test_rankings_treat_a_tiny_part_as_the_same_part_in_a_usual_size():
         vertices = radius / usual.radius * usual.vertices
         body = gc.Polyhedron.from_mesh(vertices, usual.triangles)
         grasp = gc.plan(body, 0.5, limit=1)[0]
-        chances.append(usual_chance(body, grasp, 0.5))
+        chances.append(usual_bound(body, grasp, 0.5).lower)
         arms = grasp.positions - body.center_of_mass
         masses.append(carried(body, arms, grasp.normals, 0.5, None))
     assert chances[0] == pytest.approx(chances[1], rel=1e-3)

@@ -105,9 +105,17 @@ def _allowed(q):
     return (across <= q.wrenches.friction * pushes + 1e-11).all() and (summed <= 1e-11).all()
 
 
+SINGLE = 1e-6
+"""How far lengths of normals of single precision may be off one, in what takes contacts."""
+
+
 def wrench_limit(c):
     """The largest multiple, solved again, is between the limit and the upper bound."""
-    found, x, n, largest = c.found, c.positions, c.normals, c.max_normal_force
+    found, x, largest = c.found, c.positions, c.max_normal_force
+    n = np.asarray(c.normals, dtype=np.float64)
+    lengths = np.linalg.norm(n, axis=-1, keepdims=True)
+    if (np.abs(lengths - 1.0) <= SINGLE).all():
+        n = n / lengths  # as all that takes contacts does
     mu = np.full(len(x), c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
     mu_t = np.zeros(len(x)) if np.ndim(c.torsion_m) == 0 else np.asarray(c.torsion_m)
     if not contacts_make_sense(np.asarray(x), np.asarray(n), mu):

@@ -141,3 +141,14 @@ def test_the_patch_that_is_touched_is_not_in_the_way_but_the_rest_is():
         for grasp in plan.grasps
     ]
     assert sum(blocked) >= 3
+
+
+def test_corners_that_rounding_lifts_are_not_in_the_way_of_fingers():
+    """Coordinates of six decimals move faces of one plane by more than a millionth."""
+    exact = example_object("random-8-3")
+    rounded = gc.Polyhedron.from_mesh(exact.vertices.round(6), exact.triangles, flatness_m=4e-6)
+    finger = Finger(radius_m=0.005, approach_m=0.05)
+    counts = [
+        len(gc.plan(body, 0.5, families="concurrent", finger=finger)) for body in (exact, rounded)
+    ]
+    assert counts[0] == counts[1] > 20

@@ -138,7 +138,9 @@ def copy(small_run, tmp_path):
 def without_proofs(document):
     known = ("id", "contacts_sha256", "family", "planned_radius_m")
     named = {name: document["grasps"][0][name] for name in known}
-    document["grasps"][0] = dict.fromkeys(document["grasps"][0]) | named | {"reason": EVIL}
+    document["grasps"][0] = (
+        dict.fromkeys(document["grasps"][0]) | named | {"reason": EVIL, "closed_share_reason": ""}
+    )
     document["summary"]["proved"] -= 1
 
 
