@@ -5,11 +5,12 @@ with the largest push allowed. Every trial then runs with it. Before, the simula
 cases whose answers are known (see `gate`).
 
 A trial that is lost is run again with short steps: a loss counts only if it does not depend on the
-step. Where contacts open and close between fingertips that push lightly, an object rattles. With
-steps of the usual length it bounces too much, and may fall where it would come to rest. Up to the
-first contact that opens or slips, steps of that length are exact enough, so a run with steps of
-`FINE_S` goes on from shortly before. It ends where the object is farther than it may be: the loss
-is confirmed then, whatever comes later.
+step. So is one whose object slips and is kept, but moves by more than `NEAR` of what is allowed:
+then the motion with short steps counts. Where contacts open and close between fingertips that push
+lightly, an object rattles. With steps of the usual length it bounces too much, and may fall where
+it would come to rest. Up to the first contact that opens or slips, steps of that length are exact
+enough, so a run with steps of `FINE_S` goes on from shortly before. It ends where the object is
+farther than it may be: a loss is confirmed then, whatever comes later.
 
 Several grasps of an object are executed in one process or in several, and their trials are filmed.
 """
@@ -61,6 +62,8 @@ FINE_S = 1.25e-4
 """Length of steps that confirm a loss, at most [s]."""
 FINER = 4
 """Number of such steps in a step of the usual length, at least."""
+NEAR = 0.5
+"""Share of the motion allowed above which short steps find that of a kept object that slips."""
 BEFORE = 4
 """Samples before the first trouble that is seen at which the second run begins: what happens within
 a sample is not seen."""
@@ -70,11 +73,16 @@ SHORTEST_S = 1e-5
 
 def confirming_bench(bench: HeldBench) -> HeldBench | None:
     """Return a bench of the same scene with short steps; None if those of this one are as short."""
-    step_s = min(FINE_S, held_physics(bench.scene.layout).timestep / FINER)
-    count = round(bench.sample_s / max(step_s, SHORTEST_S))
+    count = _short_steps(bench)
     if count <= bench.chunk:
         return None
     return HeldBench(bench.scene, threads=bench.threads, step_s=bench.sample_s / count)
+
+
+def _short_steps(bench: HeldBench) -> int:
+    """Return how many short steps there are in a sample."""
+    step_s = min(FINE_S, held_physics(bench.scene.layout).timestep / FINER)
+    return round(bench.sample_s / max(step_s, SHORTEST_S))
 
 
 def run_again(
@@ -302,7 +310,7 @@ def _with_first_slips(
 def _confirmed_trials(
     bench: HeldBench, predicted: Mapping[Trial, tuple[float, float]], settings: ExecutionSettings
 ) -> dict[Trial, ExecutionTrial]:
-    """Simulate trials and judge them, and those that are lost after a slip by shorter steps too."""
+    """Simulate trials and judge them; after a slip that loses the object, or nearly, once more."""
     motions = run_trials(bench, tuple(predicted))
     judged = {
         trial: _judged(trial, motion, predicted[trial], bench, settings)
@@ -310,15 +318,21 @@ def _confirmed_trials(
     }
     again = {
         trial: motions[trial] for trial, each in judged.items()
-        if not each.survived and each.fate != "stuck"
+        if each.fate != "stuck" and (not each.survived or _is_near(each, settings))
     }  # fmt: skip
     short = confirming_bench(bench) if again else None
     if short is not None:
         for trial, motion in run_again(short, again, settings).items():
             first, found = judged[trial], _judged(trial, motion, predicted[trial], short, settings)
-            confirmed = not found.survived and first.fate != "diverged"
+            confirmed = not (found.survived or first.survived) and first.fate != "diverged"
             judged[trial] = replace(first, step_s=short.step_s) if confirmed else found
     return judged
+
+
+def _is_near(trial: ExecutionTrial, settings: ExecutionSettings) -> bool:
+    """Whether an object moved by more than `NEAR` of what is allowed."""
+    moved, turned = trial.displacement_m, trial.turn_rad
+    return moved > NEAR * settings.most_m or turned > NEAR * settings.most_rad
 
 
 def _judged(
@@ -329,13 +343,14 @@ def _judged(
         found = DIVERGED
     else:
         found = outcome(motion, trial.drive, motion.layout.friction, trial.begun)
-    kept = found.displacement_m <= settings.most_m and found.turn_rad <= settings.most_rad
+    moved = found.displacement_m > settings.most_m or found.turn_rad > settings.most_rad
+    survived = not (moved or found.dropped)
     held = "slipped" if found.slipped else "stuck"
     lost = "diverged" if motion.health.fault else "dropped"
     return ExecutionTrial(
         kind=trial.kind,
         name=trial.name,
-        survived=kept and not found.dropped,
+        survived=survived,
         fate=lost if found.dropped else held,
         slip_m=found.slip_m,
         displacement_m=found.displacement_m,
@@ -345,6 +360,7 @@ def _judged(
         simulated_first_slip=found.first_slip,
         step_s=bench.step_s,
         starts_closed=trial.starts_closed,
+        converged=not found.slipped or (survived and bench.chunk >= _short_steps(bench)),
     )
 
 

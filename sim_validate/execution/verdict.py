@@ -77,10 +77,15 @@ class ExecutionTrial(Declared):
     how far away slip stayed. A slip under a load that follows the whole weight shows as one."""
     step_s: Quantity
     """Length of the shortest steps that the simulator took: a loss with steps of the usual length
-    counts only if short steps find it as well [s]."""
+    counts only if short steps find it as well, and so does more than half of the motion that is
+    allowed [s]."""
     starts_closed: bool | None = None
     """Whether fingers first meet a misplaced object in force closure, before they squeeze; null for
     other trials, and where it is too close to decide."""
+    converged: bool = False
+    """Whether shorter steps would find the same motion: no contact slips, or the object is kept and
+    its motion was found with short steps. Elsewhere `slip_m`, `displacement_m` and `turn_rad` tell
+    their order only."""
 
     def _check_together(self) -> None:
         unknown = [math.isinf(each) for each in (self.slip_m, self.displacement_m, self.turn_rad)]

@@ -1,5 +1,7 @@
 """What is claimed of qualities and limits: by descent, hulls, and programs solved again."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import minimize
 
@@ -12,6 +14,9 @@ from tests.tampering.exact_closure import (
     torsions_make_sense,
     unit_arms,
 )
+
+SINGLE = 1e-6
+"""How far normals that are given may be from unit length."""
 
 
 def support(G, mu, norm, y):
@@ -105,17 +110,16 @@ def _allowed(q):
     return (across <= q.wrenches.friction * pushes + 1e-11).all() and (summed <= 1e-11).all()
 
 
-SINGLE = 1e-6
-"""How far lengths of normals of single precision may be off one, in what takes contacts."""
+def as_given(normals):
+    """Normals that are beside a certificate: those of single precision are divided by lengths."""
+    lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
+    return normals / np.where(np.abs(lengths - 1.0) <= SINGLE, lengths, 1.0)
 
 
 def wrench_limit(c):
     """The largest multiple, solved again, is between the limit and the upper bound."""
-    found, x, largest = c.found, c.positions, c.max_normal_force
-    n = np.asarray(c.normals, dtype=np.float64)
-    lengths = np.linalg.norm(n, axis=-1, keepdims=True)
-    if (np.abs(lengths - 1.0) <= SINGLE).all():
-        n = n / lengths  # as all that takes contacts does
+    c = replace(c, normals=as_given(c.normals))
+    found, x, n, largest = c.found, c.positions, c.normals, c.max_normal_force
     mu = np.full(len(x), c.friction) if np.ndim(c.friction) == 0 else np.asarray(c.friction)
     mu_t = np.zeros(len(x)) if np.ndim(c.torsion_m) == 0 else np.asarray(c.torsion_m)
     if not contacts_make_sense(np.asarray(x), np.asarray(n), mu):

@@ -50,6 +50,31 @@ def test_a_loss_of_a_step_that_is_too_long_does_not_count(bar, monkeypatch):
             assert trial == once[name]
 
 
+def test_the_motion_of_a_kept_object_is_that_of_short_steps_where_it_nears_a_limit(
+    bar, monkeypatch
+):
+    """Limits of .7 mm, half of which only the stops that rattle exceed; the others say so."""
+    settings = replace(LIGHT, max_mm=0.7)
+    found = {trial.name: trial for trial in sv.execute(*bar, 0.4, settings).trials}
+    usual, half = found["stop +z"].step_s, 0.5 * settings.most_m
+    monkeypatch.setattr(execute, "_is_near", lambda *_: False)
+    once = {trial.name: trial for trial in sv.execute(*bar, 0.4, settings).trials}
+    near = [
+        name for name, trial in once.items()
+        if trial.survived and trial.fate == "slipped" and trial.displacement_m > half
+    ]  # fmt: skip
+    assert near == ["stop +y"]
+    for name, trial in once.items():
+        again = name in near or not trial.survived
+        assert (found[name].step_s < usual) == again, name
+        assert again or found[name] == trial, name
+    assert once["stop +y"].displacement_m != found["stop +y"].displacement_m
+    for trial in found.values():
+        kept = trial.survived and (trial.fate == "stuck" or trial.step_s < usual)
+        assert trial.converged == kept, trial.name
+    assert {trial.converged for trial in found.values()} == {True, False}
+
+
 def trials_on_a_bench(settings):
     """The box on its bench, the trials of some settings, their motions, and the frictions."""
     body, grasp = planned("box")
