@@ -138,7 +138,12 @@ def _show_robustness(verdicts: Sequence[Verdict], reporter: Reporter) -> None:
 def _surprises(verdicts: Sequence[Verdict]) -> list[str]:
     lines = list[str]()
     for verdict in verdicts:
-        for trial in verdict.failures:
+        started = verdict.outcome not in (Outcome.INVALID_START, Outcome.ERROR)
+        if not started:  # for one reason, whatever the wrench
+            lines.append(
+                f"{verdict.id}: {verdict.outcome.value}: {verdict.failures[0].hold.reason}"
+            )
+        for trial in verdict.failures if started else ():
             limit, ended = trial.predicted_limit, trial.hold.outcome.value
             over = f" as predicted, the limit is {limit:.3g} of this" if limit < 1.0 else ""
             lines.append(f"{verdict.id}: {trial.name}: {ended}{over}: {trial.hold.reason}")

@@ -27,15 +27,20 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frames, stacked
-from grasp_core.errors import InputError, UndecidedError
+from grasp_core.errors import OWN_FAULTS, InputError, UndecidedError
 from grasp_core.kinds import Count, Friction, function, instance, several, value_of
-from grasp_core.objects.on_faces import check_body, check_on_faces, within
+from grasp_core.objects.on_faces import (
+    check_body,
+    check_on_faces,
+    edge_distances,
+    within,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import facets_of
 from grasp_core.values import Contact, Grasp
@@ -50,7 +55,13 @@ from sim_validate.closure.verdict import (
     Verdict,
     WrenchVerdict,
 )
-from sim_validate.engine.gate import Gate, measured_gate, require_faithful, require_touch
+from sim_validate.engine.gate import (
+    Gate,
+    measured_gate,
+    misplaced,
+    require_faithful,
+    require_touch,
+)
 from sim_validate.engine.limits_and_friction import (
     Analysis,
     CriticalFriction,
@@ -62,9 +73,9 @@ from sim_validate.engine.limits_and_friction import (
     ramped_limits,
     released_friction,
 )
-from sim_validate.engine.setup import Agenda, Setup
+from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulate import Bench
-from sim_validate.engine.traces import LET_GO, Outcome, judge, rotated
+from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge, rotated
 from sim_validate.kit.workers import each, processes
 from sim_validate.settings import Noise
 
@@ -93,6 +104,10 @@ def validate(
     return Job(body, friction, *asked_for(agenda, setup))(grasp)
 
 
+NOT_STARTED: dict[str, Any] = {"critical_friction": False, "limits": "none", "repeats": 0}
+"""Trials that a grasp is spared whose fingertips do not stand where they are planned."""
+
+
 def tested(
     body: Polyhedron, grasp: Grasp, friction: float, gate: Gate | None, agenda: Agenda, setup: Setup
 ) -> Verdict:
@@ -100,10 +115,11 @@ def tested(
     scene = setup.scene(body, grasp, friction)
     layout, rig = scene.layout, closed_on(scene, setup, friction)
     loads = Analysis(body, grasp.contacts, friction, setup, None).planned(rig.idle, agenda)
-    overlap = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
-    if not overlap:
-        require_touch(rig.bench)
-    wrenches = held_wrenches(rig, loads, agenda, overlap)
+    amiss = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
+    untouched = () if amiss else misplaced(rig.bench, edge_distances(body, grasp))
+    if untouched:  # nothing that starts like this says anything about the grasp
+        agenda = replace(agenda, **NOT_STARTED)
+    wrenches = held_wrenches(rig, loads, agenda, amiss or untouched)
     critical = CriticalFriction(grasp.critical_friction)
     if agenda.critical_friction:
         with suppress(UndecidedError):
@@ -127,18 +143,24 @@ def tested(
         robustness=repeats,
         setup=setup,
         agenda=agenda,
-        scale=Scale(
-            layout.grasp_size_m, body.radius, layout.object_kg, layout.inertia_kg_m2, layout.drive
-        ),
+        scale=_scale(body, scene),
         gate=gate,
         scene=scene,
     )
 
 
+def _scale(body: Polyhedron, scene: Scene) -> Scale:
+    at = scene.layout
+    return Scale(at.grasp_size_m, body.radius, at.object_kg, at.inertia_kg_m2, at.drive)
+
+
 def held_wrenches(
-    rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda, overlap: Sequence[str] = ()
+    rig: Rig, loads: Sequence[PlannedLoad], agenda: Agenda, amiss: Sequence[str] = ()
 ) -> tuple[WrenchVerdict, ...]:
-    """Judge the hold of every load, from overlaps in words, and find its limit if asked for."""
+    """Judge the hold of every load, and find its limit if asked for.
+
+    What is `amiss` with the start, in words, makes all of them invalid.
+    """
     limits = [planned.limit for planned in loads]
     traces = rig.hold([planned.load for planned in loads])
     found: Sequence[SimulatedLimit | None] = [None] * len(limits)
@@ -148,7 +170,7 @@ def held_wrenches(
     return tuple(
         WrenchVerdict(
             each.name, each.load.wrench, each.predicted_limit, each.required_friction,
-            judge(trace, rig.bench.scene.layout, rig.setup.hold, overlap),
+            judge(trace, rig.bench.scene.layout, rig.setup.hold, amiss),
             limit, trace if agenda.keep_traces else None,
         )
         for each, trace, limit in zip(loads, traces, found, strict=True)
@@ -237,11 +259,38 @@ class Job:
         proved = replace(grasp, critical_friction=critical)
         return tested(body, proved, friction, gate, self.agenda, setup)
 
+    def attempted(self, grasp: Grasp) -> Verdict:
+        """Validate one of several grasps; the reason why it cannot be is a verdict, too."""
+        try:
+            return self(grasp)
+        except OWN_FAULTS as error:
+            reason = str(error)
+        setup = self.setup.for_body(self.body)
+        scene = setup.scene(self.body, grasp, self.friction)  # refuses what suits no grasp
+        nothing = np.full(len(grasp.contacts), np.nan)
+        hold = HoldVerdict(Outcome.ERROR, reason, np.nan, np.nan, np.nan, nothing, None)
+        return Verdict(
+            id=grasp.id,
+            contacts=grasp.contacts,
+            friction=self.friction,
+            critical_friction=CriticalFriction(grasp.critical_friction),
+            wrenches=(WrenchVerdict(WEAKEST, np.zeros(6), 0.0, np.inf, hold),),
+            controls=(),
+            robustness=None,
+            setup=setup,
+            agenda=replace(self.agenda, controls=False, **NOT_STARTED),
+            scale=_scale(self.body, scene),
+            gate=self.gate,
+            scene=scene,
+        )
+
 
 def validated(job: Job, grasps: Sequence[Grasp], processors: int) -> Iterator[Verdict]:
     """Yield one verdict per grasp, in order; the number of processors does not change results."""
     count = len(grasps)
-    return each(job.prepared(count, processors), grasps, jobs=processes(count, processors))
+    return each(
+        job.prepared(count, processors).attempted, grasps, jobs=processes(count, processors)
+    )
 
 
 def validate_all(
@@ -268,10 +317,11 @@ def validate_all(
             all, and the verdict. What it raises ends the loop.
 
     Returns:
-        One verdict per grasp, in order.
+        One verdict per grasp, in order. A grasp that cannot be tested, such as one that is not on
+        the body's faces or not closed at this friction, has the outcome `error` with the reason.
 
     Raises:
-        InputError: A grasp is not on the body's faces, or not closed at this friction.
+        InputError: An argument is out of range, or suits no grasp of this object.
         UnfaithfulError: The simulator fails its checks with these settings.
     """
     check_body(body)
@@ -284,7 +334,7 @@ def validate_all(
         function(progress, "progress")
     job = Job(body, friction, agenda, setup)
     verdicts: list[Verdict] = []
-    for verdict in validated(job, listed, jobs) if jobs > 1 else map(job, listed):
+    for verdict in validated(job, listed, jobs) if jobs > 1 else map(job.attempted, listed):
         verdicts.append(verdict)
         if progress is not None:
             progress(len(verdicts), len(listed), verdict)

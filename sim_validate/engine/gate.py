@@ -434,18 +434,34 @@ def angles(normals: Array, faces: Array) -> Array:
     return np.arctan2(across, np.einsum("ki,ki->k", normals, faces))
 
 
+def misplaced(bench: Bench[Scene], edges_m: Sequence[float] = ()) -> tuple[str, ...]:
+    """List fingertips that do not touch the object at their start as their faces lie.
+
+    `edges_m` are the distances of contacts from the edges of their faces [m], where known: there
+    the surface, flat only to a mesh's digits, is farthest from the plane of its face.
+    """
+    normals, _ = bench.touched(bench.scene.layout.holder.tip_names, one=False)
+    turned, found = angles(normals, bench.scene.layout.frames[:, :, 0]), list[str]()
+    for finger in np.flatnonzero(~(turned <= NORMAL_ERROR)).tolist():
+        edge = f", {1e3 * edges_m[finger]:.3g} mm from an edge of its face," if edges_m else ""
+        fault = (
+            "no contact is found, because the mesh is flat only to its digits"
+            if math.isnan(turned[finger])
+            else f"the normal of its deepest contact is off by {turned[finger]:.3g} rad (at most "
+            f"{NORMAL_ERROR:g} is allowed)"
+        )
+        found.append(
+            f"in simulation, fingertip {finger}{edge} does not touch the object as planned: {fault}"
+            "; plan with a larger --edge-clearance-m, use --surface pads, or raise ccd_iterations "
+            "in the settings of the physics"
+        )
+    return tuple(found)
+
+
 def require_touch(bench: Bench[Scene]) -> None:
     """Check that each fingertip touches the object at its start as the face lies."""
-    normals, _ = bench.touched(bench.scene.layout.holder.tip_names, one=False)
-    turned = angles(normals, bench.scene.layout.frames[:, :, 0])
-    finger = int(np.argmax(np.nan_to_num(turned, nan=np.inf)))
-    if not turned[finger] <= NORMAL_ERROR:
-        raise UnfaithfulError(
-            f"in simulation, fingertip {finger} does not touch the object as planned: the normal "
-            f"of its deepest contact is off by {turned[finger]:.3g} rad (at most {NORMAL_ERROR:g} "
-            "is allowed; nan means no contact); use --surface pads, or raise ccd_iterations in the "
-            "settings of the physics"
-        )
+    if found := misplaced(bench):
+        raise UnfaithfulError(found[0])
 
 
 def surface_touches(case: Case) -> tuple[Check, Check]:

@@ -234,11 +234,11 @@ class HoldVerdict(Declared):
 
 
 def judge(
-    trace: Trace, layout: Layout, protocol: HoldProtocol, overlap: Sequence[str] = ()
+    trace: Trace, layout: Layout, protocol: HoldProtocol, amiss: Sequence[str] = ()
 ) -> HoldVerdict:
     """Judge a trial: compare its motion with the thresholds of a protocol.
 
-    Where fingertips cannot stand where they were put, `overlap` says why, and the start is invalid.
+    Where fingertips do not stand as they were put, `amiss` says why, and the start is invalid.
     """
     size = layout.grasp_size_m
     moved = trace.displacements_m >= protocol.hold_threshold * size
@@ -247,8 +247,8 @@ def judge(
     failing = np.flatnonzero(moved | strayed | apart)
     first = int(failing[0]) if failing.size else None
     outcome, reason = _outcome(trace, layout, protocol, first)
-    if overlap:
-        outcome, reason = Outcome.INVALID_START, "; ".join(overlap)
+    if amiss:
+        outcome, reason = Outcome.INVALID_START, "; ".join(amiss)
     return HoldVerdict(
         outcome=outcome,
         reason=reason,
