@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.declared import Declared, counted
-from grasp_core.errors import InputError
+from grasp_core.errors import OWN_FAULTS, InputError
 from grasp_core.figures import NONE, Shown, cell, compared
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import arithmetic, versions
@@ -123,7 +123,7 @@ def _or_refusal(work: Callable[[Any], Any], beginning: str, job: Any) -> Any:
     """Return what a job gives, or why it is refused."""
     try:
         return work(job)
-    except InputError as error:
+    except OWN_FAULTS as error:
         return f"{beginning}{error}"
 
 

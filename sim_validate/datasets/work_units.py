@@ -25,7 +25,7 @@ from typing import Annotated, Any
 from grasp_core.arrays import Array, Shape
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared
-from grasp_core.errors import GraspError, InputError, UndecidedError, UnfaithfulError, about
+from grasp_core.errors import OWN_FAULTS, GraspError, InputError, UnfaithfulError, about
 from grasp_core.files.json_text import json_of
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import read_text
@@ -344,11 +344,15 @@ class Making:
                 limit=config.limit, seed=config.seed,
             )  # fmt: skip
             for grasp in planned.grasps:
-                self._try(
-                    grasp, self.body, grasp_id=self._name(grasp.id), name=grasp.id, label="grasp",
-                    kind=PLANNED, family=grasp.family, faces=grasp.faces,
-                    region_radius_m=grasp.radius,
-                )  # fmt: skip
+                cells: Cells = {
+                    "grasp_id": self._name(grasp.id), "name": grasp.id,
+                    "label": "grasp", "kind": PLANNED, "family": grasp.family,
+                    "faces": grasp.faces, "region_radius_m": grasp.radius,
+                }  # fmt: skip
+                try:
+                    self._try(grasp, self.body, **cells)
+                except OWN_FAULTS as error:
+                    self._note(grasp.contacts, error, cells)
 
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
@@ -358,9 +362,12 @@ class Making:
             }  # fmt: skip
             try:
                 self._judge(given, cells)
-            except (InputError, UndecidedError) as error:
-                about = self._about(tuple(map(Contact, given.points, given.normals)))
-                self.grasps.append(GraspRow(**about, **cells, note=str(error)))
+            except OWN_FAULTS as error:
+                self._note(tuple(map(Contact, given.points, given.normals)), error, cells)
+
+    def _note(self, contacts: Sequence[Contact], error: Exception, cells: Cells) -> None:
+        """Add the row of contacts that cannot be simulated, with the reason."""
+        self.grasps.append(GraspRow(**self._about(contacts), **cells, note=str(error)))
 
     def _judge(self, given: GivenGrasp, cells: Cells) -> None:
         """Try a given grasp; one that is not in force closure is a negative control."""

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
-from grasp_core.errors import GraspError, InputError, NoForcesError
+from grasp_core.errors import OWN_FAULTS, InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.kinds import Range, instance, one_of, value_of
@@ -387,10 +387,17 @@ def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[Executed
     """Yield one result per job, in order; the number of processors does not change the results."""
     count = processes(len(jobs), processors)
     threads = max(1, processors // count)
-    return each(executed_grasp, [replace(job, threads=threads) for job in jobs], jobs=count)
+    return each(attempted, [replace(job, threads=threads) for job in jobs], jobs=count)
 
 
-def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
+def attempted(job: ExecutionJob) -> ExecutedGrasp:
+    """Execute one of several grasps; whatever is wrong with it alone is a result with a reason."""
+    return executed_grasp(job, OWN_FAULTS)
+
+
+def executed_grasp(
+    job: ExecutionJob, refused: tuple[type[Exception], ...] = (NoForcesError,)
+) -> ExecutedGrasp:
     """Execute one grasp; a grasp without a squeeze is a result with a reason."""
     grasp = job.grasp
 
@@ -398,12 +405,12 @@ def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
         check_on_faces(job.body, grasp)
         return execution_of(job.holder, job.settings, threads=job.threads, enough=job.enough)
 
-    return result_of(grasp.id, grasp.family, grasp.contacts, found)
+    return result_of(grasp.id, grasp.family, grasp.contacts, found, refused)
 
 
 def result_of(
     name: str, family: str, contacts: Sequence[Contact], execution: Callable[[], Execution],
-    refused: tuple[type[GraspError], ...] = (NoForcesError,),
+    refused: tuple[type[Exception], ...] = (NoForcesError,),
 ) -> ExecutedGrasp:  # fmt: skip
     """Execute contacts; what is refused is a result with a reason."""
     about = name, family, contacts_sha256(contacts)

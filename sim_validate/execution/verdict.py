@@ -283,7 +283,8 @@ class ExecutedGrasp(Declared):
     execution: Annotated[Execution | None, FLAT]
     """Trials and negative controls; None where no squeeze carries the weight."""
     reason: Annotated[str | None, FAILED] = None
-    """Why there is no execution: no squeeze carries the weight, or the best one is unstable."""
+    """Why there is no execution: no squeeze carries the weight, the best one is unstable, or what
+    else is wrong with the grasp."""
     enough: Enough | None = None
     """The push, and stiffness, that would be enough for the trials, as in `Execution.enough`."""
 

@@ -19,7 +19,7 @@ from grasp_core.arrays import Array, Shape, frozen, frozen_units
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared
-from grasp_core.errors import InputError, SolverError, UndecidedError, about
+from grasp_core.errors import OWN_FAULTS, InputError, SolverError, about
 from grasp_core.figures import Shown, figures
 from grasp_core.files.file_kinds import REGIONS
 from grasp_core.files.records import FLAT, recorded
@@ -317,31 +317,35 @@ def _certify(
     body: Polyhedron, friction: float, asked: Certifying, grasp: Grasp
 ) -> tuple[CertifiedRegions | str, dict[str, Any]]:
     """Certify the regions of a grasp, and bound the chance of closure if anything may be off."""
-    chance = dict[str, Any]()
-    if asked.misplacing:
-        off = misplacement(
-            (friction, asked.friction_sigma), asked.off_mm / MILLI, math.radians(asked.off_deg),
-            contact_sigma_m=asked.finger_mm / MILLI,
-        )  # fmt: skip
-        bounded = placement_bound(body, grasp, off)
-        missing = isinstance(bounded, str)
-        chance = {"closed_share_reason": bounded} if missing else {"closed_share": bounded.lower}
-    return _certified(body, friction, asked, grasp), chance
+    try:
+        return _certified(body, friction, asked, grasp), _chance(body, friction, asked, grasp)
+    except OWN_FAULTS as error:
+        return str(error), {}
+
+
+def _chance(body: Polyhedron, friction: float, asked: Certifying, grasp: Grasp) -> dict[str, Any]:
+    """Bound the chance of closure, or say why not, if anything may be off."""
+    if not asked.misplacing:
+        return {}
+    off = misplacement(
+        (friction, asked.friction_sigma), asked.off_mm / MILLI, math.radians(asked.off_deg),
+        contact_sigma_m=asked.finger_mm / MILLI,
+    )  # fmt: skip
+    bounded = placement_bound(body, grasp, off)
+    missing = isinstance(bounded, str)
+    return {"closed_share_reason": bounded} if missing else {"closed_share": bounded.lower}
 
 
 def _certified(
     body: Polyhedron, friction: float, asked: Certifying, grasp: Grasp
 ) -> CertifiedRegions | str:
     left = friction * (1.0 - asked.reserve)
-    try:
-        if not force_closure(grasp.positions, grasp.normals, left).closed:
-            return f"not in force closure at friction {left:.6g}"
-        proved = certify_regions(
-            body, grasp, friction, reserve=asked.reserve, recenter=asked.recenter,
-            clearance=asked.edge_clearance_m, max_cones=asked.max_cones,
-        )  # fmt: skip
-    except (UndecidedError, SolverError) as error:
-        return str(error)
+    if not force_closure(grasp.positions, grasp.normals, left).closed:
+        return f"not in force closure at friction {left:.6g}"
+    proved = certify_regions(
+        body, grasp, friction, reserve=asked.reserve, recenter=asked.recenter,
+        clearance=asked.edge_clearance_m, max_cones=asked.max_cones,
+    )  # fmt: skip
     return "no radius could be proved" if proved is None else proved
 
 

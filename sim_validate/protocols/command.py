@@ -15,7 +15,7 @@ from sim_validate.kit import command_flags, workers
 from sim_validate.kit.console import TABLE_ROWS, Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import AboutObject, remove_results
-from sim_validate.protocols.judging import judge_by, judge_hand_by
+from sim_validate.protocols.judging import attempted, judge_hand_by
 from sim_validate.protocols.published import protocol
 from sim_validate.protocols.verdict import Judgement, Judgements
 
@@ -25,7 +25,7 @@ def judge_file(command: command_flags.Validate, reporter: Reporter) -> int:
 
     def judge(saved: Plan, setup: Setup) -> tuple[Exit, Judgements]:
         cases = [
-            partial(judge_by, name, saved.body, grasp, saved.friction, setup=setup)
+            partial(attempted, name, saved.body, grasp, saved.friction, setup)
             for name in command.protocol
             for grasp in saved.grasps
         ]

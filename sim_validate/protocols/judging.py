@@ -24,6 +24,7 @@ from functools import partial
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.errors import OWN_FAULTS
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.kinds import Friction, instance, one_of, value_of
@@ -33,7 +34,8 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.published_tests import TestedObject, TestedScene
-from sim_validate.engine.gate import require_faithful
+from scenes.mujoco.scene_text import Slides
+from sim_validate.engine.gate import misplaced, require_faithful
 from sim_validate.engine.limits_and_friction import Analysis, closed_on
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulate import Bench, Motion, Told, samples
@@ -85,6 +87,19 @@ def judge_by(
     return _judged(
         found, scene, friction, setup, ours, given.id if isinstance(given, Grasp) else ""
     )
+
+
+def attempted(
+    name: str, body: Polyhedron, grasp: Grasp, friction: float, setup: Setup
+) -> Judgement:
+    """Judge one of several grasps; whatever is wrong with it alone is a run that is not passed."""
+    try:
+        return judge_by(name, body, grasp, friction, setup=setup)
+    except OWN_FAULTS as error:
+        run = RunVerdict(0, False, str(error), math.nan, math.nan, 0)
+        ours = OurVerdict(False, False, 0.0, str(error))
+        mass_kg = _protocol(name).mass_of(body)
+        return Judgement(grasp.id, name, friction, mass_kg, 0.0, (run,), ours)
 
 
 def judge_hand_by(
@@ -188,9 +203,10 @@ def our_verdict(
     loads = analysis.as_they_are(rig.idle, named)
     margin = min((load.predicted_limit for load in loads), default=math.inf)
     held = [load.load for load in loads] or [rig.idle]
+    amiss = misplaced(rig.bench) if isinstance(rig.bench.scene.layout.holder, Slides) else ()
     names = [load.name for load in loads] or ["no load"]
     for name, trace in zip(names, rig.hold(held), strict=True):
-        found = judge(trace, rig.bench.scene.layout, setup.hold)
+        found = judge(trace, rig.bench.scene.layout, setup.hold, amiss)
         if found.outcome is not Outcome.HELD:
             return OurVerdict(True, False, margin, f"{name}: {found.outcome.value}: {found.reason}")
     return OurVerdict(True, True, margin, "")

@@ -1,6 +1,7 @@
 import json
 import math
 import pickle
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,8 @@ from sim_validate.engine.gate import measured_gate
 from sim_validate.engine.limits_and_friction import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from tests.sim_validate.rigs import grasps
+from sim_validate.kit.exit_codes import Exit
+from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp
 
 WITHOUT_CONTROLS = Agenda(controls=False)
 
@@ -218,3 +220,46 @@ def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
     monkeypatch.setattr(gate_module, "measured", fail)
     assert arrived(grasp).held
     assert arrived(grasp).gate == job.gate
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_fingertip_that_meets_nothing_is_the_outcome_of_its_grasp_alone(jobs, monkeypatch):
+    monkeypatch.setattr("sim_validate.kit.workers.UNITS_PER_PROCESS", 1)
+    plan, agenda = plan_with_a_bad_grasp(), replace(WITHOUT_CONTROLS, limits="ramp", repeats=1)
+    first, bad, last = sv.validate_all(plan.body, plan, 1.0, agenda=agenda, jobs=jobs)
+    assert (first.held, bad.outcome, last.held) == (True, Outcome.INVALID_START, True)
+    said = bad.failures[0].hold.reason
+    assert re.search(r"fingertip \d, 0.00\d+ mm from an edge of its face, does not touch", said)
+    assert "--edge-clearance-m" in said
+    assert not bad.mismatches
+    assert "nan" not in said
+
+
+def test_any_error_about_one_grasp_is_its_outcome(monkeypatch):
+    body, (grasp, *_) = grasps("wedge", 0.5, 1)
+    elsewhere = replace(grasp, id="elsewhere", faces=(*grasp.faces[1:], grasp.faces[0]))
+    odd, faithful = replace(grasp, id="odd"), Job.__call__
+
+    def failing(job, given):
+        if given.id == "odd":
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return faithful(job, given)
+
+    monkeypatch.setattr(Job, "__call__", failing)
+    found = sv.validate_all(body, [elsewhere, odd, grasp], 0.5, agenda=WITHOUT_CONTROLS)
+    assert [each.outcome for each in found] == [Outcome.ERROR, Outcome.ERROR, Outcome.HELD]
+    assert "does not lie on face" in found[0].failures[0].hold.reason
+    kept = Verdicts.of(body, 0.5, measured_gate(Setup()), found).text()
+    assert Verdicts.of_text(kept).verdicts[1].outcome is Outcome.ERROR
+    monkeypatch.setattr(Job, "__call__", lambda *_: (_ for _ in ()).throw(MemoryError))
+    with pytest.raises(MemoryError):
+        sv.validate_all(body, [grasp], 0.5)
+
+
+def test_commands_go_on_after_a_bad_grasp(tmp_path, answer):
+    path = gc.save_grasps(tmp_path / "grasps.json", plan_with_a_bad_grasp())
+    found = answer("validate", path, code=Exit.NEGATIVE)["verdicts"]
+    assert [each["outcome"] for each in found] == ["held", "invalid_start", "held"]
+    judged = answer("validate", path, "--protocol", "molmospaces", code=Exit.NEGATIVE)
+    assert [each["held"] for each in judged["judgements"]].count(False) >= 1
+    assert "does not touch the object" in judged["judgements"][1]["reason"]
