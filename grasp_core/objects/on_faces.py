@@ -81,17 +81,13 @@ def check_on_faces(body: Polyhedron, grasp: Grasp) -> None:
             )
 
 
-def edge_distances(body: Polyhedron, grasp: Grasp) -> tuple[float, ...]:
-    """Return how far each contact of a grasp is from the nearest edge of its face [m]."""
-    found = list[float]()
-    for face, contact in zip(grasp.faces, grasp.contacts, strict=True):
-        nearest = [
-            nearest_on_segments(loop, np.roll(loop, -1, axis=0), contact.position)
-            for loop in (body.faces[face].polygon, *body.faces[face].holes)
-        ]
-        away = np.linalg.norm(np.concatenate(nearest) - contact.position, axis=1)
-        found.append(float(away.min()))
-    return tuple(found)
+def edge_distance(face: Face, point: Array) -> float:
+    """Return how far a point on a face is from the face's nearest edge [m]."""
+    nearest = [
+        nearest_on_segments(loop, np.roll(loop, -1, axis=0), point)
+        for loop in (face.polygon, *face.holes)
+    ]
+    return float(np.linalg.norm(np.concatenate(nearest) - point, axis=1).min())
 
 
 @lru_cache(maxsize=32)

@@ -38,7 +38,7 @@ from grasp_core.kinds import Count, Friction, function, instance, several, value
 from grasp_core.objects.on_faces import (
     check_body,
     check_on_faces,
-    edge_distances,
+    edge_distance,
     within,
 )
 from grasp_core.objects.polyhedron import Polyhedron
@@ -116,7 +116,11 @@ def tested(
     layout, rig = scene.layout, closed_on(scene, setup, friction)
     loads = Analysis(body, grasp.contacts, friction, setup, None).planned(rig.idle, agenda)
     amiss = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
-    untouched = () if amiss else misplaced(rig.bench, edge_distances(body, grasp))
+    edges_m = [
+        edge_distance(body.faces[face], contact.position)
+        for face, contact in zip(grasp.faces, grasp.contacts, strict=True)
+    ]
+    untouched = () if amiss else misplaced(rig.bench, edges_m)
     if untouched:  # nothing that starts like this says anything about the grasp
         agenda = replace(agenda, **NOT_STARTED)
     wrenches = held_wrenches(rig, loads, agenda, amiss or untouched)

@@ -30,6 +30,7 @@ from sim_validate.execution.verdict import (
     ExecutedGrasp,
     Execution,
     Executions,
+    edges_in_words,
     held_controls_in_words,
     losses_in_words,
     multiple_in_words,
@@ -147,6 +148,9 @@ def _losses(found: Executions) -> Iterator[str]:
     for each in found:
         if each.execution is not None:
             yield from (f"{each.id}: {line}" for line in held_controls_in_words(each.execution))
+    for each in found:
+        if each.execution is not None:
+            yield from (f"{each.id}: {line}" for line in edges_in_words(each.execution))
     for each in found:
         if each.execution is None:
             yield f"{each.id}: not executed: {each.reason}"

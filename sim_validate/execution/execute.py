@@ -27,11 +27,16 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
-from grasp_core.errors import OWN_FAULTS, InputError, NoForcesError
+from grasp_core.errors import OWN_FAULTS, GraspError, InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.kinds import Range, instance, one_of, value_of
-from grasp_core.objects.on_faces import check_body, check_on_faces
+from grasp_core.objects.on_faces import (
+    check_body,
+    check_on_faces,
+    edge_distance,
+    face_under,
+)
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
@@ -249,7 +254,27 @@ def simulated(
         skipped=skipped,
         physics=scene.physics,
         tip_radius_m=best.grip.tip_radius_m,
+        over_edges=over_edges(bench, holder.body),
     )
+
+
+def over_edges(bench: HeldBench, body: Polyhedron) -> tuple[int, ...]:
+    """Return contacts nearer to an edge than the dent of their squeezed fingertip is wide.
+
+    A sphere of radius r at depth d in a plane has a dent of radius sqrt(2 r d - d^2) there.
+    """
+    layout = bench.scene.layout
+    joints = bench.squeezed[bench.parts["qpos"]]
+    _, depths = bench.touched(layout.holder.tip_names, joints, one=False)
+    dents = np.sqrt(np.maximum(depths * (2.0 * layout.tip_radius_m - depths), 0.0))
+    found = list[int]()
+    for finger, dent in enumerate(dents.tolist()):
+        point = layout.contacts[finger] + body.center_of_mass
+        face = face_under(body, Contact(point, layout.frames[finger, :, 0]))
+        # a curved surface goes on beyond its patches
+        if face is not None and not len(face.facets) and edge_distance(face, point) < dent:
+            found.append(finger)
+    return tuple(found)
 
 
 def given_contacts(body: Polyhedron, grasp: Grasp | Iterable[Contact]) -> tuple[Contact, ...]:
@@ -392,12 +417,15 @@ def executed(jobs: Sequence[ExecutionJob], processors: int) -> Iterator[Executed
 
 def attempted(job: ExecutionJob) -> ExecutedGrasp:
     """Execute one of several grasps; whatever is wrong with it alone is a result with a reason."""
-    return executed_grasp(job, OWN_FAULTS)
+    try:
+        return executed_grasp(job)
+    except OWN_FAULTS as error:
+        grasp = job.grasp
+        about = grasp.id, grasp.family, contacts_sha256(grasp.contacts)
+        return ExecutedGrasp(*about, None, str(error))
 
 
-def executed_grasp(
-    job: ExecutionJob, refused: tuple[type[Exception], ...] = (NoForcesError,)
-) -> ExecutedGrasp:
+def executed_grasp(job: ExecutionJob) -> ExecutedGrasp:
     """Execute one grasp; a grasp without a squeeze is a result with a reason."""
     grasp = job.grasp
 
@@ -405,12 +433,12 @@ def executed_grasp(
         check_on_faces(job.body, grasp)
         return execution_of(job.holder, job.settings, threads=job.threads, enough=job.enough)
 
-    return result_of(grasp.id, grasp.family, grasp.contacts, found, refused)
+    return result_of(grasp.id, grasp.family, grasp.contacts, found)
 
 
 def result_of(
     name: str, family: str, contacts: Sequence[Contact], execution: Callable[[], Execution],
-    refused: tuple[type[Exception], ...] = (NoForcesError,),
+    refused: tuple[type[GraspError], ...] = (NoForcesError,),
 ) -> ExecutedGrasp:  # fmt: skip
     """Execute contacts; what is refused is a result with a reason."""
     about = name, family, contacts_sha256(contacts)

@@ -15,7 +15,7 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more
 from grasp_core.files.file_kinds import EXECUTIONS
 from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
-from grasp_core.kinds import FieldError, OrInfinity, Quantity, path_of
+from grasp_core.kinds import FieldError, Number, OrInfinity, Quantity, path_of
 from grasp_core.solvers.ties import first_best
 from scenes.settings import PhysicsSettings
 from sim_validate.kit.files import AboutGrasps
@@ -182,6 +182,9 @@ class Execution(Declared):
     """Settings of the simulator, where they are known."""
     tip_radius_m: Annotated[Array, Shape("k")] | None = None
     """Radii of the fingertips that were used, (k,) [m], where they are known."""
+    over_edges: tuple[Number, ...] = ()
+    """Contacts nearer to an edge of their face than the dent of their squeezed fingertip is wide:
+    predictions, which know one face under each, do not hold there."""
     enough: Annotated[Enough | None, UNRECORDED] = None
     """The push, and stiffness, that would be enough for the trials; None where all were survived,
     or it was not asked for."""
@@ -422,6 +425,15 @@ def loss_in_words(found: Execution) -> str:
     if found.least_predicted_loss >= 1.0:
         said += ", none of which was predicted, so it may not be for want of push"
     return said if found.enough is None else f"{said}; {found.enough}"
+
+
+def edges_in_words(found: Execution) -> list[str]:
+    """Say for which contacts the predictions do not hold, if for any."""
+    return [
+        f"contact {finger} is nearer to an edge of its face than the dent of its fingertip is wide,"
+        " so what is predicted does not hold; plan with a larger --edge-clearance-m"
+        for finger in found.over_edges
+    ]
 
 
 def held_controls_in_words(found: Execution) -> list[str]:

@@ -7,13 +7,16 @@ import pytest
 
 import grasp_core as gc
 import sim_validate as sv
+from grasp_core.objects.on_faces import edge_distance
 from scenes.example_objects import example_object
-from sim_validate.execution.execute import Fingertips
+from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
 from sim_validate.execution.trials import Skipped
+from sim_validate.execution.verdict import edges_in_words
 from sim_validate.settings import KINDS
 from tests.grasp_core.execution.held import box
 from tests.scenes.meshes import dented_ball
 from tests.sim_validate.execution.held_rigs import G, opposed, planned
+from tests.sim_validate.rigs import plan_with_a_bad_grasp
 
 LIGHT = sv.ExecutionSettings(0.1)
 
@@ -156,3 +159,25 @@ def test_a_tiny_part_is_held_by_fingers_of_its_own_size_and_its_controls_let_go(
         assert trial.displacement_m < 0.0007
     with pytest.raises(gc.NoForcesError, match="unstable"):
         sv.execute(body, grasp, 0.5, replace(asked, keep_defaults=True))
+
+
+def test_contacts_in_reach_of_an_edge_are_named_as_what_predictions_do_not_know():
+    plan = plan_with_a_bad_grasp()
+    faces = zip(plan.grasps[1].faces, plan.grasps[1].positions, strict=True)
+    edges_m = [edge_distance(plan.body.faces[face], point) for face, point in faces]
+    moved, settings = int(np.argmin(edges_m)), sv.ExecutionSettings(0.05, trials=("weight",))
+    first, second = (
+        sv.execute(plan.body, each, 1.0, settings, enough=False) for each in plan.grasps[:2]
+    )
+    assert (first.over_edges, second.over_edges) == ((), (moved,))
+    assert f"contact {moved} is nearer to an edge" in edges_in_words(second)[0]
+
+
+def test_what_is_wrong_with_one_grasp_leaves_the_others_executed():
+    body, grasp = planned("box")
+    elsewhere = replace(grasp, faces=(*grasp.faces[1:], grasp.faces[0]))
+    jobs = [ExecutionJob(body, each, 0.5, LIGHT) for each in (elsewhere, grasp)]
+    refused, done = executed(jobs, 1)
+    assert refused.execution is None
+    assert "does not lie on face" in refused.reason
+    assert done.survived
