@@ -4,8 +4,6 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from enum import StrEnum
 
-from numpy.linalg import LinAlgError
-
 
 class GraspError(Exception):
     """Base of every error that graspproof raises on purpose."""
@@ -29,13 +27,6 @@ class NoForcesError(GraspError):
 
 class UnfaithfulError(GraspError):
     """Raised when the simulator does not reproduce statics, so it may certify nothing."""
-
-
-OWN_FAULTS = (
-    InputError, UndecidedError, SolverError, NoForcesError, ArithmeticError, LinAlgError
-)  # fmt: skip
-"""Errors that one of several grasps may raise without harm to the others: what is wrong with it, or
-with the numbers computed of it. `UnfaithfulError` is about the simulator, so about every grasp."""
 
 
 class MeshRefusal(StrEnum):

@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 59_402,
-    "modules of packages": 247,
-    "lines of tests": 39_768,
+    "lines of packages": 59_409,
+    "modules of packages": 248,
+    "lines of tests": 39_773,
     "lines of docs": 3_954,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises

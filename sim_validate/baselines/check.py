@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_core.declared import Declared, counted
-from grasp_core.errors import OWN_FAULTS, InputError
+from grasp_core.errors import InputError
 from grasp_core.figures import NONE, Shown, cell, compared
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import arithmetic, versions
@@ -34,6 +34,7 @@ from sim_validate.engine.setup import (
 from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
 from sim_validate.kit.files import AboutObject
+from sim_validate.kit.own_faults import OWN_FAULTS
 from sim_validate.kit.workers import each, processes
 
 Report = Callable[[int, int], None]

@@ -33,7 +33,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frames, stacked
-from grasp_core.errors import OWN_FAULTS, InputError, UndecidedError
+from grasp_core.errors import InputError, UndecidedError
 from grasp_core.kinds import Count, Friction, function, instance, several, value_of
 from grasp_core.objects.on_faces import (
     check_body,
@@ -76,6 +76,7 @@ from sim_validate.engine.limits_and_friction import (
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulate import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge, rotated
+from sim_validate.kit.own_faults import OWN_FAULTS
 from sim_validate.kit.workers import each, processes
 from sim_validate.settings import Noise
 

@@ -25,7 +25,7 @@ from typing import Annotated, Any
 from grasp_core.arrays import Array, Shape
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared
-from grasp_core.errors import OWN_FAULTS, GraspError, InputError, UnfaithfulError, about
+from grasp_core.errors import GraspError, InputError, UnfaithfulError, about
 from grasp_core.files.json_text import json_of
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import read_text
@@ -56,6 +56,7 @@ from sim_validate.datasets.open_dataset import mesh_path, mesh_text
 from sim_validate.datasets.parquet import Cells
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
+from sim_validate.kit.own_faults import OWN_FAULTS
 from sim_validate.planning.asked_objects import is_mesh_file
 
 NO_FRICTION = 1.0

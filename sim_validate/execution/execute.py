@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_contacts, stacked
-from grasp_core.errors import OWN_FAULTS, GraspError, InputError, NoForcesError
+from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.kinds import Range, instance, one_of, value_of
@@ -60,6 +60,7 @@ from sim_validate.execution.simulate import (
 )
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
+from sim_validate.kit.own_faults import OWN_FAULTS
 from sim_validate.kit.workers import each, processes
 from sim_validate.settings import ExecutionSettings
 

@@ -19,7 +19,7 @@ from grasp_core.arrays import Array, Shape, frozen, frozen_units
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.declared import Declared
-from grasp_core.errors import OWN_FAULTS, InputError, SolverError, about
+from grasp_core.errors import InputError, SolverError, about
 from grasp_core.figures import Shown, figures
 from grasp_core.files.file_kinds import REGIONS
 from grasp_core.files.records import FLAT, recorded
@@ -43,6 +43,7 @@ from sim_validate.kit.files import (
     remove_results,
     write_arrays,
 )
+from sim_validate.kit.own_faults import OWN_FAULTS
 from sim_validate.kit.workers import each
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import Certifying
