@@ -24,7 +24,7 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
 from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
-from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case
+from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case, untouching
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
 from sim_validate.engine.limits_and_friction import Analysis, PlannedLoad, Rig, Watched, closed_on
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
@@ -122,6 +122,8 @@ def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Rec
             f"{path}: the contacts of {grasp.id} have changed since these results were recorded; "
             "record them again"
         )
+    if verdict.not_simulated:
+        raise InputError(f"{path}: nothing was simulated of {grasp.id}: {verdict.not_simulated}")
     found = Recorded(
         grasp.id, saved.body, grasp.contacts, saved.friction, verdict.setup, verdict.agenda,
         grasp=grasp, trial=wanted.trial,
@@ -179,7 +181,9 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
     settling = [held.settling] if isinstance(held, ControlLoad) else None
     watched = rig.watch(held.load, settling)
     layout = rig.bench.scene.layout
-    overlap = clashes(recorded.body, *stacked(landed), layout.drive.radius_m) if landed else ()
+    amiss = clashes(recorded.body, *stacked(landed), layout.drive.radius_m) if landed else ()
+    if recorded.grasp is not None and recorded.trial is None:
+        amiss = amiss or untouching(rig.bench, recorded.body, recorded.grasp)
     (ended,) = rig.hold([held.load], settling)
     return Replayed(
         name=name,
@@ -187,7 +191,7 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
         predicted_limit=limits[name],
         required_friction=held.required_friction,
         friction=rig.friction,
-        hold=judge(ended, layout, recorded.setup.hold, overlap),
+        hold=judge(ended, layout, recorded.setup.hold, amiss),
         watched=watched,
         scene=rig.bench.scene,
     )

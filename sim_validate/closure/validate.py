@@ -117,11 +117,7 @@ def tested(
     layout, rig = scene.layout, closed_on(scene, setup, friction)
     loads = Analysis(body, grasp.contacts, friction, setup, None).planned(rig.idle, agenda)
     amiss = clashes(body, grasp.positions, grasp.normals, layout.drive.radius_m)
-    edges_m = [
-        edge_distance(body.faces[face], contact.position)
-        for face, contact in zip(grasp.faces, grasp.contacts, strict=True)
-    ]
-    untouched = () if amiss else misplaced(rig.bench, edges_m)
+    untouched = () if amiss else untouching(rig.bench, body, grasp)
     if untouched:  # nothing that starts like this says anything about the grasp
         agenda = replace(agenda, **NOT_STARTED)
     wrenches = held_wrenches(rig, loads, agenda, amiss or untouched)
@@ -152,6 +148,12 @@ def tested(
         gate=gate,
         scene=scene,
     )
+
+
+def untouching(bench: Bench[Scene], body: Polyhedron, grasp: Grasp) -> tuple[str, ...]:
+    """List the fingertips of a grasp that do not touch their faces at the start."""
+    faces = zip(grasp.faces, grasp.positions, strict=True)
+    return misplaced(bench, [edge_distance(body.faces[face], point) for face, point in faces])
 
 
 def _scale(body: Polyhedron, scene: Scene) -> Scale:

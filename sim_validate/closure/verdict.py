@@ -268,6 +268,13 @@ class Verdict(HoldsWrenches, InNotebooks):
         """`held`, or how the first wrench that was not held ended."""
         return self.failures[0].hold.outcome if self.failures else Outcome.HELD
 
+    @property
+    def not_simulated(self) -> str:
+        """Why no trial was simulated; empty if any was."""
+        if any(each.wrench.any() for each in self.wrenches) or not self.failures:
+            return ""
+        return self.failures[0].hold.reason
+
     @recorded
     def held(self) -> bool:
         """Whether every wrench held."""

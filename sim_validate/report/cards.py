@@ -139,7 +139,7 @@ def draw(folder: Path, card: Card) -> Drawn:
     if force_closure(found.shown, friction=drawing.friction).closed:
         drawn.wrenches = tuple(map(svg_of, wrench_panels(drawing, view)))
         drawn.margins = tuple(map(svg_of, margin_panels(drawing, largest_push(found.verdict))))
-    if found.verdict is not None:
+    if found.verdict is not None and not found.verdict.not_simulated:
         _add_motion(drawn, found, found.verdict, folder / _clip(card) if card.clip else None)
     if card.clip and found.run.executions is not None:
         _add_executed(drawn, card, found.run.executions, folder)

@@ -9,8 +9,10 @@ import sim_validate as sv
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
+from sim_validate.kit.exit_codes import Exit
+from sim_validate.main import main
 from sim_validate.settings import Noise
-from tests.sim_validate.rigs import grasps
+from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp
 
 AGENDA = Agenda(
     random_wrenches=2, wrenches=(NamedWrench("too much", [0.0, 0.0, 90.0, 0.0, 0.0, 0.0]),),
@@ -108,3 +110,16 @@ def test_closed_contacts_are_no_control(tried):
     known, _ = tried
     with pytest.raises(gc.InputError, match="are force-closed"):
         replayed(dataclasses.replace(known, control="made_up"))
+
+
+def test_a_grasp_of_which_nothing_was_simulated_is_refused_with_the_reason(tmp_path, capsys):
+    plan = plan_with_a_bad_grasp()
+    gc.save_grasps(tmp_path / "grasps.json", plan)
+    friction = str(0.999 * max(each.critical_friction for each in plan))
+    validate = ["validate", str(tmp_path / "grasps.json"), "--out", str(tmp_path), "-q"]
+    assert main([*validate, "--friction", friction]) == Exit.NEGATIVE
+    weak = max(plan, key=lambda each: each.critical_friction).id
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path), "--grasp", weak, "--out", str(tmp_path)]) == Exit.INPUT
+    assert "force closure needs friction above" in capsys.readouterr().err
+    assert main(["report", str(tmp_path), "-q"]) == Exit.GOOD
