@@ -99,6 +99,8 @@ def simulate_grasps(
         stop,
     )
     _show(found, setup, reporter)
+    if found.verdicts and all(verdict.not_simulated for verdict in found):
+        return Exit.INPUT, found  # of a friction, say, at which no grasp of the file is closed
     good = all(verdict.good for verdict in found)
     return (Exit.GOOD if good else Exit.NEGATIVE), found
 

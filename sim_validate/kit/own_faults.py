@@ -1,4 +1,4 @@
-"""Names the errors that one of several grasps may raise without harm to the others."""
+"""Names the errors that end the work on one of several grasps, and not that on the others."""
 
 from numpy.linalg import LinAlgError
 
@@ -7,5 +7,5 @@ from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedE
 OWN_FAULTS = (
     InputError, UndecidedError, SolverError, NoForcesError, ArithmeticError, LinAlgError
 )  # fmt: skip
-"""What is wrong with a grasp, or with the numbers computed of it. `UnfaithfulError` is about the
-simulator, so about every grasp."""
+"""Errors about one grasp, or about the numbers that are computed of it; its result is the reason.
+`UnfaithfulError` is about the simulator, so about every grasp."""
