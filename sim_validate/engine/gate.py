@@ -445,7 +445,7 @@ def misplaced(bench: Bench[Scene], edges_m: Sequence[float] = ()) -> tuple[str, 
     for finger in np.flatnonzero(~(turned <= NORMAL_ERROR)).tolist():
         edge = f", {1e3 * edges_m[finger]:.3g} mm from an edge of its face," if edges_m else ""
         fault = (
-            "no contact is found, because the mesh is flat only to its digits"
+            "no contact is found; the mesh, flat only to its digits, may lie deeper there"
             if math.isnan(turned[finger])
             else f"the normal of its deepest contact is off by {turned[finger]:.3g} rad (at most "
             f"{NORMAL_ERROR:g} is allowed)"
