@@ -90,6 +90,14 @@ def edge_distance(face: Face, point: Array) -> float:
     return float(np.linalg.norm(np.concatenate(nearest) - point, axis=1).min())
 
 
+def nearest_edge(body: Polyhedron, grasp: Grasp) -> float:
+    """Return the least distance of a grasp's contacts from the edges of their faces [m]."""
+    return min(
+        edge_distance(body.faces[face], contact.position)
+        for face, contact in zip(grasp.faces, grasp.contacts, strict=True)
+    )
+
+
 @lru_cache(maxsize=32)
 def face_under(body: Polyhedron, contact: Contact) -> Face | None:
     """Find the face on which a contact lies with its normal; kept, as controls repeat it."""

@@ -324,6 +324,8 @@ def outcome(motion: HeldMotion, drive: Drive, friction: Array, begun: int = 0) -
 def sticking_multiple(motion: HeldMotion, drive: Drive, friction: Array, begun: int) -> float:
     """Return the multiple of the load at which contacts that stick would reach their cones."""
     pushing, _ = _on_cone(motion.pushes, friction, begun)
+    if not pushing.any():  # the object was lost before the load came
+        return 0.0
     return _under_full_load(motion.pushes[:, pushing], drive.shares, friction[pushing], begun)
 
 

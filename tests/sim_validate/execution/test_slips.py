@@ -16,6 +16,7 @@ from sim_validate.execution.simulate import (
     HeldMotion,
     _first_slip,
     outcome,
+    sticking_multiple,
 )
 from tests.sim_validate.execution.held_rigs import box_scene
 
@@ -190,3 +191,8 @@ def test_a_slip_in_the_first_sample_of_a_load_has_a_multiple():
     forces = np.array([[[1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[1.0, 0.6, 0.0]]])
     shares = np.array([0.0, 0.0, 0.3])
     assert _first_slip(forces, shares, FRICTION[:1], 0) == 0.3
+
+
+def test_contacts_that_push_at_nothing_hold_no_multiple_of_the_load():
+    motion = motion_of(forces=np.zeros((COUNT, 4, 3)))
+    assert sticking_multiple(motion, idle(COUNT), FRICTION, 0) == 0.0

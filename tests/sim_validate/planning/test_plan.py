@@ -6,11 +6,15 @@ from itertools import count
 import pytest
 
 import grasp_core as gc
+from grasp_core.objects.on_faces import nearest_edge
 from grasp_core.stopping import Stop
+from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.planning import plan as planning
+from sim_validate.planning.plan import say_counts
 from tests.sim_validate.interrupts import interrupt_once
+from tests.sim_validate.rigs import plan_with_a_bad_grasp
 
 
 def test_a_time_limit_ends_a_plan_without_a_verdict_on_the_object(tmp_path, capsys):
@@ -82,3 +86,16 @@ def test_regions_that_there_is_time_for_are_kept(tmp_path, ends_in, capsys):
     assert "the time limit ended the proofs after 2 grasps" in capsys.readouterr().err
     regions = json.loads((tmp_path / "regions.json").read_text())
     assert (len(regions["grasps"]), regions["complete"]) == (2, False)
+
+
+def test_contacts_in_whose_dent_an_edge_lies_are_named(capsys):
+    """The second of three grasps has a contact 10 um from a corner."""
+    plan = plan_with_a_bad_grasp()
+    distances = [nearest_edge(plan.body, grasp) for grasp in plan]
+    assert 10.0 * distances[1] < 1e-4 < min(distances[0], distances[2])
+    say_counts(plan.body, plan, Reporter())
+    (said,) = [line for line in capsys.readouterr().out.splitlines() if "to an edge" in line]
+    assert said.startswith("1 grasp with contacts nearer to an edge than 135 um")
+    assert said.endswith(f": bad ({1e6 * distances[1]:.3g} um)")
+    say_counts(plan.body, plan[:1], Reporter())
+    assert "to an edge" not in capsys.readouterr().out
