@@ -166,7 +166,9 @@ def _planar_groups(
         return None
     automatic = choices.faces == "auto"
     most = MAX_FACES if automatic else choices.max_faces
-    groups = coplanar_groups(found, slack, blur=0.5 * blur, caps=found.surface.caps, most=most)
+    groups = coplanar_groups(
+        found, slack, blur=0.5 * slack, refit=blur > 0.0, caps=found.surface.caps, most=most
+    )
     if automatic and len(groups) > most:
         return None
     if len(groups) > choices.max_faces:

@@ -26,6 +26,7 @@ through semidefinite programming", 2015), with the ellipse of the polygon's seco
 
 import math
 from bisect import insort
+from collections.abc import Sequence
 from itertools import islice
 from typing import NamedTuple
 
@@ -47,7 +48,7 @@ from grasp_core.geometry.polygons import (
 )
 from grasp_core.mesh_files.limits import PatchLimits
 from grasp_core.objects.booleans import triangulate
-from grasp_core.objects.surface import NO_CAPS, Face, Mesh, Plane, border_loops, crosses_of
+from grasp_core.objects.surface import NO_CAPS, Face, Fit, Mesh, Plane, border_loops, crosses_of
 from grasp_core.solvers.ties import first_best, graded, largest_first, ranks, surpassing
 
 MAX_FACES = 200
@@ -65,13 +66,19 @@ FITS = 3
 face with rounded corners."""
 
 
+BESIDE = 4.0
+"""Distance of faces that slivers part, in distances that are in a plane."""
+LIKE = 0.99
+"""Cosine of the largest angle of planes that are compared further."""
+
+
 def planar_slack(extent: float, flatness_m: float) -> float:
     """Return the distance within which corners count as in one plane, if rounding explains some."""
     return max(PLANAR * extent, flatness_m)
 
 
 def coplanar_groups(
-    mesh: Mesh, distance: float, *, angle: float = ANGLE, blur: float = 0.0,
+    mesh: Mesh, distance: float, *, angle: float = ANGLE, blur: float = 0.0, refit: bool = False,
     caps: Indices = NO_CAPS, most: int | None = None,
 ) -> list[Indices]:  # fmt: skip
     """Group triangles that lie in one plane within the limits and connect across edges, (g,) each.
@@ -81,9 +88,9 @@ def coplanar_groups(
 
     Groups grow from the largest triangles first, whose planes are the least affected by rounding.
     Rounding may have moved one side of a triangle by `blur` against the opposite corner [m], so
-    that a triangle of this height may lean by a radian more; then the plane is fitted again to
-    what has grown. A triangle thinner than the distance limit has no meaningful normal, so only its
-    distance counts.
+    that a triangle of this height may lean by a radian more; with `refit` the plane is fitted again
+    to what has grown. A triangle thinner than the distance limit has
+    no meaningful normal, so only its distance counts.
     """
     corners, normals, areas = mesh.corners, mesh.normals, mesh.areas
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
@@ -101,11 +108,87 @@ def coplanar_groups(
         largest_first(2.0 * areas),
         lambda seed: (normals[seed], corners[seed, 0]),
         fit,
-        1 + FITS if blur else 1,
+        1 + FITS if refit else 1,
         caps,
     )
-    members = [np.sort(group) for group, _ in islice(found, None if most is None else most + 1)]
-    return sorted(members, key=lambda group: int(group[0]))
+    every = list(islice(found, None if most is None else most + 1))
+    groups = _bridged(mesh, every, fit, sliver, BESIDE * distance)
+    return sorted(map(np.sort, groups), key=lambda group: int(group[0]))
+
+
+def _bridged(
+    mesh: Mesh, found: Sequence[tuple[Indices, Plane]], fit: Fit, sliver: NDArray[np.bool_],
+    beside: float,
+) -> list[Indices]:  # fmt: skip
+    """Join groups of one plane that slivers of other groups keep apart.
+
+    A sliver fits many planes, and is in the group that grew first. Those that connect two groups of
+    one plane and `beside` each other [m] are taken from other groups, unless that would leave these
+    in pieces. A sliver that leads from one face to a distant one is no part of them.
+    """
+    across, corners = mesh.across, mesh.corners
+    groups: list[Indices] = [group for group, _ in found]
+    owner: Indices = np.full(len(sliver), -1, dtype=np.int64)
+    for place, group in enumerate(groups):
+        owner[group] = place
+    thin = np.flatnonzero(sliver & (owner >= 0))
+    if not len(thin):
+        return groups
+    normals = np.array([normal for _, (normal, _) in found])
+    for place, (_, plane) in enumerate(found):
+        likely = np.flatnonzero(normals[place + 1 :] @ plane[0] > LIKE) + place + 1
+        alike = [
+            other for other in likely.tolist()
+            if len(groups[other]) and len(groups[place]) and fit(groups[other], plane).all()
+            and _apart(corners[groups[place]], corners[groups[other]]) <= beside
+        ]  # fmt: skip
+        if not alike:
+            continue
+        own = np.concatenate([groups[place], *(groups[other] for other in alike)])
+        reached = _connected(across, np.union1d(own, thin[fit(thin, plane)]), groups[place][0])
+        joined = [other for other in alike if groups[other][0] in reached]
+        whole = _without_ends(across, reached, ~np.isin(owner[reached], [place, *joined]))
+        left = {
+            other: np.setdiff1d(groups[other], whole)
+            for other in map(int, np.setdiff1d(owner[whole], [place, *joined]))
+        }  # fmt: skip
+        if joined and all(
+            len(_connected(across, rest, *rest[:1])) == len(rest) for rest in left.values()
+        ):
+            groups = [
+                whole if at == place else left.get(at, group[: 0 if at in joined else None])
+                for at, group in enumerate(groups)
+            ]
+            owner[whole] = place
+    return [group for group in groups if len(group)]
+
+
+def _apart(some: Array, others: Array) -> float:
+    """Return how far corners of triangles (s, 3, 3), (o, 3, 3) are from edges of the others."""
+    gaps = list[float]()
+    for one, two in ((some, others), (others, some)):
+        heads = np.roll(two, -1, axis=1)
+        for point in one.reshape(-1, 3):
+            nearest = nearest_on_segments(two, heads, point)
+            gaps.append(float(np.linalg.norm(nearest - point, axis=-1).min()))
+    return min(gaps)
+
+
+def _connected(across: Indices, members: Indices, *first: int) -> Indices:
+    """Return the triangles among sorted members that connect with a first one, sorted."""
+    reached = np.array(first, dtype=np.int64)
+    while len(more := np.setdiff1d(np.intersect1d(across[reached], members), reached)):
+        reached = np.union1d(reached, more)
+    return reached
+
+
+def _without_ends(across: Indices, members: Indices, loose: NDArray[np.bool_]) -> Indices:
+    """Drop loose triangles that do not lie between two others, again and again."""
+    while True:
+        ends = loose & (np.isin(across[members], members).sum(axis=1) < 2)  # noqa: PLR2004
+        if not ends.any():
+            return members
+        members, loose = members[~ends], loose[~ends]
 
 
 def planar_face(mesh: Mesh, group: Indices, slack: float) -> Face:

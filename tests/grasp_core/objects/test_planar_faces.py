@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import grasp_core as gc
 from grasp_core.objects.booleans import hull
 from grasp_core.objects.planar_faces import coplanar_groups, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
@@ -48,6 +49,18 @@ def test_a_shallow_roof_is_one_face_only_within_both_limits(limits, roof_faces):
     corners = [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (-0.3, 0.0)]
     solid = hull([*corners, *ridge])
     assert len(coplanar_groups(solid, **limits)) == 5 + roof_faces
+
+
+def test_a_thin_triangle_that_rounding_tilts_parts_no_face():
+    """It is 2e-6 of the extent high, and its corner is 1e-8 above the top of a box."""
+    corners = [[x, y, z] for z in (0.0, 0.1) for x, y in ((0, 0), (0.1, 0), (0.1, 0.1), (0, 0.1))]
+    thin = [[0.02, 0.05, 0.1], [0.08, 0.05, 0.1], [0.05, 0.05 + 2e-7, 0.1 + 1e-9]]
+    walls = [[0, 2, 1], [0, 3, 2]]
+    for i, j in ((0, 1), (1, 2), (2, 3), (3, 0)):
+        walls += [[i, j, 4 + j], [i, 4 + j, 4 + i]]
+    top = [[4, 5, 9], [4, 9, 8], [4, 8, 7], [5, 6, 9], [7, 8, 10], [7, 10, 6], [10, 9, 6]]
+    body = gc.Polyhedron.from_mesh([*corners, *thin], [*walls, *top, [8, 9, 10]])
+    assert len(body.faces) == 6
 
 
 def test_a_face_with_a_hole_is_tiled_by_convex_pieces():

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
@@ -165,3 +166,19 @@ def test_files_of_every_kind_give_the_same_solid(tmp_path):
     assert {len(body.faces) for body in bodies} == {8}
     assert {round(1e9 * body.volume, 6) for body in bodies} == {40000.0}
     assert len({body.content_sha256 for body in bodies}) == 1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_flush_walls_of_turned_parts_are_one_face(seed):
+    """Rounding makes slivers between walls in one plane, which belong to the faces beside them."""
+    parts = [
+        trimesh.creation.box(bounds=bounds)
+        for bounds in ([[0, 0, 0], [60, 20, 30]], [[0, 20, 0], [20, 60, 30]])
+    ]
+    both = trimesh.util.concatenate(parts)
+    turn = Rotation.from_rotvec(np.random.default_rng(seed).normal(size=3))
+    soup = turn.apply(both.vertices)[both.faces].reshape(-1, 3).astype(np.float32) / 1000.0
+    body = gc.Polyhedron.from_mesh(soup, np.arange(len(soup)).reshape(-1, 3))
+    assert len(body.faces) == 8
+    assert body.volume == pytest.approx(60e-6, rel=1e-5)
+    assert sum(face.area for face in body.faces) == pytest.approx(11_200e-6, rel=1e-5)
