@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 59_546,
+    "lines of packages": 59_544,
     "modules of packages": 248,
-    "lines of tests": 39_841,
+    "lines of tests": 39_856,
     "lines of docs": 3_954,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
@@ -27,11 +27,11 @@ RISES = (
     "lines of packages, 57,150 to 57,757, modules, 240 to 242: a proved chance of closure where"
     " the object, the fingers and friction are off",
     "lines of packages, 57,757 to 57,764: a flatness as wide as the object",
-    "lines of packages, 57,764 to 59,546, modules, 242 to 247: searches that end in time with"
+    "lines of packages, 57,764 to 59,544, modules, 242 to 247: searches that end in time with"
     " what is found, tiny parts, parts that touch, voids, limits that are attained, hands as"
     " published, soft fingertips in analyses, one list of the kinds of files, grasps that fail"
     " alone",
-    "lines of tests, 37,965 to 39,841: a test for each of these faults",
+    "lines of tests, 37,965 to 39,856: a test for each of these faults",
     "lines of docs, 3,904 to 3,954: what is new in files, flags and meshes",
     "lines of docs, 3,896 to 3,904: the same chance, and how well it was measured to hold",
     "lines of tests, 37,927 to 37,965: forged landings, rounded faces, and harmless errors",

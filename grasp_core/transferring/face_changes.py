@@ -46,7 +46,7 @@ from grasp_core.arrays import Array, cross
 from grasp_core.declared import Declared, counted
 from grasp_core.files.records import Key
 from grasp_core.kinds import FaceTurn, Vector, number, value_of
-from grasp_core.objects.on_faces import ON_FACE, nearest_on_triangles
+from grasp_core.objects.on_faces import nearest_on_triangles, on_face_slack
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.planning.given_contacts import fan
@@ -60,9 +60,6 @@ WIDEST_DEG = 45.0
 SAME = 1e-9
 """Difference of distances, relative to the old part's radius, and of angles [rad] that is rounding:
 a face that has moved by exactly the allowed distance is still near enough."""
-MOVED = ON_FACE
-"""Least distance that counts as moved, relative to the old part's radius: files that keep six
-digits stay within it."""
 TURNED = 1e-4
 """Least angle that counts as turned [rad]: six digits turn a face by no more unless it is narrower
 than a hundredth of the part."""
@@ -178,11 +175,12 @@ def face_changes(old: Polyhedron, new: Polyhedron, rule: Likeness) -> tuple[Face
     near = [_successor(face, new, every, rule, rule.reach) for face in old.faces]
     free = sorted({*every} - {*near})
     changes: list[FaceChange] = []
+    slack = max(on_face_slack(old), on_face_slack(new))  # less than this is no motion
     for index, (face, successor) in enumerate(zip(old.faces, near, strict=True)):
         found = successor
         if found is None and (found := _successor(face, new, free, rule, math.inf)) is not None:
             free.remove(found)
-        changes.append(_change(index, face, found, new, old.radius))
+        changes.append(_change(index, face, found, new, slack))
     wide = replace(rule, angle=math.radians(WIDEST_DEG))
     for index, change in enumerate(changes):
         face = old.faces[index]
@@ -228,7 +226,7 @@ def _successor(
 
 
 def _change(
-    index: int, face: Face, successor: int | None, new: Polyhedron, size: float
+    index: int, face: Face, successor: int | None, new: Polyhedron, slack: float
 ) -> FaceChange:
     (x, y, z), (a, b, c) = face.normal.tolist(), face.centroid.tolist()
     normal, center = (x, y, z), (a, b, c)
@@ -239,7 +237,7 @@ def _change(
     # (1), positive outwards
     distance = float(now.normal @ (face.centroid - now.centroid)) / along
     turn = turn_of(face.normal, now.normal)
-    moved = abs(distance) > MOVED * size or turn > TURNED
+    moved = abs(distance) > slack or turn > TURNED
     return FaceChange(index, successor, distance, turn, face.area, now.area, moved, normal, center)
 
 

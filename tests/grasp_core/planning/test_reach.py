@@ -145,9 +145,11 @@ def test_the_patch_that_is_touched_is_not_in_the_way_but_the_rest_is():
 
 def test_corners_that_rounding_lifts_are_not_in_the_way_of_fingers():
     """Coordinates of six decimals move faces of one plane by more than a millionth."""
-    exact = example_object("random-8-3")
-    rounded = gc.Polyhedron.from_mesh(exact.vertices.round(6), exact.triangles, flatness_m=4e-6)
-    finger = Finger(radius_m=0.005, approach_m=0.05)
+    large = example_object("random-8-3")
+    points, triangles = 0.2 * large.vertices, large.triangles
+    exact = gc.Polyhedron.from_mesh(points, triangles)
+    rounded = gc.Polyhedron.from_mesh(points.round(6), triangles, flatness_m=4e-6)
+    finger = Finger(radius_m=0.001, approach_m=0.01)
     counts = [
         len(gc.plan(body, 0.5, families="concurrent", finger=finger)) for body in (exact, rounded)
     ]

@@ -10,6 +10,7 @@ import trimesh
 import grasp_core as gc
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
+from grasp_core.transferring.face_changes import face_changes, likeness
 from grasp_core.transferring.transfer import FRICTION_BAND, QUALITY_BAND, compared
 from scenes.example_objects import example_object
 from tests.changed_parts import (
@@ -276,3 +277,15 @@ def test_bands_are_where_they_are_said_to_be():
     assert status(0.2 + far * step) == status(quality=0.1 - far * share) == "worse"
     assert status(0.2 - far * step) == status(quality=0.1 + far * share) == "better"
     assert status(0.2 - 2.0 * step, 0.1 - 2.0 * share) == "worse"
+
+
+def test_a_part_written_with_six_decimals_has_not_moved():
+    """Its coordinates are rounded by far more than a millionth of its size."""
+    large = example_object("random-8-3")
+    points, triangles = 0.2 * large.vertices, large.triangles
+    exact = gc.Polyhedron.from_mesh(points, triangles)
+    rounded = gc.Polyhedron.from_mesh(points.round(6), triangles, flatness_m=4e-6)
+    changes = face_changes(exact, rounded, likeness(exact, None, 10.0))
+    assert max(abs(change.distance) for change in changes) > 1e-6 * exact.radius
+    assert [change.new for change in changes] == list(range(len(exact.faces)))
+    assert not any(change.moved for change in changes)
