@@ -9,13 +9,16 @@ subclasses of arrays may hide entries.
 
 import math
 from dataclasses import dataclass
+from itertools import chain
 from typing import Annotated, Any, TypeAlias, cast
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import ArrayLike, NDArray
+from pydantic_core import CoreSchema, core_schema
 
 from grasp_core.errors import InputError
-from grasp_core.kinds import LARGEST_FRICTION, MOST_COUNT, Range, UnfitError, shown
+from grasp_core.kinds import LARGEST_FRICTION, MOST_COUNT, UnfitError, shown
 
 Array: TypeAlias = NDArray[np.float64]
 """Float array of any shape; the docstring of each value or argument gives its shape."""
@@ -88,7 +91,7 @@ class Shape:
 
     def take(self, value: Any) -> NDArray[Any]:
         """Return a read-only copy of a value, or itself if it is read-only and owns its entries."""
-        if self._fits(value):
+        if self.fits(value):
             array = value if value.base is None and not value.flags.writeable else np.array(value)
             array.setflags(write=False)
         else:
@@ -99,7 +102,11 @@ class Shape:
                 array = make(value, self._lengths, "")
             except InputError as error:
                 raise UnfitError(str(error).strip()) from None
-        self._check_ends(array)
+        if not self.in_range(array):
+            raise UnfitError(
+                f"must hold numbers from {self.least:g} to {self.most:g}, got "
+                f"{float(array.min()):.6g} to {float(array.max()):.6g}"
+            )
         return array
 
     def _with_nan(self, value: Any) -> Array:
@@ -114,14 +121,45 @@ class Shape:
         array.setflags(write=False)
         return array
 
-    def exact(self, value: Any) -> NDArray[Any]:
-        """Return an array that is of this shape and type already."""
-        if not self._fits(value):
-            raise UnfitError
-        self._check_ends(value)
+    def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:
+        """Take arrays with `take`, and write them as lists in which null stands for NaN."""
+        written = core_schema.plain_serializer_function_ser_schema(self._listed)
+        return core_schema.with_info_plain_validator_function(self._given, serialization=written)
+
+    def __get_pydantic_json_schema__(self, *_: Any) -> dict[str, Any]:
+        """Return the JSON schema of nested lists."""
+        entry: dict[str, Any] = {"type": "integer" if self.whole else "number"}
+        free = self.least == -LARGEST_ENTRY and self.most == LARGEST_ENTRY
+        entry |= {} if free else {"minimum": self.least, "maximum": self.most}
+        entry = {"anyOf": [entry, {"type": "null"}]} if self.nan else entry
+        for length in reversed(self.shape):
+            fixed = isinstance(length, int)
+            entry = {"type": "array", "items": entry}
+            entry |= {"minItems": length, "maxItems": length} if fixed else {}
+        return entry
+
+    def _given(self, value: Any, info: core_schema.ValidationInfo[Any]) -> NDArray[Any]:
+        return self.take(self._of_lists(value) if info.context else value)
+
+    def _of_lists(self, value: Any) -> Any:
+        """Refuse true and false in a file, which arrays would take for 1 and 0."""
+        if isinstance(value, list) and not value and not isinstance(self.shape[0], int):
+            return np.empty((0, *(size for size in self.shape[1:] if isinstance(size, int))))
+        items: list[Any] = [value]
+        while set(map(type, items)) == {list}:
+            items = [*chain.from_iterable(items)]
+        if any(isinstance(item, bool) for item in items):
+            raise UnfitError("must hold numbers, got true or false among them")
         return value
 
-    def _fits(self, value: Any) -> bool:
+    def _listed(self, array: NDArray[Any]) -> Any:
+        if not self.nan:
+            return array.tolist()
+        whole = array.astype(object)
+        whole[np.isnan(array)] = None
+        return whole.tolist()
+
+    def fits(self, value: Any) -> bool:
         """Return whether a value is an array of this shape and type, with entries as must be."""
         if type(value) is not np.ndarray or value.dtype != (np.int64 if self.whole else np.float64):
             return False
@@ -137,13 +175,10 @@ class Shape:
         lengths = np.sqrt((array * array).sum(axis=-1))
         return bool((np.abs(lengths - 1.0) <= self.slack).all())
 
-    def _check_ends(self, array: NDArray[Any]) -> None:
+    def in_range(self, array: NDArray[Any]) -> bool:
+        """Return whether all entries are from `least` to `most`."""
         free = self.least == -LARGEST_ENTRY and self.most == LARGEST_ENTRY
-        if not free and array.size and not self.least <= array.min() <= array.max() <= self.most:
-            raise UnfitError(
-                f"must hold numbers from {self.least:g} to {self.most:g}, got "
-                f"{float(array.min()):.6g} to {float(array.max()):.6g}"
-            )
+        return free or not array.size or self.least <= array.min() <= array.max() <= self.most
 
     def __str__(self) -> str:
         """Return the shape in words."""
@@ -172,9 +207,9 @@ Frictions = Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
 """A Coulomb coefficient for each of k contacts, (k,)."""
 Polygon = Annotated[Array, Shape(None, 3)]
 """Any number of points in space, (n, 3) [m], such as the corners of a polygon in order."""
-Figure = Annotated[float, Range(least=-LARGEST_ENTRY, most=LARGEST_ENTRY)]
+Figure = Annotated[float, Interval(ge=-LARGEST_ENTRY, le=LARGEST_ENTRY)]
 """A number that a proof may square."""
-Amount = Annotated[float, Range(least=0.0, most=LARGEST_ENTRY)]
+Amount = Annotated[float, Interval(ge=0.0, le=LARGEST_ENTRY)]
 """How much there is of something, that a proof may square."""
 Triangles = Annotated[Indices, Shape(None, 3, whole=True)]
 """Places of the corners of triangles among points, (t, 3)."""
@@ -267,11 +302,8 @@ def rounded(value: float) -> float:
 
 def is_array(value: Any, *shape: int | None, **rules: Any) -> bool:
     """Return whether a value is an array as it must be by the rules of `Shape`."""
-    try:
-        Shape(*shape, **rules).exact(value)
-    except UnfitError:
-        return False
-    return True
+    wanted = Shape(*shape, **rules)
+    return wanted.fits(value) and wanted.in_range(value)
 
 
 def _has_shape(array: NDArray[Any], shape: tuple[int | None, ...]) -> bool:

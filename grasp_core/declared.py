@@ -1,28 +1,40 @@
-"""Declares frozen values once: fields with their kinds, checked, compared and shown by them.
+"""Declares frozen values once: dataclasses of pydantic that are compared and shown by their fields.
 
-    @dataclass(frozen=True, slots=True, eq=False, repr=False)
+    @declared
     class Contact(Declared):
         position: Point
         \"\"\"Point on the surface [m].\"\"\"
         normal: UnitVector
         \"\"\"Unit vector into the object.\"\"\"
 
-The constructor checks each field by its kind (see `kinds`) and keeps it in plain form: arrays
+The constructor checks each field by its type (see `kinds`) and keeps it in plain form: arrays
 copied and read-only. Two values are equal if they are of one class and all their fields are equal:
 arrays entry by entry, tuples and mappings item by item, numbers exactly; two NaN count as equal, so
 that a copy equals its original. Fields that are declared with `compare=False` do not count.
-`is_sound` checks a value again that may come from anywhere. Nothing that is slow to import is
-imported here, since command-line help waits for it.
+`is_sound` checks a value again that may come from anywhere.
 """
 
 from collections.abc import Callable, Mapping, Sized
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, field, fields
 from functools import cache
 from textwrap import shorten
-from typing import Annotated, Any, NamedTuple, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    TypeVar,
+    cast,
+    dataclass_transform,
+    get_type_hints,
+    overload,
+)
+
+from pydantic import ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic.dataclasses import dataclass
+from pydantic_core import CoreSchema, core_schema
 
 from grasp_core.errors import InputError
-from grasp_core.kinds import FieldError, Take, UnfitError, misfit, shown, takes
+from grasp_core.kinds import FLAT, FieldError, bare, input_error, rules, shown, strictly
 
 HASHED = (str, int, bool)
 """Classes of the fields that a hash is made from."""
@@ -40,14 +52,6 @@ Draw = Callable[[Any], str | None]
 """A function that returns the HTML of a value, or None where it has no picture of it."""
 _DRAWN_WITH: list[Draw] = []
 """The function that was handed over, or none."""
-
-
-class Checks(NamedTuple):
-    """How the fields of a class are checked."""
-
-    takers: tuple[tuple[str, Take], ...]
-    lettered: tuple[tuple[str, tuple[Any, ...]], ...]
-    """Names of arrays some of whose lengths have a letter, and their shapes."""
 
 
 class ByValue:
@@ -75,15 +79,49 @@ class ByValue:
         parts = (f"{name}={_size(getattr(self, name))}" for name in told)
         return shorten(f"{type(self).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
 
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Take only instances of the class."""
+        return core_schema.is_instance_schema(cls)
 
-class Declared(ByValue):
-    """Base of frozen dataclasses whose fields are checked against their kinds."""
+
+class InOurWords(type):
+    """Class of the classes of values: it words what pydantic says of a constructor's arguments."""
+
+    if not TYPE_CHECKING:
+
+        def __call__(cls, *args, **kwargs):  # noqa: ANN002, ANN003, ANN204, D102
+            try:
+                return super().__call__(*args, **kwargs)
+            except ValidationError as error:
+                fault = input_error(cls, error)
+            if isinstance(fault, FieldError):
+                fault.owner = cls
+            raise fault
+
+
+class Declared(ByValue, metaclass=InOurWords):
+    """Base of frozen dataclasses whose fields pydantic checks against their types."""
 
     __slots__ = ()
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(
+        extra="forbid",
+        defer_build=True,  # most commands make values of few classes
+        allow_inf_nan=False,
+        arbitrary_types_allowed=True,
+        validate_by_name=True,
+        validate_by_alias=False,  # names in Python, aliases in files
+        serialize_by_alias=True,
+    )
 
     def __post_init__(self) -> None:
-        check(self)
-        self._check_together()
+        try:
+            check_letters(self)
+            self._check_together()
+        except InputError as error:
+            raise ValueError(error) from error  # so that pydantic adds its place
 
     def _check_together(self) -> None:
         """Refuse fields that do not fit each other; classes replace it where some may not."""
@@ -91,39 +129,69 @@ class Declared(ByValue):
     def is_sound(self) -> bool:
         """Return whether every field is as the constructor would keep it, whoever set it."""
         try:
-            for name, take in checks_of(type(self), exact=True).takers:
-                take(getattr(self, name))
-            check_letters(self)
-            self._check_together()
-        except (UnfitError, InputError, AttributeError):
+            given = {name: getattr(self, name) for name in types(type(self))}
+            kept = type(self)(**given)
+        except (InputError, AttributeError):
             return False
-        return self._is_consistent()
+        same = all(_is_kept(getattr(kept, name), value) for name, value in given.items())
+        return same and self._is_consistent()
 
     def _is_consistent(self) -> bool:
         """Return whether sound fields fit each other as proofs need, beyond `_check_together`."""
         return True
 
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Take no text for numbers, and take keys of flat parts from among the record's own."""
+        made = handler(source)
+        own = handler.resolve_ref_schema(made)
+        strictly(own["schema"])
+        flat = flat_parts(cls)
+        if not flat:
+            return made
+        own["serialization"] = core_schema.wrap_serializer_function_ser_schema(
+            lambda value, write: _flattened(write(value), flat)
+        )
+        return core_schema.with_info_before_validator_function(
+            lambda value, info: _nested(value, flat) if info.context else value, made
+        )
 
-def check(value: object) -> None:
-    """Check all fields of a dataclass against their kinds, and keep them in plain form."""
-    kind = type(value)
-    for name, take in checks_of(kind).takers:
-        given = getattr(value, name)
-        try:
-            plain = take(given)
-        except UnfitError as fault:
-            error = misfit(types(kind)[name], given, name, fault)
-            error.owner = kind
-            raise error from None
-        if plain is not given:
-            object.__setattr__(value, name, plain)
-    check_letters(value)
+
+def _flattened(found: dict[str, Any], flat: Mapping[str, type]) -> dict[str, Any]:
+    """Move the keys of flat parts among those of the record."""
+    plain: dict[str, Any] = {}
+    for name, value in found.items():
+        plain |= (value or {}) if name in flat else {name: value}
+    return plain
+
+
+def _nested(found: Any, flat: Mapping[str, type]) -> Any:
+    """Give each flat part all keys of the record; a part of which there are none is None."""
+    if not isinstance(found, dict):
+        return found
+    given, nested = cast("dict[str, Any]", found), dict[str, Any]()
+    for name, kind in flat.items():
+        infos: Mapping[str, Any] = cast("Any", kind).__pydantic_fields__
+        some = any((info.alias or key) in given for key, info in infos.items())
+        nested[name] = given if some else None
+    return given | nested
+
+
+@overload
+def declared(kind: type[Item], /) -> type[Item]: ...
+@overload
+def declared(*, slots: bool = True) -> Callable[[type[Item]], type[Item]]: ...
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def declared(kind: Any = None, /, *, slots: bool = True) -> Any:
+    """Make a subclass of `Declared` a frozen dataclass of pydantic."""
+    made = dataclass(frozen=True, slots=slots, eq=False, repr=False)
+    return made if kind is None else made(kind)
 
 
 def check_letters(value: object) -> None:
     """Refuse arrays whose lengths differ where their shapes say the same letter."""
     sizes: dict[str, tuple[int, str]] = {}
-    for name, shape in checks_of(type(value)).lettered:
+    for name, shape in _lettered(type(value)):
         array = getattr(value, name)
         for letter, size in zip(shape, getattr(array, "shape", ()), strict=False):
             if isinstance(letter, str):
@@ -134,29 +202,24 @@ def check_letters(value: object) -> None:
 
 
 @cache
+def _lettered(kind: type) -> tuple[tuple[str, tuple[Any, ...]], ...]:
+    """Return the names of arrays some of whose lengths have a letter, and their shapes."""
+    shapes = ((name, getattr(rule, "shape", ()))
+              for name, each in types(kind).items() for rule in rules(each))  # fmt: skip
+    return tuple((name, shape) for name, shape in shapes if any(isinstance(n, str) for n in shape))
+
+
+@cache
 def types(kind: type) -> Mapping[str, Any]:
-    """Return the kinds of a dataclass's fields, with their rules."""
+    """Return the types of a dataclass's fields, with their rules."""
     hints = get_type_hints(kind, include_extras=True)
     return {each.name: hints[each.name] for each in fields(cast("Any", kind)) if each.init}
 
 
 @cache
-def checks_of(kind: type, *, exact: bool = False) -> Checks:
-    """Return how the fields of a class are checked."""
-    takers = tuple((name, takes(each, exact=exact)) for name, each in types(kind).items())
-    shapes = ((name, getattr(rule, "shape", ()))
-              for name, each in types(kind).items() for rule in rules(each))  # fmt: skip
-    lettered = tuple(
-        (name, shape) for name, shape in shapes if any(isinstance(n, str) for n in shape)
-    )
-    return Checks(takers, lettered)
-
-
-def rules(kind: Any) -> tuple[Any, ...]:
-    """Return the rules that narrow a kind, or one that may be None instead."""
-    if get_origin(kind) is Annotated:
-        return get_args(kind)[1:]
-    return tuple(rule for part in get_args(kind) for rule in rules(part))
+def flat_parts(kind: type) -> Mapping[str, type]:
+    """Return the classes of the parts whose keys stand among those of the record, by name."""
+    return {name: bare(each) for name, each in types(kind).items() if FLAT in rules(each)}
 
 
 def default_of(each: Field[Any]) -> Any:
@@ -184,6 +247,24 @@ def kept(value: object, name: str) -> Any:
         return object.__getattribute__(value, name)
     except AttributeError:
         return None
+
+
+def _is_kept(kept: Any, value: Any) -> bool:
+    """Return whether a value is what the constructor keeps of it, and not only equal to that."""
+    if isinstance(kept, Declared):
+        return kept is value and kept.is_sound()
+    if _is_array(kept):
+        return type(value) is type(kept) and value.dtype == kept.dtype and _same(kept, value)
+    if isinstance(kept, tuple):
+        items = cast("tuple[Any, ...]", kept)
+        return (isinstance(value, tuple) and len(items) == len(cast("Any", value))
+                and all(map(_is_kept, items, cast("Any", value))))  # fmt: skip
+    if isinstance(kept, Mapping):
+        table, given = cast("Mapping[Any, Any]", kept), cast("Mapping[Any, Any]", value)
+        return (isinstance(value, Mapping) and table.keys() == given.keys()
+                and all(_is_kept(table[key], given[key]) for key in table))  # fmt: skip
+    plain = (float, int) if isinstance(kept, float) else type(kept)
+    return isinstance(value, plain) and _same(kept, value)
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -18,8 +18,8 @@ from enum import Enum
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar, cast
 
-from grasp_core.declared import Declared, rules, types
-from grasp_core.files.records import entries, property_kinds
+from grasp_core.declared import Declared, declared, rules, types
+from grasp_core.files.records import entries, returned
 from grasp_core.kinds import inside
 
 Own = TypeVar("Own", bound="Kept")
@@ -138,10 +138,11 @@ def compared(kind: type) -> tuple[Figure, ...]:
 
 def _marked(kind: type, *marks: type[Shown | Compared]) -> Iterator[Figure]:
     """Yield the figures whose kinds carry one of some marks, those of flat parts among them."""
-    own, properties = entries(kind)
     said = meanings(kind)
-    listed = [(each.name, each.kind, each.flat) for each in (*own, *properties)]
-    listed += [(name, each, None) for name, each in property_kinds(kind, figure).items()]
+    listed = [(each.name, each.kind, each.flat) for each in entries(kind)]
+    members = {name: each for base in reversed(kind.__mro__) for name, each in vars(base).items()}
+    listed += [(name, returned(kind, name), None)
+               for name, each in members.items() if isinstance(each, figure)]  # fmt: skip
     for name, own_kind, flat in listed:
         if flat is not None:
             for one in _marked(flat, *marks):
@@ -190,7 +191,7 @@ def keeps(listed: Iterable[Figure], digits: int | None = None) -> Callable[[type
         own.FIGURES, own.DIGITS = {each.name: each for each in listed}, digits
         kinds = {name: each.kind for name, each in own.FIGURES.items()}
         own.__annotations__ = {**inspect.get_annotations(own), **kinds}
-        return dataclass(frozen=True, slots=True, eq=False, repr=False)(own)
+        return declared(own)
 
     return made
 
@@ -230,9 +231,8 @@ def table(records: Iterable[object], kind: type) -> tuple[Sequence[str], list[tu
 
 def scalars(record: object) -> Mapping[str, Any]:
     """Return the plain entries of a record and its flat parts: numbers, words, numbers of items."""
-    own, properties = entries(type(record))
     found: dict[str, Any] = {}
-    for each in (*own, *properties):
+    for each in entries(type(record)):
         value = getattr(record, each.name)
         if each.flat is not None:
             found |= {} if value is None else scalars(value)

@@ -1,15 +1,12 @@
-"""Tells which values an argument or a field may hold: by the kinds of types, and in their words.
+"""Tells which values an argument or a field may hold, as types that pydantic checks.
 
-Kinds are float, int, bool, str, `Path`, `Literal`, enumerations, tuples, mappings, other classes,
-and each of them or None. `Annotated` narrows a kind by rules: `Annotated[float, Range(least=0.0)]`.
-A rule tells whether a value `holds` and, as text, what it asks for; a rule that can `take` does all
-of it, such as `grasp_core.arrays.Shape`. Single values that users pass are checked by `value_of`,
-the fields of frozen dataclasses in `declared`. Nothing that is slow to import is imported here,
-since command-line help waits for it.
+`Annotated` narrows a type: `Annotated[float, Interval(ge=0.0)]`. Fields of values are checked by
+`declared`, single values that users pass by `value_of`. Numbers of numpy count as numbers, text and
+truth values do not; a number is finite unless its interval ends at infinity.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sized
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -17,6 +14,10 @@ from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
+
+from annotated_types import Interval, Len
+from pydantic import AfterValidator, ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationError
+from pydantic_core import CoreSchema, core_schema
 
 from grasp_core.errors import InputError
 
@@ -36,14 +37,12 @@ HUGE = 10**100
 """Whole numbers above this are shown by their size: Python does not write the largest ones."""
 SHOWN = 60
 """Largest number of characters of a refused value that a message shows."""
-
-
-Take = Callable[[Any], Any]
-"""A function that returns a value in the plain form of a kind; `UnfitError` if it is not of it."""
+FLAT = "flat"
+"""Mark in the type of a field that is a record, whose keys stand among those of the outer one."""
 
 
 class UnfitError(ValueError):
-    """Error for a value that is not of a kind; its text says why, where the kind's words do not."""
+    """Error of a rule for a value; its text says what the value must be."""
 
 
 class FieldError(InputError):
@@ -61,85 +60,27 @@ class FieldError(InputError):
         return f"{self.name} {self.fault}"
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
-    """Ends of a range of numbers; without an upper end numbers must be finite."""
-
-    above: float | None = None
-    least: float | None = None
-    below: float | None = None
-    most: float | None = None
-    where: str = ""  # what the ends are, for messages that name them
-
-    def holds(self, value: float) -> bool:
-        """Return whether a number is in the range."""
-        inside = math.isfinite(value) if self.most is None else value <= self.most
-        return (
-            inside
-            and (self.above is None or value > self.above)
-            and (self.least is None or value >= self.least)
-            and (self.below is None or value < self.below)
+def nonzero(value: tuple[float, ...]) -> tuple[float, ...]:
+    """Refuse a vector whose largest part is implausibly small or large, such as a zero vector."""
+    if not SMALLEST <= max(map(abs, value)) <= LARGEST:
+        raise UnfitError(
+            f"must be numbers that are not all zero: the largest is from {SMALLEST:g} to "
+            f"{LARGEST:g} in size, got {shown(value)}"
         )
-
-    def __str__(self) -> str:
-        """Return the ends in words."""
-        words = {"above": "above", "least": "from", "below": "below", "most": "up to"}
-        ends = {word: getattr(self, name) for name, word in words.items()}
-        said = " ".join(f"{word} {end:g}" for word, end in ends.items()
-                        if end is not None and not math.isinf(end))  # fmt: skip
-        return said + self.where
+    return value
 
 
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """Endings of a path's name, in upper or lower case."""
+def ending(*endings: str) -> AfterValidator:
+    """Return the rule that a path's name has one of some endings, in upper or lower case."""
 
-    endings: tuple[str, ...]
+    def check(value: Path) -> Path:
+        if value.suffix.lower() not in endings:
+            raise UnfitError(
+                f"must be a path that ends in {' or '.join(endings)}, got {shown(str(value))}"
+            )
+        return value
 
-    def holds(self, value: Path) -> bool:
-        """Return whether a path has one of the endings."""
-        return value.suffix.lower() in self.endings
-
-    def __str__(self) -> str:
-        """Return the endings in words."""
-        return f"that ends in {' or '.join(self.endings)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Size:
-    """Range of the largest part of a vector in size, so that it is no zero vector."""
-
-    least: float = SMALLEST
-    most: float = LARGEST
-
-    def holds(self, value: tuple[float, ...]) -> bool:
-        """Return whether the largest part is in the range."""
-        return self.least <= max(map(abs, value)) <= self.most
-
-    def __str__(self) -> str:
-        """Return the range in words."""
-        return f"that are not all zero: the largest is from {self.least:g} to {self.most:g} in size"
-
-
-@dataclass(frozen=True, slots=True)
-class Many:
-    """Range of the number of items of a sequence."""
-
-    least: int = 1
-    most: int = MOST_COUNT
-
-    def holds(self, value: Sized) -> bool:
-        """Return whether a sequence has neither fewer nor more items."""
-        return self.least <= len(value) <= self.most
-
-    def __str__(self) -> str:
-        """Return the range in words."""
-        return f"(at least {self.least}, at most {self.most})"
-
-    def fault(self, value: Sized) -> str:
-        """Return in words why a sequence has too few or too many items."""
-        most = f" and at most {self.most}" if self.most < MOST_COUNT else ""
-        return f"must have a length of at least {self.least}{most}, got {len(value)}"
+    return AfterValidator(check)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,46 +89,61 @@ class Null:
 
     value: float
 
-    def holds(self, _value: float) -> bool:
-        """Return True: any number may be there."""
-        return True
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Take null for the number, where a file says it, and write null for it."""
+        inner = handler(source)
+        inner["allow_inf_nan"] = True
 
-    def __str__(self) -> str:
-        """Return in words which number may be there besides finite ones."""
-        return f"or {self.value}"
+        def take(value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
+            if value is None and info.context:
+                return self.value
+            odd = isinstance(value, float) and not math.isfinite(value)
+            if odd and math.isnan(value) != math.isnan(self.value):
+                raise UnfitError(f"must be a number, got {value}")
+            return value
+
+        return core_schema.with_info_before_validator_function(
+            take,
+            inner,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda value: value if math.isfinite(value) else None
+            ),
+        )
 
 
-Quantity = Annotated[float, Range(least=SMALLEST, most=LARGEST)]
+Quantity = Annotated[float, Interval(ge=SMALLEST, le=LARGEST)]
 """A length, force or similar quantity in SI units of a plausible size."""
-Signed = Annotated[float, Range(least=-LARGEST, most=LARGEST)]
+Signed = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]
 """A number of a plausible size, of either sign."""
-NotNegative = Annotated[float, Range(least=0.0, most=LARGEST)]
-Friction = Annotated[float, Range(least=SMALLEST, most=LARGEST_FRICTION)]
-FrictionOrZero = Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)]
-Share = Annotated[float, Range(least=0.0, most=1.0)]
-Gap = Annotated[float, Range(least=1e-4, most=0.9)]
+NotNegative = Annotated[float, Interval(ge=0.0, le=LARGEST)]
+Friction = Annotated[float, Interval(ge=SMALLEST, le=LARGEST_FRICTION)]
+FrictionOrZero = Annotated[float, Interval(ge=0.0, le=LARGEST_FRICTION)]
+Share = Annotated[float, Interval(ge=0.0, le=1.0)]
+Gap = Annotated[float, Interval(ge=1e-4, le=0.9)]
 """A gap of a proof: less is left to rounding, and more the first twist proves."""
-TimeLimit = Annotated[float, Range(least=0.0, most=1e7)]
-Cases = Annotated[int, Range(least=1, most=10**8)]
-Reserve = Annotated[float, Range(least=0.0, below=1.0)]
-MaxCones = Annotated[int, Range(least=64, most=1_000_000)]
+TimeLimit = Annotated[float, Interval(ge=0.0, le=1e7)]
+Cases = Annotated[int, Interval(ge=1, le=10**8)]
+Reserve = Annotated[float, Interval(ge=0.0, lt=1.0)]
+MaxCones = Annotated[int, Interval(ge=64, le=1_000_000)]
 """Number of cones of a proof of regions, which begins with the 64 orthants."""
-FaceTurn = Annotated[float, Range(least=0.0, most=45.0)]
+FaceTurn = Annotated[float, Interval(ge=0.0, le=45.0)]
 """Angle between normals of like faces [deg]: beyond it, a chamfer would be like its box's face."""
-TorqueLimit = Annotated[float, Range(above=0.0, most=1e6)]
-HandClearance = Annotated[float, Range(least=0.0, most=0.02)]
-Starts = Annotated[int, Range(least=1, most=10_000)]
-Edges = Annotated[int, Range(least=3, most=MOST_EDGES)]
-RandomWrenches = Annotated[int, Range(least=0, most=10_000)]
-Repeats = Annotated[int, Range(least=0, most=100_000)]
-Count = Annotated[int, Range(least=1, most=MOST_COUNT)]
-Number = Annotated[int, Range(least=0, most=MOST_COUNT)]
+TorqueLimit = Annotated[float, Interval(gt=0.0, le=1e6)]
+HandClearance = Annotated[float, Interval(ge=0.0, le=0.02)]
+Starts = Annotated[int, Interval(ge=1, le=10_000)]
+Edges = Annotated[int, Interval(ge=3, le=MOST_EDGES)]
+RandomWrenches = Annotated[int, Interval(ge=0, le=10_000)]
+Repeats = Annotated[int, Interval(ge=0, le=100_000)]
+Count = Annotated[int, Interval(ge=1, le=MOST_COUNT)]
+Number = Annotated[int, Interval(ge=0, le=MOST_COUNT)]
 """A number of things, of which there may be none."""
-FaceSets = Annotated[int, Range(least=0, most=10**18)]
+FaceSets = Annotated[int, Interval(ge=0, le=10**18)]
 """Number of sets of faces, of which 400 faces have more than a thousand million."""
-Seed = Annotated[int, Range(least=0, most=MOST_SEED)]
+Seed = Annotated[int, Interval(ge=0, le=MOST_SEED)]
 Vector = tuple[float, float, float]
-Direction = Annotated[Vector, Size()]
+Direction = Annotated[Vector, AfterValidator(nonzero)]
 Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
 """The family of a grasp, by how its four lines of force meet."""
 Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
@@ -220,240 +176,94 @@ Measured = Annotated[float, Null(math.nan)]
 """A number that is NaN where a simulation diverged; null in files."""
 
 
-@lru_cache(maxsize=1024)
-def takes(kind: Any, *, exact: bool = False) -> Take:
-    """Return the function that takes values of a kind in plain form; if `exact`, as they are."""
-    origin, parts = get_origin(kind), get_args(kind)
-    if origin in COMPOUND:
-        return COMPOUND[origin](parts, exact)
-    if origin is not None and issubclass(origin, Mapping):
-        return _mapping(parts, exact)
-    if isinstance(kind, type) and issubclass(kind, Enum):
-        return _member(kind)
-    return (EXACT if exact else PLAIN).get(kind) or _instance(origin or kind, exact)
+def strictly(schema: Any) -> None:
+    """Change a schema of pydantic: text and truth values are no numbers, numpy's numbers are.
+
+    Sequences are taken from any sequence of numpy or Python. A part that refers to another class
+    is left to that class.
+    """
+    if isinstance(schema, list):
+        for each in cast("list[Any]", schema):
+            strictly(each)
+    if not isinstance(schema, dict):
+        return
+    part = cast("dict[str, Any]", schema)
+    kind, before = part.get("type"), BEFORE.get(cast("Any", part.get("type")))
+    for each in list(part.values()):
+        strictly(each)
+    if kind in STRICT:
+        part["strict"] = True
+    if kind == "float" and math.inf in (part.get("le"), -part.get("ge", 0.0)):
+        part["allow_inf_nan"] = True
+    if before is not None:
+        inner = {key: part.pop(key) for key in list(part)}
+        part.update(core_schema.no_info_before_validator_function(before, cast("Any", inner)))
 
 
-def _if(allowed: Callable[[Any], bool]) -> Take:
-    def take(value: Any) -> Any:
-        if not allowed(value):
-            raise UnfitError
+def _real(value: Any) -> Any:
+    """Return Python's float of a real number; of anything else itself, which is then refused."""
+    if type(value) is float or isinstance(value, bool) or not isinstance(value, Real):
         return value
-
-    return take
-
-
-def _literal(parts: tuple[Any, ...], _exact: bool) -> Take:
-    return _if(lambda value: type(value) is not bool and isinstance(value, str | int)
-               and value in parts)  # fmt: skip
+    try:
+        return float(value)
+    except OverflowError:
+        return None
 
 
-def _narrowed(parts: tuple[Any, ...], exact: bool) -> Take:
-    """Take values of a kind that its rules allow."""
-    kind, *given = parts
-    rules = [rule for rule in given if hasattr(rule, "holds")]
-    own = next((rule for rule in given if hasattr(rule, "take")), None)
-    if own is not None:
-        inner: Take = own.exact if exact else own.take
-    elif kind is float and rules:
-        nothing = [rule.value for rule in rules if isinstance(rule, Null)]
-        endless = any(isinstance(rule, Range) for rule in rules) or any(map(math.isinf, nothing))
-        inner = _numbers(endless=endless, nan=any(map(math.isnan, nothing)), exact=exact)
-    else:
-        inner = takes(kind, exact=exact)
-
-    def take(value: Any) -> Any:
-        plain = inner(value)
-        for rule in rules:
-            if not rule.holds(plain):
-                raise UnfitError(rule.fault(plain) if isinstance(rule, Many) else "")
-        return plain
-
-    return take if rules else inner
+def _whole(value: Any) -> Any:
+    whole = type(value) is not int and isinstance(value, Integral) and not isinstance(value, bool)
+    return int(value) if whole else value
 
 
-def _first_of(parts: tuple[Any, ...], exact: bool) -> Take:
-    each = [takes(part, exact=exact) for part in parts]
-
-    def take(value: Any) -> Any:
-        faults: list[str] = []
-        for one in each:
-            try:
-                return one(value)
-            except UnfitError as fault:
-                faults.append(str(fault))
-        raise UnfitError(next(filter(None, faults), ""))
-
-    return take
+def _listed(value: Any) -> Any:
+    """Return the numbers of an array as lists."""
+    entries = getattr(getattr(value, "dtype", None), "kind", None)
+    return value.tolist() if entries in ("i", "u", "f") else value
 
 
-def _numbers(*, endless: bool, nan: bool = False, exact: bool = False) -> Take:
-    """Take real numbers as Python's floats; those that are not finite only if asked to."""
-    allowed = float | int if exact else Real  # narrower ones of numpy round what they are beside
-
-    def take(value: Any) -> float:
-        if type(value) is not float:
-            if isinstance(value, bool) or not isinstance(value, allowed):
-                raise UnfitError
-            try:
-                value = float(value)
-            except OverflowError:
-                raise UnfitError from None
-        if not math.isfinite(value) and not (nan if math.isnan(value) else endless):
-            raise UnfitError
-        return value
-
-    return take
+STRICT = ("float", "int", "bool", "str")
+BEFORE: Mapping[str, Callable[[Any], Any]] = {"float": _real, "int": _whole, "tuple": _listed}
+"""What is done with a value before pydantic takes it, by the type of the schema."""
 
 
-def _whole(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise UnfitError
-    return int(value)
+class _Strictly:
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        made = handler(source)
+        strictly(made)
+        return made
 
 
-def _path(value: Any) -> Path:
-    if not isinstance(value, str | Path) or value == "" or "\0" in str(value):
-        raise UnfitError
-    return Path(value)
-
-
-PLAIN: Mapping[Any, Take] = {
-    Any: lambda value: value, float: _numbers(endless=False), int: _whole, Path: _path,
-    type(None): _if(lambda value: value is None), bool: _if(lambda value: isinstance(value, bool)),
-    str: _if(lambda value: isinstance(value, str)),
-}  # fmt: skip
-EXACT: Mapping[Any, Take] = {
-    **PLAIN, float: _numbers(endless=False, exact=True),
-    int: _if(lambda value: isinstance(value, int) and not isinstance(value, bool)),
-}  # fmt: skip
-
-
-def _member(kind: type[Enum]) -> Take:
-    def take(value: Any) -> Any:
-        try:
-            return kind(value)
-        except ValueError:
-            raise UnfitError from None
-
-    return take
-
-
-def _instance(kind: Any, exact: bool) -> Take:
-    sound = getattr(kind, "is_sound", None) if exact else None
-    return _if(lambda value: isinstance(value, kind) and (sound is None or sound(value)))
-
-
-def _tuple(parts: tuple[Any, ...], exact: bool) -> Take:
-    endless = parts[-1:] == (Ellipsis,)
-    each = [takes(part, exact=exact) for part in parts if part is not Ellipsis]
-
-    def take(value: Any) -> tuple[Any, ...]:
-        if exact and not isinstance(value, tuple):
-            raise UnfitError
-        entries = getattr(
-            getattr(cast("Any", value), "dtype", None), "kind", "f"
-        )  # those of numpy's arrays
-        text = isinstance(value, str | bytes | Mapping)
-        if text or not isinstance(value, Iterable) or entries not in "iuf":
-            raise UnfitError
-        items = tuple(cast("Iterable[Any]", value))
-        if not endless and len(items) != len(each):
-            raise UnfitError
-        takers = each * len(items) if endless else each
-        return tuple(one(item) for one, item in zip(takers, items, strict=True))
-
-    return take
-
-
-def _mapping(parts: tuple[Any, ...], exact: bool) -> Take:
-    key, one = (takes(part, exact=exact) for part in parts)
-
-    def take(value: Any) -> dict[Any, Any]:
-        if not isinstance(value, Mapping):
-            raise UnfitError
-        return {key(name): one(each) for name, each in cast("Mapping[Any, Any]", value).items()}
-
-    return take
-
-
-COMPOUND: Mapping[Any, Callable[[tuple[Any, ...], bool], Take]] = {
-    Annotated: _narrowed, Union: _first_of, UnionType: _first_of, tuple: _tuple, Literal: _literal,
-}  # fmt: skip
-"""How a kind with parts takes values, by what it is made with."""
-
-
-def words(kind: Any) -> str:
-    """Return in words what values a kind allows: 'a number from 0 to 1'."""
-    origin, parts = get_origin(kind), get_args(kind)
-    if origin is Annotated:
-        own = next((str(part) for part in parts[1:] if hasattr(part, "take")), words(parts[0]))
-        narrower = [str(part) for part in parts[1:]
-                    if hasattr(part, "holds") and not hasattr(part, "take")]  # fmt: skip
-        return " ".join([own, *filter(None, narrower)])
-    if origin in (Union, UnionType):
-        return " or ".join(words(part) for part in parts if part is not type(None))
-    if origin is tuple or (isinstance(origin, type) and issubclass(origin, Mapping)):
-        return _words_of_items(cast("type", origin), parts)
-    if origin is Literal:
-        return f"one of {', '.join(map(str, parts))}"
-    if isinstance(kind, type) and issubclass(kind, Enum):
-        return f"one of {', '.join(str(each.value) for each in kind)}"
-    plain = {float: "a number", int: "a whole number", bool: "true or false", str: "text",
-             Path: "a path", type(None): "None"}  # fmt: skip
-    named = cast("Any", origin or kind)
-    return plain.get(cast("Any", kind)) or f"a {getattr(named, '__name__', 'value')}"
-
-
-def _words_of_items(origin: type, parts: tuple[Any, ...]) -> str:
-    if origin is not tuple:
-        return f"a table, each key {words(parts[0])}, each value {words(parts[1])}"
-    if parts[-1] is Ellipsis:
-        return f"a sequence, each item {words(parts[0])}"
-    if any(part != parts[0] for part in parts):
-        return f"{len(parts)} items: {', '.join(map(words, parts))}"
-    each = "" if parts[0] is float else f", each {words(parts[0])}"
-    inner = get_args(parts[0])[0] if get_origin(parts[0]) is Annotated else parts[0]
-    return f"{len(parts)} {'numbers' if inner in (float, int) else 'items'}{each}"
-
-
-def inside(kind: Any, wanted: type) -> Any:
-    """Return the class of a kind that is one of `wanted`, alone or beside None; None if none is."""
-    if get_origin(kind) is Annotated:
-        return inside(get_args(kind)[0], wanted)
-    parts = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
-    return next((p for p in parts if isinstance(p, type) and issubclass(p, wanted)), None)
+@lru_cache(maxsize=256)
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    config = ConfigDict(allow_inf_nan=False, arbitrary_types_allowed=True)
+    return TypeAdapter(Annotated[kind, _Strictly()], config=config)
 
 
 def value_of(kind: Any, value: Any, name: str) -> Any:
     """Return a value in the plain form of a kind; one that is not of it is an error."""
     try:
-        return takes(kind)(value)
-    except UnfitError as fault:
-        raise misfit(kind, value, name, fault) from None
+        return _adapter(kind).validate_python(value)
+    except ValidationError as error:
+        raise input_error(kind, error, name) from None
 
 
-def misfit(kind: Any, value: Any, name: str, fault: UnfitError) -> FieldError:
-    """Return the error for a value that is not of a kind."""
-    given = str(value) if hasattr(value, "__fspath__") else value
-    return FieldError(name, str(fault) or f"must be {words(kind)}, got {shown(given)}")
-
-
-def number(value: Any, name: str, **ends: Any) -> float:
-    """Check that a value is a number in a range, with the fields of `Range`."""
-    return value_of(Annotated[float, Range(**ends)], value, name)
+def number(value: Any, name: str, where: str = "", **ends: Any) -> float:
+    """Check that a value is a number in an interval; `where` says what an end is."""
+    kind = Annotated[float, Interval(**ends)]
+    try:
+        return value_of(kind, value, name)
+    except FieldError:
+        fault = f"must be {words(kind)}{where}, got {shown(value)}"
+        raise FieldError(name, fault) from None
 
 
 def path_of(value: Any, name: str) -> Path:
     """Check that a value names a file or folder."""
-    return value_of(Path, value, name)
-
-
-def near(word: str, known: Iterable[str]) -> str:
-    """Ask whether known words are meant that are near a mistyped one; empty if none is near."""
-    import difflib  # only mistakes need it
-
-    found = [] if len(word) > SHOWN else difflib.get_close_matches(word, list(known))
-    return f"did you mean {' or '.join(found)}?" if found else ""
+    if not isinstance(value, str | Path) or value == "" or "\0" in str(value):
+        raise FieldError(name, f"must be a path, got {shown(value)}")
+    return Path(value)
 
 
 def one_of(value: Any, choices: Iterable[str], name: str) -> None:
@@ -482,6 +292,127 @@ def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> t
             f"{name} must be a sequence of {kind}, such as a tuple, got {shown(value)}"
         )
     return tuple(each(thing) for thing in cast("Iterable[Any]", value))
+
+
+def input_error(kind: Any, error: ValidationError, where: str = "") -> InputError:
+    """Return the first fault that pydantic found as our error: the field, the wanted, the given."""
+    fault = error.errors(include_url=False)[0]
+    said, place = fault["type"], fault["loc"]
+    if said == "missing" and isinstance(place[-1], int):  # a vector is too short
+        said, place = "too_short", place[:-1]
+    place, kind, name = _located(kind, place, where)
+    came, ctx = fault["input"], fault.get("ctx", {})
+    ours = ctx["error"].args[0] if said == "value_error" else None
+    match said:
+        case "missing":
+            hint = near(name, came) if isinstance(came, dict) else ""
+            return InputError(f"{place}: missing; add it{hint and f' ({hint})'}")
+        case "unexpected_keyword_argument":
+            known = [*bare(kind).__pydantic_fields__]
+            hint = near(name, known) or f"choose from {', '.join(known)}"
+            return InputError(f"{where and f'{where}: '}no field is named {shown(name)}; {hint}")
+        case "value_error" if isinstance(ours, FieldError):
+            return FieldError(at(place, ours.name), ours.fault)
+        case "value_error" if isinstance(ours, InputError):
+            return InputError(f"{place}: {ours}") if place else ours
+        case "value_error":
+            return FieldError(place, str(ours))
+        case "too_short" | "too_long" if counts := [r for r in rules(kind) if isinstance(r, Len)]:
+            least, most = counts[0].min_length, counts[0].max_length
+            ends = f"{least}" if most is None else f"{least} and at most {most}"
+            return FieldError(place, f"must have a length of at least {ends}, got {len(came)}")
+        case _:
+            return FieldError(place, f"must be {words(kind)}, got {shown(came)}")
+
+
+def at(where: str, name: str) -> str:
+    """Return where a field is that stands in a table or record."""
+    return f"{where}.{name}" if where and name else where or name
+
+
+def _located(kind: Any, loc: Iterable[int | str], where: str) -> tuple[str, Any, str]:
+    """Return where a fault of pydantic is, the kind that is wanted there, and its last name."""
+    name = where
+    for part in loc:
+        plain = bare(kind)
+        own = getattr(plain, "__pydantic_fields__", None)
+        if own is not None:
+            called = [(key, info) for place, (key, info) in enumerate(own.items())
+                      if part in (place, key, info.alias)]  # fmt: skip
+            if not called:  # an unknown key, or the branch of a union
+                name = str(part)
+                continue
+            key, info = called[0]
+            kind = Annotated[info.annotation, info.alias, *info.metadata]
+            if FLAT not in info.metadata:
+                name = key if isinstance(part, int) else part
+                where = at(where, name)
+        elif isinstance(part, int) and (items := get_args(plain)):
+            where, kind = f"{where}[{part}]", items[0 if items[-1] is Ellipsis else part]
+        elif get_origin(plain) is not None and issubclass(get_origin(plain), Mapping):
+            where, kind = at(where, str(part)), get_args(plain)[1]
+    return where, kind, name
+
+
+def bare(kind: Any) -> Any:
+    """Return a type without its rules, and without None beside it."""
+    if get_origin(kind) is Annotated:
+        return bare(get_args(kind)[0])
+    parts = get_args(kind) if get_origin(kind) in (Union, UnionType) else ()
+    others = [part for part in parts if part is not type(None)]
+    return bare(others[0]) if len(others) == 1 else kind
+
+
+def inside(kind: Any, wanted: type) -> Any:
+    """Return the class of a kind that is one of `wanted`, alone or beside None; None if none is."""
+    plain = bare(kind)
+    return plain if isinstance(plain, type) and issubclass(plain, wanted) else None
+
+
+def words(kind: Any) -> str:
+    """Return in words what values a kind allows: 'a number from 0 to 1'."""
+    plain, parts = bare(kind), get_args(bare(kind))
+    said = NAMES.get(plain) or f"a {getattr(get_origin(plain) or plain, '__name__', 'value')}"
+    if get_origin(plain) is Literal:
+        said = f"one of {', '.join(map(str, parts))}"
+    elif isinstance(plain, type) and issubclass(plain, Enum):
+        said = f"one of {', '.join(str(each.value) for each in plain)}"
+    elif get_origin(plain) in (Union, UnionType):
+        said = " or ".join(map(words, parts))
+    elif get_origin(plain) is tuple and parts[-1] is not Ellipsis:
+        each = "numbers" if set(map(bare, parts)) <= {float, int} else "items"
+        said = f"{len(parts)} {each}"
+    elif get_origin(plain) is tuple:
+        said = f"a sequence, each item {words(parts[0])}"
+    elif parts:
+        said = f"a table, each key {words(parts[0])}, each value {words(parts[1])}"
+    ends = [f"{word} {getattr(rule, name):g}" for rule in rules(kind)
+            if isinstance(rule, Interval) for name, word in ENDS.items()
+            if getattr(rule, name) is not None and math.isfinite(getattr(rule, name))]  # fmt: skip
+    return " ".join([said, *ends])
+
+
+NAMES: Mapping[Any, str] = {
+    float: "a number", int: "a whole number", bool: "true or false", str: "text", Path: "a path",
+    type(None): "None",
+}  # fmt: skip
+ENDS = {"gt": "above", "ge": "from", "lt": "below", "le": "up to"}
+"""What ends of intervals are called."""
+
+
+def rules(kind: Any) -> tuple[Any, ...]:
+    """Return the rules that narrow a kind, or one that may be None instead."""
+    if get_origin(kind) is Annotated:
+        return get_args(kind)[1:] + rules(get_args(kind)[0])
+    return tuple(rule for part in get_args(kind) for rule in rules(part))
+
+
+def near(word: str, known: Iterable[str]) -> str:
+    """Ask whether known words are meant that are near a mistyped one; empty if none is near."""
+    import difflib  # only mistakes need it
+
+    found = [] if len(word) > SHOWN else difflib.get_close_matches(word, list(known))
+    return f"did you mean {' or '.join(found)}?" if found else ""
 
 
 def shown(value: Any) -> str:

@@ -2,7 +2,7 @@
 
     @dataclass(frozen=True, slots=True, repr=False)
     class Noise(Settings):
-        shift: Annotated[float, Range(least=0.0, most=1.0)] = 0.01
+        shift: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.01
         \"\"\"Deviation of the object's position along each axis, in object radii.\"\"\"
 
 What functions take, tables of files and flags of commands are such classes, and all are checked in
@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar, cast, get_args
 
 from grasp_core.declared import Declared, default_of, types
 from grasp_core.errors import InputError
-from grasp_core.kinds import FieldError, inside, shown
+from grasp_core.kinds import FieldError, at, inside, shown
 
 Given = TypeVar("Given", bound="Settings")
 LONGEST_LINE = 200
@@ -46,8 +46,10 @@ class Settings(Declared):
                 raise InputError(f"{at(where, each.name)}: missing; add it")
         try:
             return cls(**given) if usual is None else replace(usual, **given)
+        except FieldError as error:
+            raise FieldError(at(where, error.name), error.fault) from None
         except InputError as error:
-            raise placed(error, where) from None
+            raise InputError(f"{where}: {error}" if where else str(error)) from None
 
     def __repr__(self) -> str:
         """Return the settings that differ from the usual ones, in a line."""
@@ -58,13 +60,6 @@ class Settings(Declared):
         )
         said = f"{type(self).__name__}({', '.join(differing)})"
         return shorten(said, LONGEST_LINE, placeholder=" ...)")
-
-
-def placed(error: InputError, where: str) -> InputError:
-    """Return an error about fields with the place of their table or record in a file."""
-    if isinstance(error, FieldError):
-        return FieldError(at(where, error.name), error.fault)
-    return InputError(f"{where}: {error}" if where else str(error))  # fields that do not fit
 
 
 def for_users(kind: type) -> tuple[str, ...]:
@@ -95,11 +90,6 @@ def named(
                 f"{start}no {what} is named {shown(name)}; choose from {', '.join(known)}"
             )
     return given
-
-
-def at(where: str, name: str) -> str:
-    """Return where a field is that stands in a table or record."""
-    return f"{where}.{name}" if where else name
 
 
 def extended(kind: type[Given], part: Settings, **more: Any) -> Given:

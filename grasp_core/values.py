@@ -6,28 +6,19 @@ vectors that point into the object. Arrays are copied, checked and made read-onl
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
+from annotated_types import Interval
+from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Shape, UnitVector
-from grasp_core.declared import Declared, counted, summary, vector
+from grasp_core.declared import Declared, counted, declared, summary, vector
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
-from grasp_core.files.records import Key, recorded
 from grasp_core.frames import poses_along
-from grasp_core.kinds import (
-    Family,
-    FieldError,
-    NotNegative,
-    Null,
-    Number,
-    Range,
-    Signed,
-    shown,
-    value_of,
-)
+from grasp_core.kinds import Family, FieldError, NotNegative, Null, Number, Signed, shown, value_of
 
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[Number, Number, Number, Number]
@@ -37,13 +28,13 @@ Item = TypeVar("Item")
 
 FINGERS = 4
 RIGHT_ANGLE = math.pi / 2
-HalfAngle = Annotated[float, Range(least=0.0, below=RIGHT_ANGLE)]
+HalfAngle = Annotated[float, Interval(ge=0.0, lt=RIGHT_ANGLE)]
 """The half-angle of a cone, from 0 to below pi / 2 [rad]."""
 Bounds = tuple[Signed, Signed]
 """A proved lower and a proved upper bound of one number."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ForceCone(Declared):
     """A circular cone of force directions inside a friction cone.
 
@@ -52,21 +43,21 @@ class ForceCone(Declared):
 
     axis: UnitVector
     """Unit vector along the middle of the cone, (3,)."""
-    half_angle: Annotated[HalfAngle, Key("half_angle_rad")]
+    half_angle: Annotated[HalfAngle, Field(alias="half_angle_rad")]
     """Angle between the axis and the cone's surface, from 0 to below pi / 2 [rad]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Contact(Declared):
     """A point where one fingertip touches the object, with the direction in which it can push."""
 
-    position: Annotated[Array, Shape(3), Key("position_m")]
+    position: Annotated[Array, Shape(3), Field(alias="position_m")]
     """Point on the surface, (3,) [m]."""
     normal: UnitVector
     """Unit vector into the object, (3,)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ContactRegion(Declared):
     """A region where one finger may stand while the others stay anywhere in their own regions."""
 
@@ -74,9 +65,9 @@ class ContactRegion(Declared):
     """Which proof certifies the region: `cone` is the inverted force cone of a focus point cut with
     the face, `disc` a disc around the contact of a pencil, `certified` a region with a proof of its
     own (see `certify_regions`); `point` claims nothing but the contact."""
-    polygon: Annotated[Array, Shape(None, 3), Key("polygon_m")]
+    polygon: Annotated[Array, Shape(None, 3), Field(alias="polygon_m")]
     """Convex polygon on the face, (k, 3) [m]; for a disc, points of its border."""
-    inscribed_radius: Annotated[NotNegative, Key("inscribed_radius_m")]
+    inscribed_radius: Annotated[NotNegative, Field(alias="inscribed_radius_m")]
     """Radius of the largest disc inside the region [m]."""
 
     def __repr__(self) -> str:
@@ -84,16 +75,17 @@ class ContactRegion(Declared):
         return summary("ContactRegion", self.kind, corners, inscribed_radius=self.inscribed_radius)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Witness(Declared):
     """Balanced contact forces, whose four lines show to which family a grasp belongs."""
 
-    points: Annotated[Array, Shape(FINGERS, 3), Key("points_m")]
+    points: Annotated[Array, Shape(FINGERS, 3), Field(alias="points_m")]
     """One point on each line, namely the contact, (4, 3) [m]."""
     forces: Annotated[Array, Shape(FINGERS, 3)]
     """Forces along the lines, into the object, whose normal parts sum to one, (4, 3)."""
 
-    @recorded
+    @computed_field
+    @property
     def directions(self) -> Array:
         """Return unit vectors along the lines, (4, 3)."""
         return self.forces / np.linalg.norm(self.forces, axis=1, keepdims=True)
@@ -106,7 +98,7 @@ PUT_OFF = ("critical_friction", "ferrari_canny")
 """Fields of a grasp that may be computed when they are asked for."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Grasp(Declared):
     """Four contacts in finger order, with a witness that shows why they hold the object.
 
@@ -119,23 +111,23 @@ class Grasp(Declared):
     family: Annotated[Family, Shown("family")]
     faces: FaceQuadruple
     contacts: tuple[Contact, Contact, Contact, Contact]
-    focus_points: Annotated[Array, Shape(None, 3), Key("focus_points_m")]
+    focus_points: Annotated[Array, Shape(None, 3), Field(alias="focus_points_m")]
     """Points where witness lines meet, (k, 3) [m]: one for a concurrent grasp, one for each pair of
     a pencil. For a regulus, the points midway between the two lines of each pair; empty for other
     grasps."""
     force_cones: tuple[ForceCone, ForceCone, ForceCone, ForceCone]
     """Force cones that the construction used; each lies inside its contact's friction cone."""
     regions: tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
-    radius: Annotated[NotNegative, Key("radius_m"), Shown("radius mm", ".3g", 1e3)]
+    radius: Annotated[NotNegative, Field(alias="radius_m"), Shown("radius mm", ".3g", 1e3)]
     """Radius of the smallest of four discs in which fingers may stand independently [m]; 0.0 where
     no discs are claimed."""
     span_angle: Annotated[
-        HalfAngle, Key("span_angle_rad"), Shown("theta* deg", ".2f", math.degrees(1.0))
+        HalfAngle, Field(alias="span_angle_rad"), Shown("theta* deg", ".2f", math.degrees(1.0))
     ]
     """theta*, the largest half-angle [rad] below which cones around the four normals positively
     span."""
     critical_friction: Annotated[
-        float, Range(least=0.0, most=math.inf), Null(math.inf), Shown("mu*", ".4f")
+        float, Interval(ge=0.0, le=math.inf), Null(math.inf), Shown("mu*", ".4f")
     ]
     """Smallest Coulomb coefficient above which the contacts are in force closure; computed at
     first use if the grasp was planned."""

@@ -281,7 +281,7 @@ def export_grasps(
         wanted = " or ".join(ENDINGS[to])
         raise InputError(f"path must end in {wanted} for the format {to}, got {path.name[-40:]!r}")
     if fingertip_radius_m is not None:
-        number(fingertip_radius_m, "fingertip_radius_m", least=SMALLEST, most=plan.body.radius,
+        number(fingertip_radius_m, "fingertip_radius_m", ge=SMALLEST, le=plan.body.radius,
                where=", the object's radius in m")  # fmt: skip
     if not plan.grasps:
         raise InputError("plan: expected at least one grasp to export, found none")

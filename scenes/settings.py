@@ -5,12 +5,14 @@ commands are made of them; see `grasp_core.settings`. Scenes spell out every set
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
-from grasp_core.declared import default_of
+from annotated_types import Interval
+
+from grasp_core.declared import declared, default_of
 from grasp_core.errors import InputError
-from grasp_core.kinds import LARGEST, Direction, NotNegative, Quantity, Range, Share
+from grasp_core.kinds import LARGEST, Direction, NotNegative, Quantity, Share
 from grasp_core.settings import CHOSEN, Settings
 from grasp_core.small_objects import fitted
 
@@ -18,13 +20,13 @@ if TYPE_CHECKING:
     from grasp_core.objects.polyhedron import Polyhedron
 
 MOST_ITERATIONS = 10_000
-Iterations = Annotated[int, Range(least=1, most=MOST_ITERATIONS)]
-Number = Annotated[float, Range(least=-LARGEST, most=LARGEST)]
-Component = Annotated[float, Range(least=-1e4, most=1e4)]
+Iterations = Annotated[int, Interval(ge=1, le=MOST_ITERATIONS)]
+Number = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]
+Component = Annotated[float, Interval(ge=-1e4, le=1e4)]
 Field = tuple[Component, Component, Component]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Softness(Settings):
     """How soft the fingertips are in simulation."""
 
@@ -46,7 +48,7 @@ class Softness(Settings):
 HARD = Softness()
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class PhysicsSettings(Softness):
     """Options of the simulation, named as in MJCF, and the torsion of its contacts.
 
@@ -61,7 +63,7 @@ class PhysicsSettings(Softness):
         InputError: A number is out of its range, or MuJoCo does not know a word.
     """
 
-    timestep: Annotated[float, Range(least=1e-5, most=0.005)] = 0.002
+    timestep: Annotated[float, Interval(ge=1e-5, le=0.005)] = 0.002
     """Length of a step, from 1e-5 to 0.005 [s]. With steps twice as long, objects let go at
     frictions 40 % above the critical friction, and few of the cases with known answers reveal it.
     """
@@ -77,7 +79,7 @@ class PhysicsSettings(Softness):
     iterations: Iterations = 100
     ls_iterations: Iterations = 50
     ls_tolerance: Share = 0.01
-    noslip_iterations: Annotated[int, Range(least=0, most=MOST_ITERATIONS)] = 0
+    noslip_iterations: Annotated[int, Interval(ge=0, le=MOST_ITERATIONS)] = 0
     noslip_tolerance: Share = 1e-6
     ccd_iterations: Iterations = 35
     ccd_tolerance: Share = 1e-6
@@ -172,7 +174,7 @@ Surface = Literal["object", "pads"]
 Drive: TypeAlias = Literal["servo", "rigid"]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Fingertips(Settings):
     """How fingertips are built; a setting that is not given is chosen to suit the grasp."""
 
@@ -191,7 +193,7 @@ class Fingertips(Settings):
     direction that was planned for it, or its contact normal."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class FingerSettings(Fingertips):
     """How fingertips are built and driven; a setting that is None is chosen to suit the grasp.
 
@@ -201,11 +203,11 @@ class FingerSettings(Fingertips):
 
     drive: Annotated[Drive, CHOSEN] = "servo"
     """How fingertips are held: pushed by servos, or rigidly fixed in place."""
-    indentation: Annotated[float, Range(least=0.0, below=1.0), CHOSEN] = 0.0
+    indentation: Annotated[float, Interval(ge=0.0, lt=1.0), CHOSEN] = 0.0
     """Depth of each fingertip in its face at the start, in grasp sizes; 0 means just touching."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class ScaledScene(Settings):
     """What users choose about a scene with scaled masses, in which closure is tested."""
 
@@ -228,7 +230,7 @@ FITTED: Mapping[str, int] = {
 """Settings that are fitted to small objects, with the power of the size (see `small_objects`)."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class HeldSettings(Settings):
     """Masses and damping of what holds and is held, and the direction of gravity.
 
@@ -243,7 +245,7 @@ class HeldSettings(Settings):
     [kg/m^3]."""
     tip_mass_kg: Quantity = 0.05
     """Mass of a fingertip with the part of its finger that moves with it [kg]."""
-    damping_ratio: Annotated[float, Range(least=0.01, most=10.0)] = 0.5
+    damping_ratio: Annotated[float, Interval(ge=0.01, le=10.0)] = 0.5
     """Damping ratio of the object between the springs; with 0.5 it overshoots once, by a sixth."""
     down: Direction = UPRIGHT
     """Direction of gravity in the object's frame, in trials that do not choose their own; its

@@ -5,10 +5,13 @@ help waits for it.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Literal, Self, TypeAlias, get_args
 
+from annotated_types import Interval
+
+from grasp_core.declared import declared
 from grasp_core.errors import InputError
 from grasp_core.kinds import (
     FieldError,
@@ -16,7 +19,6 @@ from grasp_core.kinds import (
     NotNegative,
     Quantity,
     RandomWrenches,
-    Range,
     Repeats,
     Reserve,
     Seed,
@@ -25,10 +27,10 @@ from grasp_core.kinds import (
 from grasp_core.settings import Settings
 from scenes.settings import SAMPLE_S, HeldSettings
 
-Duration = Annotated[float, Range(least=0.05, most=60.0)]
-Settling = Annotated[float, Range(least=1.0, most=100.0)]
-Rounds = Annotated[int, Range(least=1, most=40)]
-Spans = tuple[Annotated[float, Range(above=0.0, below=1.0)], ...]
+Duration = Annotated[float, Interval(ge=0.05, le=60.0)]
+Settling = Annotated[float, Interval(ge=1.0, le=100.0)]
+Rounds = Annotated[int, Interval(ge=1, le=40)]
+Spans = tuple[Annotated[float, Interval(gt=0.0, lt=1.0)], ...]
 
 
 def _check_spans(spans: Spans) -> None:
@@ -36,7 +38,7 @@ def _check_spans(spans: Spans) -> None:
         raise FieldError("spans", f"must be one or more numbers in rising order, got {spans}")
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class HoldProtocol(Settings):
     """Durations, loads and thresholds of a trial in which the object must hold a wrench.
 
@@ -52,18 +54,18 @@ class HoldProtocol(Settings):
     squeeze_s: Duration = 0.16
     load_s: Duration = 0.16
     settle_s: Duration = 0.10
-    hold_s: Annotated[float, Range(least=0.2, most=60.0)] = 0.40
+    hold_s: Annotated[float, Interval(ge=0.2, le=60.0)] = 0.40
     """Duration of the hold [s]; a shorter one does not see a small imbalance move anything."""
     settling_friction: Settling = 3.0
     """Friction while loading, relative to the friction under test. In trials of negative controls
     (contacts that must fail) it is relative to the larger of that friction and the one that the
     planned forces need."""
-    load_share: Annotated[float, Range(least=0.1, most=0.999)] = 0.8
+    load_share: Annotated[float, Interval(ge=0.1, le=0.999)] = 0.8
     """Applied wrench, relative to the largest one that is resisted according to the analysis."""
-    control_load: Annotated[float, Range(least=0.05, most=2.0)] = 0.2
+    control_load: Annotated[float, Interval(ge=0.05, le=2.0)] = 0.2
     """Wrench applied to a negative control (contacts that must fail), relative to the largest
     normal force."""
-    least_normal_share: Annotated[float, Range(least=1e-4, most=0.1)] = 0.005
+    least_normal_share: Annotated[float, Interval(ge=1e-4, le=0.1)] = 0.005
     """Least planned normal force, relative to the largest; it keeps fingers without load in
     contact."""
     hold_threshold: Quantity = 2e-4
@@ -71,7 +73,7 @@ class HoldProtocol(Settings):
     total_threshold: Quantity = 2e-4
     """Largest displacement from the planned pose, in grasp sizes; a tilt of the object acts like
     that much additional friction."""
-    least_excess: Annotated[float, Range(least=1e-4, most=0.01)] = 5e-4
+    least_excess: Annotated[float, Interval(ge=1e-4, le=0.01)] = 5e-4
     """Share of the sum of forces by which the forces must leave their friction cones even without a
     load; it equals minus the closure margin. Contacts that need at least this share have to slip
     without a load. With less, the servos, which hide a few thousandths of the largest normal force,
@@ -80,7 +82,7 @@ class HoldProtocol(Settings):
     """A fingertip farther than this from its face has lost contact, in grasp sizes."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class LimitProtocol(Settings):
     """How the largest wrench that a grasp resists is found in simulation."""
 
@@ -99,7 +101,7 @@ class LimitProtocol(Settings):
         _check_spans(self.spans)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class FrictionProtocol(Settings):
     """How the critical friction of a grasp is found in simulation."""
 
@@ -110,10 +112,10 @@ class FrictionProtocol(Settings):
     """How often bisection halves an interval."""
     settling_friction: Settling = 5.0
     """Friction while the fingers squeeze, relative to the predicted critical friction."""
-    least_friction: Annotated[float, Range(least=1e-6, most=0.01)] = 1e-3
+    least_friction: Annotated[float, Interval(ge=1e-6, le=0.01)] = 1e-3
     """Least friction that is simulated; the only one tried where the prediction is smaller."""
     settle_s: Duration = 0.10
-    hold_s: Annotated[float, Range(least=0.2, most=60.0)] = 0.40
+    hold_s: Annotated[float, Interval(ge=0.2, le=60.0)] = 0.40
     """Duration of the hold [s]; a shorter one does not see a small imbalance move anything."""
     threshold: Quantity = 2e-5
     """Largest displacement while the object must be held, in grasp sizes. Within it the servos hide
@@ -124,11 +126,11 @@ class FrictionProtocol(Settings):
         _check_spans(self.spans)
 
 
-Tilt = Annotated[float, Range(least=0.0, most=45.0)]
+Tilt = Annotated[float, Interval(ge=0.0, le=45.0)]
 LimitSearch: TypeAlias = Literal["none", "ramp", "bisection"]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Noise(Settings):
     """How uncertain the pose, surface, friction and mass are, as standard deviations.
 
@@ -148,7 +150,7 @@ class Noise(Settings):
     """Deviation of the mass and of every load, relative to the planned values."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class ChosenTrials(Settings):
     """Which trials a grasp goes through besides the usual ones."""
 
@@ -178,7 +180,7 @@ LONGEST_S = 100.0
 """Longest duration of a lift or a stop [s]."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Holding(HeldSettings):
     """What holds the object, and how hard."""
 
@@ -191,7 +193,7 @@ class Holding(HeldSettings):
     tenth of the object's radius, or less where that would overlap something."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class ChosenExecution(Holding):
     """How grasps are executed, and how far an object may move and still count as held."""
 
@@ -199,12 +201,12 @@ class ChosenExecution(Holding):
     """Names of the trials."""
     lift_m: Quantity = 0.2
     """Height by which the object is lifted off its table [m]."""
-    lift_s: Annotated[float, Range(least=0.05, most=LONGEST_S)] = 0.6
+    lift_s: Annotated[float, Interval(ge=0.05, le=LONGEST_S)] = 0.6
     """Duration of the lift [s]."""
     shake_g: NotNegative = 1.0
     """Largest acceleration of a shake [9.80665 m/s^2], 0 for no shakes; a shake about an axis gives
     it to points at the object's radius."""
-    shake_hz: Annotated[float, Range(least=0.1, most=25.0)] = 5.0
+    shake_hz: Annotated[float, Interval(ge=0.1, le=25.0)] = 5.0
     """Frequency of a shake [Hz]."""
     stop_m_per_s2: Quantity = 10.0
     """Deceleration of a stop [m/s^2], which takes at least 0.005 s: at most 200 times the speed."""
@@ -218,9 +220,9 @@ class ChosenExecution(Holding):
     by normal errors along and about each axis with these standard deviations, as in `regions`."""
     off_mm: NotNegative = 2.0
     """Distance of a misplaced object from where the fingers expect it [mm]."""
-    off_deg: Annotated[float, Range(least=0.0, most=180.0)] = 2.0
+    off_deg: Annotated[float, Interval(ge=0.0, le=180.0)] = 2.0
     """Angle by which a misplaced object is turned [deg]."""
-    misplacements: Annotated[int, Range(least=1, most=1000)] = 5
+    misplacements: Annotated[int, Interval(ge=1, le=1000)] = 5
     """Number of times that the object is misplaced, each time in a random direction."""
     max_mm: Quantity = 5.0
     """Displacement against the palm up to which an object counts as held [mm]."""
@@ -246,7 +248,7 @@ class ChosenExecution(Holding):
             )
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class ExecutionSettings(ChosenExecution):
     """How grasps are executed, and how far an object may move and still count as held.
 
@@ -280,7 +282,7 @@ class ExecutionSettings(ChosenExecution):
         return math.radians(self.max_deg)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Certifying(Settings):
     """How regions are certified."""
 
@@ -297,7 +299,7 @@ class Certifying(Settings):
     off_mm: NotNegative = 0.0
     """Standard deviation of the object's place along each axis [mm]. With this or another deviation
     above zero, the chance that each grasp is closed is bounded from below."""
-    off_deg: Annotated[float, Range(least=0.0, most=45.0)] = 0.0
+    off_deg: Annotated[float, Interval(ge=0.0, le=45.0)] = 0.0
     """Standard deviation of the object's turn about each axis through its centre of mass [deg]."""
     finger_mm: NotNegative = 0.0
     """Standard deviation of each finger in each direction across its own [mm]."""

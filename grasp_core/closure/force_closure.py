@@ -31,7 +31,7 @@ made explicit; the cone program is standard.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import Annotated
 
@@ -61,7 +61,7 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.decision import decide, decided_at_once
 from grasp_core.closure.proofs import ContactCones, margin_ceiling, proved_margin
-from grasp_core.declared import Declared, trusted
+from grasp_core.declared import Declared, declared, trusted
 from grasp_core.errors import UndecidedError
 from grasp_core.kinds import LARGEST
 from grasp_core.values import Contact, Grasp
@@ -78,7 +78,7 @@ FAR_BELOW = -1e6
 """Least margin that is reported: hardly any forces balance, or none at all."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ClosureCertificate(Declared):
     """A verdict on force closure, with the forces or the wrench that prove it."""
 

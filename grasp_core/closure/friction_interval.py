@@ -24,16 +24,16 @@ but for the rounding of their coordinates.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
 from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
-from grasp_core.declared import Declared
-from grasp_core.kinds import LARGEST_FRICTION, Range
+from grasp_core.declared import Declared, declared
+from grasp_core.kinds import LARGEST_FRICTION
 
 Whole: TypeAlias = NDArray[np.object_]
 """Whole numbers of any size: numerators over a denominator that all share."""
@@ -221,7 +221,7 @@ def _cross(a: Whole, b: Whole) -> Whole:
     return ahead - np.roll(a, -2, axis=-1) * np.roll(b, -1, axis=-1)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class FrictionInterval(Declared):
     """Friction up to `lower`, without force closure, and from `upper` on, with force closure.
 
@@ -230,9 +230,9 @@ class FrictionInterval(Declared):
     that they are closed holds for the contacts as they are.
     """
 
-    lower: Annotated[float, Range(least=0.0, most=math.inf)]
+    lower: Annotated[float, Interval(ge=0.0, le=math.inf)]
     """Coulomb coefficient; 0 where nothing is claimed, infinite where no friction is enough."""
-    upper: Annotated[float, Range(least=0.0, most=math.inf)]
+    upper: Annotated[float, Interval(ge=0.0, le=math.inf)]
     """Coulomb coefficient, at most `LARGEST_FRICTION`, or infinite where nothing is claimed."""
     positions: Points
     """Contact points, (k, 3) [m]."""

@@ -22,7 +22,6 @@ Source: Ferrari & Canny, "Planning optimal grasps" (ICRA 1992), with circular co
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal, Self, TypeAlias, get_args
 
 import numpy as np
@@ -39,7 +38,7 @@ from grasp_core.closure.contacts import (
     in_frames,
 )
 from grasp_core.closure.proofs import ContactCones
-from grasp_core.declared import Declared, trusted
+from grasp_core.declared import Declared, declared, trusted
 from grasp_core.errors import InputError
 from grasp_core.kinds import Quantity, one_of, shown, value_of
 from grasp_core.solvers.conic import ConicProgram, minimize
@@ -86,7 +85,7 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
     return arms
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class WrenchSet(Declared):
     """The set of wrenches that contacts can apply with bounded normal forces.
 

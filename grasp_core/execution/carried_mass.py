@@ -83,6 +83,7 @@ from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import (
@@ -99,13 +100,13 @@ from grasp_core.arrays import (
 )
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.declared import Declared, summary, trusted
+from grasp_core.declared import Declared, declared, summary, trusted
 from grasp_core.errors import InputError
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Bounded, Grip, unsqueezed
 from grasp_core.execution.loads import GRAVITY_M_PER_S2, any_direction
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.kinds import SMALLEST, Quantity, Range, number, value_of
+from grasp_core.kinds import SMALLEST, Quantity, number, value_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import InnerPolytope
 from grasp_core.quality.motors import Motors, motors_for
@@ -159,7 +160,7 @@ def ball_in(points: Array, triangles: Indices) -> float:
     return shown.radius_between(points) - LOST * float(np.linalg.norm(points, axis=1).max())
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class HandPayload(Declared):
     """The largest mass that a hand holds in every orientation, proved from both sides.
 
@@ -171,7 +172,7 @@ class HandPayload(Declared):
     lower: Amount
     """Mass that is held in every orientation [kg]; zero where none is shown to be, without corners
     of a hull then."""
-    upper: Annotated[float, Range(most=math.inf)]
+    upper: Annotated[float, Interval(le=math.inf)]
     """Mass above which some orientation is not held [kg]."""
     gravities: Annotated[Array, Shape("n", 3)]
     """Corners of a hull that contains the unit ball, (n, 3): gravity in units of its own size.
@@ -229,7 +230,7 @@ class HandPayload(Declared):
         )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@declared(slots=False)
 class CarryingHand(Declared):
     """Contacts, motors and links of a hand, in the object's axes, about its centre of mass."""
 
@@ -336,7 +337,7 @@ class Ray:
 
 def carried_mass(hand: CarryingHand, gap: float = GAP) -> HandPayload:
     """Bound the mass that a hand holds in every orientation, by rays until the bounds meet."""
-    number(gap, "gap", least=FINEST_GAP, below=1.0)
+    number(gap, "gap", ge=FINEST_GAP, lt=1.0)
     found, weakest = _searched(hand, gap)
     push, none = hand.push_n, _nothing_held(hand, weakest)
     for _ in range(TIMES):
@@ -423,7 +424,7 @@ FreeMass = HandPayload
 """Bounds of the mass that forces chosen anew for each orientation hold."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Payload(Declared):
     """The largest mass held in every orientation, with forces chosen beforehand and chosen anew."""
 

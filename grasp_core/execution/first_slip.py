@@ -191,7 +191,7 @@ def first_slip(
     check_grip(grip)
     load = frozen(wrench, (6,), "wrench")
     one_of(model, get_args(Model), "model")
-    number(max_push_n, "max_push_n", least=SMALLEST, most=math.inf)
+    number(max_push_n, "max_push_n", ge=SMALLEST, le=math.inf)
     if not SMALLEST <= float(np.abs(load).max()) <= LARGEST:
         raise InputError(
             f"wrench must not be zero: the largest part is from {SMALLEST:g} to {LARGEST:g}, got "

@@ -40,7 +40,7 @@ compliance of a robotic hand" (1989); Howard & Kumar, "On the stability of grasp
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated
 
@@ -59,7 +59,7 @@ from grasp_core.closure.contacts import (
     listed_contacts,
     stacked,
 )
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.kinds import LARGEST, SMALLEST, instance
 from grasp_core.objects.on_faces import check_body, check_on_faces
@@ -103,7 +103,7 @@ def are_springs(K: Array) -> bool:
     return bool((values >= SMALLEST).all() and (odd <= SYMMETRIC * values[:, -1]).all())
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@declared(slots=False)
 class Grip(Declared):
     """Contacts on an object, held by fingertips on springs with a squeeze that is never replanned.
 

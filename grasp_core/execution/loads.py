@@ -53,7 +53,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Shape, frozen
 from grasp_core.closure.contacts import WRENCH
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.execution.grips import Grip
 from grasp_core.kinds import LARGEST, SMALLEST, Quantity, number, value_of
@@ -73,7 +73,7 @@ ROUNDING = 1e-12
 what rounding leaves. Forces near the tip of a cone may leave it by its root, a millionth."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class LoadSet(Declared):
     """Loads offset + E z with |z| <= 1, the torques about the centre of mass."""
 
@@ -108,7 +108,7 @@ def any_direction(
         InputError: A number is out of range, or there is nothing that has any direction.
     """
     mass = value_of(Quantity, mass_kg, "mass_kg")
-    most = number(acceleration_m_per_s2, "acceleration_m_per_s2", least=0.0, most=LARGEST)
+    most = number(acceleration_m_per_s2, "acceleration_m_per_s2", ge=0.0, le=LARGEST)
     offset, axes = np.zeros(WRENCH), np.zeros((WRENCH, 3))
     if gravity is None:
         axes[:3] = mass * (GRAVITY_M_PER_S2 + most) * np.eye(3)

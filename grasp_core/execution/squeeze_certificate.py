@@ -48,7 +48,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Amount, Array, Figure, Indices, Shape, of_order_one
 from grasp_core.closure.contacts import WRENCH, grasp_map, in_frames
-from grasp_core.declared import Declared, trusted
+from grasp_core.declared import Declared, declared, trusted
 from grasp_core.execution.grips import Grip
 from grasp_core.execution.loads import LoadSet, Reactions
 from grasp_core.kinds import NotNegative
@@ -66,7 +66,7 @@ NONE = 1e-9
 """Scale that is none, in pushes over the change of contact forces at scale one."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Cuts(Declared):
     """Angles and cases of some rows (1)."""
 
@@ -222,7 +222,7 @@ class Survival:
         return (float(rows.b @ multipliers + max_push_n * rows.d @ multipliers) + slack) / taken
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class BestSqueeze(Declared):
     """A squeeze, the loads that it survives without replanning, and a bound on what others survive.
 

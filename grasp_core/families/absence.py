@@ -10,13 +10,13 @@ parts cover the pieces there are no contacts left. `free` finds such proofs, or 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import clip
 from grasp_core.kinds import FrictionOrZero
 from grasp_core.objects.face_pieces import FacePiece
@@ -33,7 +33,7 @@ SAME_CORNERS = 1e-12
 """Distance of a proof's contacts from the corners of its part that counts as rounding."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Absence(Declared):
     """A proof that no four contacts on four convex pieces are in force closure."""
 

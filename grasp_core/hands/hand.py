@@ -44,15 +44,17 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval, Len
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen_each
-from grasp_core.declared import Declared, counted, summary
+from grasp_core.declared import Declared, counted, declared, summary
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import object_of
-from grasp_core.files.records import Key, from_record
+from grasp_core.files.records import from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import HANDS, Many, Range, TorqueLimit, shown, value_of
+from grasp_core.kinds import HANDS, TorqueLimit, shown, value_of
 
 LARGEST_SIZE = 2.0  # largest length of a hand [m]: a larger one is in other units
 MOST_TURN = 2.0 * np.pi  # largest angle of a joint, in either direction [rad]
@@ -89,26 +91,26 @@ Rotation = Annotated[Array, Shape(3, 3), _Turn()]
 Place = Annotated[Array, Shape(3, least=-LARGEST_SIZE, most=LARGEST_SIZE)]
 """A point of a hand, (3,) [m]."""
 Corners = Annotated[
-    Array, Shape(None, 3, least=-LARGEST_SIZE, most=LARGEST_SIZE), Many(2, MOST_CORNERS)
+    Array, Shape(None, 3, least=-LARGEST_SIZE, most=LARGEST_SIZE), Len(2, MOST_CORNERS)
 ]  # fmt: skip
 """Two or more points of a hand, (m, 3) [m]: one corner would make a ball."""
-Length = Annotated[float, Range(least=0.0, most=LARGEST_SIZE)]
-Angle = Annotated[float, Range(least=-MOST_TURN, most=MOST_TURN)]
+Length = Annotated[float, Interval(ge=0.0, le=LARGEST_SIZE)]
+Angle = Annotated[float, Interval(ge=-MOST_TURN, le=MOST_TURN)]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class LinkShape(Declared):
     """All points within `radius` of a box: a box, a capsule or a ball of a link."""
 
-    position: Annotated[Place, Key("position_m")]
+    position: Annotated[Place, Field(alias="position_m")]
     """Middle in the link's frame, (3,) [m]."""
     rotation: Rotation
     """Columns are the box's axes in the link's frame, (3, 3)."""
     half_sizes: Annotated[
-        Array, Shape(3, least=0.0, most=LARGEST_SIZE), Key("half_sizes_m")
+        Array, Shape(3, least=0.0, most=LARGEST_SIZE), Field(alias="half_sizes_m")
     ]  # fmt: skip
     """Half the box's lengths along its axes, (3,) [m], each zero or more."""
-    radius: Annotated[Length, Key("radius_m")]
+    radius: Annotated[Length, Field(alias="radius_m")]
     """Distance from the box to the surface [m]."""
 
     def _check_together(self) -> None:
@@ -122,20 +124,20 @@ class LinkShape(Declared):
         return bool((away + radius <= self.radius + SAME).all())
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Joint(Declared):
     """A revolute joint: where it is on the link before it, its axis, range and torque limit."""
 
     name: str
-    position: Annotated[Place, Key("position_m")]
+    position: Annotated[Place, Field(alias="position_m")]
     """Origin of the moved link's frame, in the frame of the link before it, (3,) [m]."""
     rotation: Rotation
     """Axes of that frame at the angle zero, (3, 3)."""
     axis: UnitVector
     """Unit vector of the axis through the origin, in the moved link's frame, (3,)."""
-    lowest: Annotated[Angle, Key("lowest_rad")]
+    lowest: Annotated[Angle, Field(alias="lowest_rad")]
     """Smallest angle [rad]."""
-    highest: Annotated[Angle, Key("highest_rad")]
+    highest: Annotated[Angle, Field(alias="highest_rad")]
     """Largest angle [rad]."""
     torque_limit_n_m: TorqueLimit | None = None
     """Largest torque of the motor in either direction [N m]; None where no source states one."""
@@ -147,20 +149,20 @@ class Joint(Declared):
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Link(Declared):
     """A part of a finger behind one joint."""
 
     name: str
     joint: Joint
     shapes: tuple[LinkShape, ...]
-    mass_kg: Annotated[float, Range(least=0.0, most=1e3)] | None = None
+    mass_kg: Annotated[float, Interval(ge=0.0, le=1e3)] | None = None
     """Mass [kg]; None where no source states one."""
-    center_of_mass: Annotated[Place, Key("center_of_mass_m")] | None = None
+    center_of_mass: Annotated[Place | None, Field(alias="center_of_mass_m")] = None
     """Centre of mass in the link's frame, (3,) [m]; None where no source states one."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Fingertip(Declared):
     """The end of a finger that touches the object: a ball, or a block.
 
@@ -168,13 +170,13 @@ class Fingertip(Declared):
     a tip has to be one: in planning, and in simulations, where it lies at the block's contact.
     """
 
-    center: Annotated[Place, Key("center_m")]
+    center: Annotated[Place, Field(alias="center_m")]
     """Middle of the ball in the last link's frame, (3,) [m]."""
-    radius: Annotated[float, Range(above=0.0, most=LARGEST_SIZE), Key("radius_m")]
+    radius: Annotated[float, Interval(gt=0.0, le=LARGEST_SIZE), Field(alias="radius_m")]
     """Radius of the ball [m]."""
-    corners: Annotated[Corners, Key("corners_m")] | None = None
+    corners: Annotated[Corners | None, Field(alias="corners_m")] = None
     """Corners of the block in the last link's frame, (m, 3) [m]; None for a ball."""
-    rounding: Annotated[Length, Key("rounding_m")] = 0.0
+    rounding: Annotated[Length, Field(alias="rounding_m")] = 0.0
     """Distance from their hull to the surface of the block [m]; zero for a ball."""
 
     def _check_together(self) -> None:
@@ -194,7 +196,7 @@ class Fingertip(Declared):
         return self.corners, self.rounding
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class HandFinger(Declared):
     """A chain of links from the palm, with a fingertip on the last of them.
 
@@ -219,7 +221,7 @@ class HandFinger(Declared):
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Coupling(Declared):
     """A joint that follows another: its angle is `offset + ratio * angle of the driver`."""
 
@@ -227,10 +229,10 @@ class Coupling(Declared):
     """Name of the joint that follows."""
     driver: str
     """Name of the joint that it follows, which follows none itself."""
-    ratio: Annotated[float, Range(least=-LARGEST_RATIO, most=LARGEST_RATIO)]
+    ratio: Annotated[float, Interval(ge=-LARGEST_RATIO, le=LARGEST_RATIO)]
     """Change of the angle per change of the driver's angle."""
     offset: Annotated[
-        float, Range(least=-LARGEST_OFFSET, most=LARGEST_OFFSET), Key("offset_rad")
+        float, Interval(ge=-LARGEST_OFFSET, le=LARGEST_OFFSET), Field(alias="offset_rad")
     ] = 0.0
     """Angle where the driver's is zero [rad]."""
 
@@ -300,7 +302,7 @@ def drives(names: Sequence[str], ranges: Array, couplings: Sequence[Coupling]) -
     return Drives(drivers, ratios, offsets, found)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Hand(Declared):
     """A palm with three to five fingers, and where its numbers come from."""
 

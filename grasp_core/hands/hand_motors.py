@@ -46,7 +46,6 @@ shift of the points that touch, as in (4) of `grips`, less what the fingertips t
 A finger needs joints that let its fingertip move in all directions, or L' S L has no inverse.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Annotated
@@ -56,6 +55,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import UNIT_SLACK, Array, Shape, cross
 from grasp_core.closure.contacts import WRENCH, contact_frictions, cross_matrix
+from grasp_core.declared import declared
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import GAP, CarryingHand, HandPayload, carried_mass
 from grasp_core.execution.grips import Grip
@@ -185,7 +185,7 @@ def hand_payload(
     return carried_mass(CarryingHand(arms, normals, mu, max_push_n, motors, weights), gap)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@declared(slots=False)
 class HandGrip(Grip):
     """Contacts held by fingers whose joints have servos, with commands that stay as they are."""
 

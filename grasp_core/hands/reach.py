@@ -17,13 +17,13 @@ from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared, summary
+from grasp_core.declared import Declared, declared, summary
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
-from grasp_core.files.records import Key, recorded
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import places
@@ -51,13 +51,13 @@ OBEYED = 1e-6
 """By how much a joint may be off the angle that follows from another: rounding of a file [rad]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class HandReach(Declared):
     """A pose in which a hand stands in a grasp, or why none was found."""
 
     hand: str
     """Name of the hand."""
-    grasp: Annotated[str, Key("id"), Shown("grasp")]
+    grasp: Annotated[str, Field(alias="id"), Shown("grasp")]
     """Id of the grasp."""
     reason: ReachReason
     """Why no pose was found; empty where one was."""
@@ -69,7 +69,7 @@ class HandReach(Declared):
     """Least distance that was asked for between all that must not touch [m]."""
     fingers: Annotated[Indices, Shape("k", whole=True)] | None = None
     """The hand's finger at each contact that is used, (k,)."""
-    joints: Annotated[Array, Shape("j"), Key("joints_rad")] | None = None
+    joints: Annotated[Annotated[Array, Shape("j")] | None, Field(alias="joints_rad")] = None
     """Joint angles in the order of `Hand.joints`, (j,) [rad]."""
     palm_pose: Annotated[Array, Shape(POSE, POSE)] | None = None
     """Pose of the palm in the object's frame, (4, 4)."""
@@ -78,7 +78,9 @@ class HandReach(Declared):
     within_regions: tuple[bool, ...] | None = None
     """Whether each is in the grasp's region for it, or at the planned contact; regions are proved
     for four contacts together, so that they promise nothing to three."""
-    pregrasp: Annotated[Array, Shape("j"), Key("pregrasp_joints_rad")] | None = None
+    pregrasp: Annotated[Annotated[Array, Shape("j")] | None, Field(alias="pregrasp_joints_rad")] = (
+        None
+    )
     """Joint angles at which the fingers are open and the hand is free, (j,) [rad]; None if none
     were found."""
     approach: UnitVector | None = None
@@ -111,33 +113,39 @@ class HandReach(Declared):
                 f"used, contacts and within_regions must be equally many for grasp {self.grasp}"
             )
 
-    @recorded
+    @computed_field
+    @property
     def reached(self) -> Annotated[bool, Shown("reached")]:
         """Whether a pose was found."""
         return self.joints is not None
 
-    @recorded
+    @computed_field
+    @property
     def contacts(self) -> tuple[Contact, ...] | None:
         """Contacts that are reached, k of them, in the grasp's finger order."""
         proof = self.certificate
         return None if proof is None else tuple(map(Contact, proof.positions, proof.normals))
 
-    @recorded
+    @computed_field
+    @property
     def closure_margin(self) -> Annotated[float | None, Shown("margin")]:
         """Margin of force closure with the contacts that are reached, proved."""
         return None if self.certificate is None else self.certificate.margin
 
-    @recorded
+    @computed_field
+    @property
     def contacts_within_regions(self) -> Annotated[int | None, Shown("within regions")]:
         """How many of the contacts are in the grasp's regions for them, or as planned."""
         return None if self.within_regions is None else sum(self.within_regions)
 
-    @recorded
+    @computed_field
+    @property
     def opens(self) -> Annotated[bool | None, Shown("opens")]:
         """Whether the fingers can open by 3 to 15 mm, with the palm where it is."""
         return self.pregrasp is not None if self.reached else None
 
-    @recorded
+    @computed_field
+    @property
     def comes_straight(self) -> Annotated[bool | None, Shown("straight way in")]:
         """Whether the open hand comes in straight over 60 mm, with nothing in the way."""
         return self.approach is not None if self.reached else None

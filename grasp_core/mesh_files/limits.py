@@ -1,9 +1,11 @@
 """Settings of how a mesh is taken: lengths, faces, and limits on what is read."""
 
-from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
-from grasp_core.kinds import Count, Quantity, Range
+from annotated_types import Interval
+
+from grasp_core.declared import declared
+from grasp_core.kinds import Count, Quantity
 from grasp_core.settings import Settings
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
@@ -12,7 +14,7 @@ FORMATS = ("obj", "stl", "ply", "off", "glb")
 Unit: TypeAlias = Literal["m", "cm", "mm", "in"]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class MeshLimits(Settings):
     """Limits on a mesh file's size and content, which bound the time and memory of reading it."""
 
@@ -26,7 +28,7 @@ class MeshLimits(Settings):
     """Largest number of separate parts of a surface: separate bodies and inner cavities."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class PatchLimits(Settings):
     """How flat a patch of a curved surface must be, and how many patches are kept.
 
@@ -34,16 +36,16 @@ class PatchLimits(Settings):
         InputError: A limit is out of range.
     """
 
-    spread_deg: Annotated[float, Range(above=0.0, most=45.0)] = 10.0
+    spread_deg: Annotated[float, Interval(gt=0.0, le=45.0)] = 10.0
     """Largest angle between the surface and a patch's plane [deg]; the friction angle to plan with
     shrinks by as much."""
-    depth: Annotated[float, Range(above=0.0, most=0.1)] = 0.01
+    depth: Annotated[float, Interval(gt=0.0, le=0.1)] = 0.01
     """Largest distance of the surface from a patch's plane, relative to the object's extent."""
-    most: Annotated[int, Range(least=4, most=200)] = 20
+    most: Annotated[int, Interval(ge=4, le=200)] = 20
     """Keep at most this many patches, those with the largest inscribed discs."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Lengths(Settings):
     """What lengths the numbers of a mesh file mean."""
 
@@ -53,7 +55,7 @@ class Lengths(Settings):
     """Factor on the coordinates of a mesh file, besides its unit."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class MeshChoices(MeshLimits):
     """How a mesh is taken."""
 
@@ -61,7 +63,7 @@ class MeshChoices(MeshLimits):
     """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface,
     which may have holes; auto takes patches where there are more than 200 planar faces."""
     patches: PatchLimits = PatchLimits()
-    flatness_m: Annotated[float, Range(least=0.0, most=20.0)] | None = None
+    flatness_m: Annotated[float, Interval(ge=0.0, le=20.0)] | None = None
     """Distance within which corners count as in one plane [m]. If not given, it is a millionth of
     the extent, or what the rounding of the file's coordinates explains."""
     largest_part: bool = False

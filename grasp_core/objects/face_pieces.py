@@ -16,7 +16,7 @@ from typing import Annotated, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Amount, Array, Indices, Point, Shape, UnitVector
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,
@@ -46,7 +46,7 @@ LARGEST_INSET = 0.5
 """Largest distance that a contact keeps from edges, in radii of the piece's largest disc."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class FacePiece(Declared):
     """One convex piece of a face: the points origin + frame @ y for all y with E y <= b."""
 

@@ -8,17 +8,18 @@ above it. The whole triangle is then within 3 d of the hull's border.
 
 import hashlib
 import importlib
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
-from grasp_core.declared import Declared, InNotebooks, counted, summary
+from grasp_core.declared import Declared, InNotebooks, counted, declared, summary
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import LARGEST, Quantity, Range, instance, one_of, path_of, shown, value_of
+from grasp_core.kinds import LARGEST, Quantity, instance, one_of, path_of, shown, value_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import read_triangles
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
@@ -28,7 +29,7 @@ from grasp_core.settings import extended
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Polyhedron(Declared, InNotebooks):
     """A solid bounded by planar faces, with the mass properties of uniform density 1 kg/m^3."""
 
@@ -38,7 +39,7 @@ class Polyhedron(Declared, InNotebooks):
     triangles: Triangles
     """Vertex indices, (t, 3), counter-clockwise seen from outside."""
     faces: tuple[Face, ...]
-    volume: Annotated[float, Range(above=0.0, most=LARGEST)]
+    volume: Annotated[float, Interval(gt=0.0, le=LARGEST)]
     """Volume [m^3]."""
     center_of_mass: Point
     """Centre of mass, (3,) [m]."""

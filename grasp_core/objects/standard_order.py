@@ -39,7 +39,7 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, Shape
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.objects.face_pieces import Shapes, face_shapes, shared_quadruples
 from grasp_core.objects.planar_faces import convex_pieces, planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
@@ -227,7 +227,7 @@ ORDERS = np.array(list(itertools.permutations(range(FINGERS))))
 """Ways to match the fingers of two grasps, (24, 4)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Symmetries(Declared):
     """The orthogonal matrices that map an object to itself about its centre of mass."""
 

@@ -12,12 +12,13 @@ from functools import cached_property
 from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Point, Polygon, Shape, UnitVector
-from grasp_core.declared import Declared, counted, summary
+from grasp_core.declared import Declared, counted, declared, summary
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.kinds import LARGEST, NotNegative, Number, Range
+from grasp_core.kinds import LARGEST, NotNegative, Number
 from grasp_core.values import RIGHT_ANGLE
 
 SIDES = 2
@@ -298,7 +299,7 @@ Places = Annotated[Indices, Shape(None, whole=True)]
 """Places of things in a list, (n,)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Face(Declared):
     """A planar face: one outer border, perhaps holes, and a split into convex pieces."""
 
@@ -306,7 +307,7 @@ class Face(Declared):
     """Unit vector into the object, (3,)."""
     centroid: Point
     """Centre of area, on the plane, (3,) [m]."""
-    area: Annotated[float, Range(above=0.0, most=LARGEST)]
+    area: Annotated[float, Interval(gt=0.0, le=LARGEST)]
     """Area of the face without its holes [m^2]."""
     polygon: Polygon
     """Outer border, (k, 3) [m], counter-clockwise when `normal` points at the viewer."""
@@ -314,7 +315,7 @@ class Face(Declared):
     """Borders of the holes, each (k, 3) [m], clockwise in the same view."""
     pieces: tuple[Polygon, ...]
     """Convex polygons that tile the face, each (k, 3) [m], wound as `polygon`."""
-    spread: Annotated[float, Range(least=0.0, below=RIGHT_ANGLE)] = 0.0
+    spread: Annotated[float, Interval(ge=0.0, lt=RIGHT_ANGLE)] = 0.0
     """Largest angle between the surface and the plane of a curved patch [rad]."""
     depth: NotNegative = 0.0
     """Largest distance of the surface from the plane of a curved patch [m]."""
@@ -329,7 +330,7 @@ class Face(Declared):
 MM = 1e3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Surface(Declared):
     """What is known of an object's triangles."""
 
@@ -345,7 +346,7 @@ class Surface(Declared):
     """Largest distance between two corners of one closed hole [m]."""
     volume_error: NotNegative = 0.0
     """Largest error of the volume if each closed hole was half an ellipsoid, as a share of it."""
-    dropped: Annotated[float, Range(least=0.0, most=1.0)] = 0.0
+    dropped: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.0
     """Area of the parts that were left out, as a share of the whole."""
     flatness_m: NotNegative = 0.0
     """Distance from one plane that the rounding of the coordinates explains [m]; 0 where no more is

@@ -27,16 +27,17 @@ quality. Faces that are not convex count as a whole, up to their borders.
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Amount, Array, Indices, frozen_each
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_polygon
 from grasp_core.kinds import (
@@ -46,7 +47,6 @@ from grasp_core.kinds import (
     Friction,
     Gap,
     MeasureName,
-    Range,
     Seed,
     TimeLimit,
     function,
@@ -112,7 +112,7 @@ def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
     return False
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class GapAt(Declared):
     """How far a search had come at one moment."""
 
@@ -131,7 +131,7 @@ class GapAt(Declared):
         return 1.0 - self.quality / self.bound
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class BestGrasp(Declared):
     """The best grasp found, with a proved bound of the quality of all others."""
 
@@ -357,7 +357,7 @@ def checked_clearance(body: Polyhedron, clearance: float | None) -> float:
     if clearance is None:
         clearance = FINGER_RADIUS * body.radius
     return number(
-        clearance, "clearance", least=0.0, most=body.radius, where=", the object's radius in m"
+        clearance, "clearance", ge=0.0, le=body.radius, where=", the object's radius in m"
     )
 
 
@@ -366,7 +366,7 @@ SMALLEST = 1e-5  # bound that is not lowered any more [N]
 SEED = 0
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class QualityCeiling(Declared):
     """A proved bound on the quality of all contacts on four faces, clear of the edges."""
 
@@ -425,8 +425,8 @@ def quality_ceiling(
     """
     check_planar(body, "quality_ceiling")
     friction = value_of(Friction, friction, "friction")
-    number(known, "known", least=0.0, most=LARGEST)
-    number(gap, "gap", least=SMALLEST_GAP, most=LARGEST_GAP)
+    number(known, "known", ge=0.0, le=LARGEST)
+    number(gap, "gap", ge=SMALLEST_GAP, le=LARGEST_GAP)
     value_of(Cases, parts, "parts")
     given = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
     radii = frozen_each(given, FINGERS, "finger_radius")
@@ -442,7 +442,7 @@ def quality_ceiling(
 
 
 def _grounds(body: Polyhedron, faces: Sequence[int], insets: Array) -> tuple[Grounds, Indices]:
-    each = partial(value_of, Annotated[int, Range(least=0, most=len(body.faces) - 1)], name="faces")
+    each = partial(value_of, Annotated[int, Interval(ge=0, le=len(body.faces) - 1)], name="faces")
     given: tuple[int, ...] = several(faces, each, "faces", "indices")
     if len(given) != FINGERS:
         raise InputError(f"faces must be {FINGERS} indices of faces, got {len(given)}")

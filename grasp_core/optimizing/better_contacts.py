@@ -100,7 +100,7 @@ def optimize_contacts(
     seed = value_of(Seed, seed, "seed")
     if finger_radius is not None:
         where = ", the object's radius in m, or None"
-        number(finger_radius, "finger_radius", least=SMALLEST, most=body.radius, where=where)
+        number(finger_radius, "finger_radius", ge=SMALLEST, le=body.radius, where=where)
     before = _quality(body, grasp, friction)
     if before.lower <= 0.0:
         raise InputError(

@@ -29,14 +29,14 @@ same reason.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 
 from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_polygon
 from grasp_core.objects.face_pieces import (
@@ -72,7 +72,7 @@ REPLAY = "grasp_core.optimizing.replay_kernel"
 TWISTS = "grasp_core.optimizing.twists_kernel"
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Grounds(Declared):
     """Convex polygons on which contacts may be, at unit size about the centre of mass."""
 

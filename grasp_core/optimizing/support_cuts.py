@@ -69,19 +69,20 @@ for the Ferrari-Canny quality. For other measures it is 2, and two arrays say wh
 
 import io
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from annotated_types import Len
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.compiled import compiled
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.text_files import read_bytes, write_parts
-from grasp_core.kinds import FrictionOrZero, Many
+from grasp_core.kinds import FrictionOrZero
 from grasp_core.optimizing.contact_places import REPLAY, Grounds, first_nodes, fitting
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
@@ -125,19 +126,19 @@ class Slack(NamedTuple):
         return cls(slack, 0.0) if measure.is_usual else cls(0.0, slack)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class CutTree(Declared):
     """A proof that a measure of contacts on the pieces of faces is below a bound."""
 
     grounds: Grounds
     """Where contacts may be, at unit size."""
     friction: FrictionOrZero
-    maps: Annotated[Array, Shape(None, 3, 3), Many()]
+    maps: Annotated[Array, Shape(None, 3, 3), Len(1)]
     """Symmetries that are used, matrices about the centre of mass, the identity first, (g, 3, 3).
     """
     threshold: float
     """The multiple of the loads, or the Ferrari-Canny quality [N], that the tree refutes."""
-    deeds: Annotated[Indices, Shape("n", whole=True), Many()]
+    deeds: Annotated[Indices, Shape("n", whole=True), Len(1)]
     """What is done at each node, parents before their children, the whole subtree of a child before
     the next child, (n,): the sum of 2**i over fingers i that may answer; 16 + i if finger i is on
     some pieces or others; 32 + i if it is on one side of a line or the other."""

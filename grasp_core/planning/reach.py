@@ -21,6 +21,7 @@ from itertools import combinations, islice, product
 import numpy as np
 
 from grasp_core.arrays import Array
+from grasp_core.declared import declared
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.kinds import Quantity
 from grasp_core.objects.on_faces import nearest_on_triangles, on_face_slack
@@ -34,7 +35,7 @@ RING_DIRECTIONS = 6
 """Number of approach directions tried on each ring around the normal."""
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Finger(Settings):
     """A finger's radius and the length of its straight way to a contact.
 

@@ -3,15 +3,17 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from textwrap import shorten
 from typing import Annotated, Any, Literal, Protocol, TypeAlias, get_args, runtime_checkable
 
+from pydantic import Field
+
 from grasp_core.arrays import UNIT_SLACK
-from grasp_core.declared import Declared, InNotebooks, counted, summary
+from grasp_core.declared import Declared, InNotebooks, counted, declared, summary
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown, figure
-from grasp_core.files.records import UNRECORDED, Key
+from grasp_core.files.records import UNRECORDED
 from grasp_core.grasp_tables import ById, frame_of
 from grasp_core.kinds import (
     METHODS,
@@ -47,7 +49,7 @@ MOST_FACES = 1000
 """Most faces to plan with: tables of pairs and of spanning triples take some hundred megabytes."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class PlanRequest(PlanSettings):
     """What is to be planned: the settings, and the fingers that must reach their contacts."""
 
@@ -62,7 +64,7 @@ class PlanRequest(PlanSettings):
             widest = math.degrees(math.atan(self.friction))
             where = f", the angle of friction {self.friction}, or None"
             most = widest * (1.0 + UNIT_SLACK)
-            number(self.theta_deg, "theta_deg", least=SMALLEST, most=most, where=where)
+            number(self.theta_deg, "theta_deg", ge=SMALLEST, le=most, where=where)
 
     @property
     def theta(self) -> float:
@@ -85,14 +87,14 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
     """Refuse keywords out of range, and objects with too many faces for the request."""
     check_body(body)
     size, finger = body.radius, request.finger
-    number(request.edge_clearance_m, "edge_clearance_m", below=size, where=ITS_RADIUS)
+    number(request.edge_clearance_m, "edge_clearance_m", lt=size, where=ITS_RADIUS)
     if request.share_faces_m is not None:
         where = ", the object's size, or None"
-        number(request.share_faces_m, "share_faces_m", below=2.0 * size, where=where)
+        number(request.share_faces_m, "share_faces_m", lt=2.0 * size, where=where)
     if finger is not None:
-        number(finger.radius_m, "finger.radius_m", most=size, where=ITS_RADIUS)
+        number(finger.radius_m, "finger.radius_m", le=size, where=ITS_RADIUS)
         farthest, where = FARTHEST_APPROACH * size, ", a thousand radii"
-        number(finger.approach_m, "finger.approach_m", most=farthest, where=where)
+        number(finger.approach_m, "finger.approach_m", le=farthest, where=where)
     faces = len(body.faces)
     if faces > MOST_FACES:
         raise InputError(
@@ -129,7 +131,7 @@ class Proof(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class MethodCounts(Declared):
     """Counts of how the candidates of one planning method ended.
 
@@ -166,7 +168,7 @@ Tally: TypeAlias = Counter[str]
 """The counts of `MethodCounts` by their names, while a search runs."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Outcomes(Declared):
     """Counts of an object's sets of four faces: with a grasp, without, open, out of reach."""
 
@@ -180,16 +182,18 @@ class Outcomes(Declared):
     """Sets of four faces with certified grasps that fingers of the given size cannot reach."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Moved(Declared):
     """How optimisation changed a grasp's quality, as proved bounds (lower, upper)."""
 
     id: Annotated[str, Shown("grasp")]
     moved_from: str
     """Id of the planned grasp; equal to `id` where the grasp was not moved."""
-    before: Annotated[Bounds, Key("ferrari_canny_before"), Shown("quality before", ".4f")]
-    after: Annotated[Bounds, Key("ferrari_canny_after"), Shown("after", ".4f")]
-    ceiling: Annotated[float | None, Key("ferrari_canny_ceiling"), Shown("upper bound", ".4f")]
+    before: Annotated[Bounds, Field(alias="ferrari_canny_before"), Shown("quality before", ".4f")]
+    after: Annotated[Bounds, Field(alias="ferrari_canny_after"), Shown("after", ".4f")]
+    ceiling: Annotated[
+        float | None, Field(alias="ferrari_canny_ceiling"), Shown("upper bound", ".4f")
+    ]
     """Quality that no contacts on the same faces exceed; None where no ceiling was asked for."""
 
     @figure
@@ -198,7 +202,7 @@ class Moved(Declared):
         return self.after[0] / self.before[0]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class PlanCounts(Declared):
     """Counts of what the planner tried on one object."""
 
@@ -212,7 +216,7 @@ class PlanCounts(Declared):
     """Counts of each method: the three families and `free`, as far as they were asked for."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Plan(Declared, ById[Grasp], InNotebooks):
     """The grasps found on one object, the best first, and what was tried.
 
@@ -226,7 +230,7 @@ class Plan(Declared, ById[Grasp], InNotebooks):
     """The object."""
     grasps: tuple[Grasp, ...]
     friction: Friction
-    theta: Annotated[HalfAngle, Key("theta_rad")]
+    theta: Annotated[HalfAngle, Field(alias="theta_rad")]
     """Half-angle of the friction cones planned with, before each quadruple's own limit [rad]."""
     seed: Seed
     counts: PlanCounts
@@ -256,7 +260,7 @@ class Plan(Declared, ById[Grasp], InNotebooks):
     """Face quadruples whose grasps the fingers cannot reach, with the reason."""
     unranked: Annotated[Mapping[str, Number], UNRECORDED] = field(default_factory=dict[str, int])
     """Numbers of grasps without a figure to rank by, which come last, by the reason."""
-    moves: Annotated[tuple[Moved, ...], Key("optimization")] = ()
+    moves: Annotated[tuple[Moved, ...], Field(alias="optimization")] = ()
     """How optimisation changed each grasp; empty if it was not asked for."""
     seconds: Annotated[Mapping[Method, float], UNRECORDED] = field(
         default_factory=dict[Method, float], compare=False

@@ -1,14 +1,15 @@
 """Settings of plans: which grasps of an object are looked for, and how."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
+from annotated_types import Len
+
+from grasp_core.declared import declared
 from grasp_core.kinds import (
     METHODS,
     ConeKind,
     Count,
     Friction,
-    Many,
     Method,
     NotNegative,
     Quantity,
@@ -19,13 +20,13 @@ from grasp_core.kinds import (
 from grasp_core.settings import Settings
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class PlanSettings(Settings):
     """Which grasps to plan."""
 
     friction: Friction = 0.5
     """Coulomb coefficient at every contact."""
-    families: Annotated[tuple[Method, ...], Many()] = METHODS
+    families: Annotated[tuple[Method, ...], Len(1)] = METHODS
     """Families of grasps to construct. `free` looks for grasps of any type on the faces that the
     other families leave over. For faces without a grasp it proves that they have none, or says that
     it is undecided."""

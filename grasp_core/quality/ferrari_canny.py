@@ -61,18 +61,19 @@ collision detection in six dimensions (also Zheng 2013 for this metric).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_core.arrays import Array, Figure, Indices, Shape
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.compiled import compiled
-from grasp_core.declared import Declared, trusted
-from grasp_core.kinds import Range, value_of
+from grasp_core.declared import Declared, declared, trusted
+from grasp_core.kinds import value_of
 from grasp_core.values import Contact, Grasp
 
 GAP = 1e-4
@@ -80,7 +81,7 @@ GAP = 1e-4
 FINEST_GAP = 1e-7
 """Smallest gap that may be asked for: below it, rounding of the planes of tiny simplices costs more
 than they gain."""
-QualityGap = Annotated[float, Range(least=FINEST_GAP, below=1.0)]
+QualityGap = Annotated[float, Interval(ge=FINEST_GAP, lt=1.0)]
 MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
 """Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
 apart."""
@@ -107,7 +108,7 @@ LARGEST_KEY = 2**62
 """Largest integer that may name a ridge, with one digit for each of its corners."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class InnerPolytope(Declared):
     """A polytope inside a wrench set whose planes bound the quality from below."""
 
@@ -215,7 +216,7 @@ def _units(normals: Array) -> Array:
     return normals / np.sqrt(np.maximum(squares, TINY))[:, None]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class FerrariCanny(Declared):
     """Bounds of a quality, with the direction and the polytope, or forces, that prove them."""
 

@@ -49,7 +49,7 @@ Contacts that are not in force closure may have no such forces. For them
 always has an answer; its multipliers are a twist of length up to `STEEP` that bounds m_j.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Annotated, NamedTuple, get_args
 
 import numpy as np
@@ -58,7 +58,7 @@ from numpy.typing import ArrayLike, NDArray
 from grasp_core.arrays import Array, Figure, Shape, frozen
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program, into_cones
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.kinds import LARGEST, SMALLEST, MeasureName, one_of
 from grasp_core.quality.ferrari_canny import (
@@ -95,7 +95,7 @@ NONE_SHOWN = -1.0
 """Lower bound where no multiple is shown to be resisted, not even zero."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Measure(Declared):
     """The set of loads whose largest resisted multiple is a measure of contacts."""
 
@@ -177,7 +177,7 @@ class Measure(Declared):
 FERRARI_CANNY = Measure("ferrari-canny")
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ResistedLoads(Declared):
     """Bounds of the largest multiple of a set of loads that contacts resist, with their proofs."""
 

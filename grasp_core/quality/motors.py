@@ -16,19 +16,19 @@ Links that move, friction in the joints and the motors' dynamics are left out. F
 joints only helps a hold.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Shape, frozen, frozen_each
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.kinds import LARGEST, SMALLEST, instance
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Motors(Declared):
     """The joints of a hand in one pose, with the torques of their motors."""
 

@@ -40,7 +40,7 @@ stated length.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -62,7 +62,7 @@ from grasp_core.closure.contacts import (
 )
 from grasp_core.closure.proofs import ContactCones
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
 from grasp_core.quality.allowed_forces import ROUNDING, AllowedForces, Load, Mixture
@@ -232,7 +232,7 @@ class WrenchBody:
         return moved / self.scale
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class WrenchLimit(Declared):
     """The largest multiple of an external wrench that contacts resist, proved from both sides."""
 

@@ -14,24 +14,24 @@ from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
+from annotated_types import Interval, Len
+from pydantic import Field
 
 from grasp_core.arrays import Array, Indices, Point, Shape
 from grasp_core.closure.contacts import contact_frictions
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import CONTACTS_FILE, GRASPS
 from grasp_core.files.json_text import json_of, object_of, shown, text_of
-from grasp_core.files.records import Key, from_record, record_of
+from grasp_core.files.records import from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import (
     LARGEST,
     LARGEST_FRICTION,
     SMALLEST,
     FrictionOrZero,
-    Many,
     Quantity,
-    Range,
     instance,
     path_of,
 )
@@ -52,7 +52,7 @@ RECORDED = MeshLimits(max_triangles=2_000_000, max_faces=50_000, max_parts=640)
 """Limits for the meshes in grasps files: ten times the usual, for users who raised a limit."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Mesh(Declared):
     """The triangles of an object in a file."""
 
@@ -60,7 +60,7 @@ class Mesh(Declared):
     triangles: Annotated[Indices, Shape(None, 3, whole=True)]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class RecordedObject(Declared):
     """What a file says of the object that grasps were planned on."""
 
@@ -191,10 +191,10 @@ CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
 ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]
 
 Coordinates = Annotated[Array, Shape(3, least=-LARGEST_LENGTH_M, most=LARGEST_LENGTH_M)]
-Length = Annotated[float, Range(above=0.0, most=LARGEST_LENGTH_M)]
+Length = Annotated[float, Interval(gt=0.0, le=LARGEST_LENGTH_M)]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class GivenContact(Declared):
     """A contact in a file; its normal need not be exactly of length one."""
 
@@ -203,23 +203,23 @@ class GivenContact(Declared):
     friction: FrictionOrZero | None = None
 
 
-GivenContacts = Annotated[tuple[GivenContact, ...], Many(FEWEST_CONTACTS, MOST_CONTACTS)]
+GivenContacts = Annotated[tuple[GivenContact, ...], Len(FEWEST_CONTACTS, MOST_CONTACTS)]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class GivenGrasp(Declared):
     """A grasp in a file."""
 
     contacts: GivenContacts
-    id: Annotated[str, Many(1, LONGEST_ID)] | None = None
+    id: Annotated[str, Len(1, LONGEST_ID)] | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class ContactsFile(Declared):
     """A contacts file: the contacts of one grasp, or several grasps."""
 
     contacts: GivenContacts | None = None
-    grasps: Annotated[tuple[GivenGrasp, ...], Many(1, MOST_GRASPS)] | None = None
+    grasps: Annotated[tuple[GivenGrasp, ...], Len(1, MOST_GRASPS)] | None = None
     friction: FrictionOrZero | None = None
     center_m: Coordinates | None = None
     torque_scale_m: Length | None = None
@@ -231,20 +231,20 @@ class ContactsFile(Declared):
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class ContactSet(Declared):
     """The contacts of one grasp, with the centre and the length by which torques are measured."""
 
     id: Annotated[str, Shown("grasp")]
-    positions: Annotated[Array, Shape("k", 3), Key("positions_m")]
+    positions: Annotated[Array, Shape("k", 3), Field(alias="positions_m")]
     """Contact points, (k, 3) [m], k >= 2."""
     normals: Annotated[Array, Shape("k", 3, units=True)]
     """Unit vectors into the object, (k, 3)."""
     friction: Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
     """Coulomb coefficients, (k,)."""
-    center: Annotated[Array, Shape(3), Key("center_m")]
+    center: Annotated[Array, Shape(3), Field(alias="center_m")]
     """Point about which torques are taken, (3,) [m]."""
-    torque_scale: Annotated[Quantity, Key("torque_scale_m")]
+    torque_scale: Annotated[Quantity, Field(alias="torque_scale_m")]
     """Length that makes a torque comparable with a force [m]."""
     center_from: CenterSource
     torque_scale_from: ScaleSource

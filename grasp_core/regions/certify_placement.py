@@ -125,7 +125,7 @@ def misplacement(
         covariance = frozen(pose_covariance, (6, 6), "pose_covariance")
     mean, sigma = friction if isinstance(friction, tuple) else (friction, 0.0)
     value_of(Friction, mean, "friction")
-    shift = number(contact_sigma_m, "contact_sigma_m", least=0.0, most=LARGEST)
+    shift = number(contact_sigma_m, "contact_sigma_m", ge=0.0, le=LARGEST)
     return Misplacement(covariance, shift, mean, sigma)
 
 

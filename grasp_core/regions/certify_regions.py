@@ -87,7 +87,7 @@ def certify_regions(
     check_on_faces(body, grasp)
     value_of(Reserve, reserve, "reserve")
     value_of(bool, recenter, "recenter")
-    number(clearance, "clearance", least=0.0, below=body.radius, where=", the object's radius in m")
+    number(clearance, "clearance", ge=0.0, lt=body.radius, where=", the object's radius in m")
     value_of(MaxCones, max_cones, "max_cones")
     left = value_of(Friction, friction, "friction") * (1.0 - reserve)
     positions, normals = stacked(grasp.contacts)

@@ -53,7 +53,6 @@ What is bounded in the end is the sum of the chances of all failures.
 
 import importlib
 import math
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -62,7 +61,7 @@ from grasp_core.arrays import Amount, Array, Point, Polygon, Shape, cross
 from grasp_core.closure.contacts import unit_size
 from grasp_core.closure.decision import decided_at_once
 from grasp_core.closure.proofs import ContactCones
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, convex_polygon, plane_frame
 from grasp_core.kinds import Friction, NotNegative, Share
@@ -85,7 +84,7 @@ MASS = -np.diff(ABOVE, prepend=1.0)
 """Chances of the intervals."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Misplacement(Declared):
     """How far object, fingers and friction may be off what was planned: Gaussian errors."""
 
@@ -115,7 +114,7 @@ class Misplacement(Declared):
         return min(MOST_TURN, REACH * float(np.linalg.norm(self.root[3:], 2)))
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class PlacementProbability(Declared):
     """A proved lower bound of the chance that a grasp is closed wherever fingers meet the object.
 

@@ -46,14 +46,14 @@ use for regions of reguli, for which Sudsang & Ponce (1995) have no method.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 
 from grasp_core.arrays import Amount, Array, Indices, Point, Polygon, Shape, Wrench, is_array
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
@@ -64,7 +64,7 @@ from grasp_core.geometry.polygons import (
     holds_disc,
     plane_frame,
 )
-from grasp_core.kinds import LARGEST_FRICTION, Quantity, Range
+from grasp_core.kinds import LARGEST_FRICTION, Quantity
 from grasp_core.values import FINGERS, ContactRegion
 
 TWIST = 6
@@ -79,7 +79,7 @@ LARGEST_ENTRY = 2.0**50
 between its inverse and it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class TwistCover(Declared):
     """Cones that fill the space of twists, each with contact forces that resist all its twists.
 
@@ -210,7 +210,7 @@ to `scale`, which is no longer than contacts are apart: files that keep ten digi
 """
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class CertifiedRegions(Declared):
     """Regions in which each finger may stand while the others stand anywhere in theirs."""
 
@@ -224,7 +224,7 @@ class CertifiedRegions(Declared):
     hold all of `borders`."""
     centers: Annotated[Array, Shape(FINGERS, 3)]
     """Centres of the discs, which lie in the polygons, (4, 3) [m]."""
-    limit: Annotated[float, Range(least=0.0, most=math.inf)]
+    limit: Annotated[float, Interval(ge=0.0, le=math.inf)]
     """Radius of slightly larger discs that contain the contacts `open_choice` [m]; infinite if no
     such contacts were found."""
     open_choice: Annotated[Array, Shape(FINGERS, 3)] | None

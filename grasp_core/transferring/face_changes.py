@@ -41,10 +41,10 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from grasp_core.arrays import Array, cross
-from grasp_core.declared import Declared, counted
-from grasp_core.files.records import Key
+from grasp_core.declared import Declared, counted, declared
 from grasp_core.kinds import FaceTurn, Vector, number, value_of
 from grasp_core.objects.on_faces import nearest_on_triangles, on_face_slack
 from grasp_core.objects.polyhedron import Polyhedron
@@ -88,13 +88,13 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
     usual = SHARE_OF_SIZE * old.radius
     most = usual if distance is None else distance
     return Likeness(
-        number(most, "distance", least=0.0, most=old.radius, where=where),
+        number(most, "distance", ge=0.0, le=old.radius, where=where),
         math.radians(value_of(FaceTurn, angle_deg, "angle_deg")),
         SAME * old.radius,
     )
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class FaceChange(Declared):
     """What became of one face of the old part."""
 
@@ -102,24 +102,24 @@ class FaceChange(Declared):
     """Number of the face on the old part."""
     new: int | None
     """Number of its successor on the changed part; None if there is none."""
-    distance: Annotated[float, Key("moved_m")]
+    distance: Annotated[float, Field(alias="moved_m")]
     """How far the face moved, positive outwards, at its old centroid [m]; 0.0 without successor."""
-    turn: Annotated[float, Key("turned_rad")]
+    turn: Annotated[float, Field(alias="turned_rad")]
     """Angle between the old and the new normal [rad]; 0.0 without successor."""
-    old_area: Annotated[float, Key("old_area_m2")]
+    old_area: Annotated[float, Field(alias="old_area_m2")]
     """Area on the old part [m^2]."""
-    new_area: Annotated[float, Key("new_area_m2")]
+    new_area: Annotated[float, Field(alias="new_area_m2")]
     """Area of the successor [m^2]; 0.0 without one."""
     moved: bool
     """Whether the face is gone, or its plane is another one by more than rounding."""
     normal: Vector
     """Inward unit normal on the old part."""
-    center: Annotated[Vector, Key("center_m")]
+    center: Annotated[Vector, Field(alias="center_m")]
     """Centroid on the old part [m]."""
     likely: int | None = None
     """Number of the face that it probably became although it turned too far to succeed it; None if
     it has a successor, or no face is plausible."""
-    likely_turn: Annotated[float, Key("likely_turned_rad")] = 0.0
+    likely_turn: Annotated[float, Field(alias="likely_turned_rad")] = 0.0
     """Angle between the normals of these two [rad]; 0.0 without such a face."""
 
     @property

@@ -1,14 +1,15 @@
 """Settings of how grasps are carried over to a part that has changed."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
+from grasp_core.declared import declared
 from grasp_core.kinds import FaceTurn, NotNegative, Quantity
 from grasp_core.mesh_files.limits import Unit
 from grasp_core.settings import Settings
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Carrying(Settings):
     """How far a face may have moved or turned."""
 
@@ -19,7 +20,7 @@ class Carrying(Settings):
     """Largest angle between the normals of a face before and after [deg]."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class IfChanged(Carrying):
     """What to do if a part has changed since its grasps were planned.
 

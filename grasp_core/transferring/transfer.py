@@ -34,15 +34,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import numpy as np
+from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared, counted, summary
+from grasp_core.declared import Declared, counted, declared, summary
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement
-from grasp_core.files.records import UNRECORDED, Key, recorded
+from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import Friction, Null, OrInfinity, instance, several, value_of
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.reading import read_triangles
@@ -79,7 +80,7 @@ QUALITY_BAND = 0.05
 DRAWS = 8  # how often internal forces are drawn that may make the lines of a witness skew
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class GraspFigures(Declared):
     """What contacts reach at a friction."""
 
@@ -92,7 +93,7 @@ class GraspFigures(Declared):
     """Proved lower and upper bound of the quality [N]; zeros where the contacts are not closed."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class CarriedContact(Declared):
     """What became of one contact of a grasp on the changed part."""
 
@@ -104,15 +105,15 @@ class CarriedContact(Declared):
     """Number of the face of the changed part that it is on now; None if it has no place there."""
     contact: Contact | None
     """The contact on the changed part, with the normal of its face; None if it has no place."""
-    distance: Annotated[OrInfinity, Key("moved_m")]
+    distance: Annotated[OrInfinity, Field(alias="moved_m")]
     """How far it moved [m]; without a place, the distance of the nearest like face, which is
     infinite (null in files) if there is none."""
-    turn: Annotated[float, Key("turned_rad")]
+    turn: Annotated[float, Field(alias="turned_rad")]
     """Angle between its old normal and that of the nearest like face [rad]; 0.0 if there is none.
     """
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class CarriedGrasp(Declared):
     """What became of one grasp on the changed part."""
 
@@ -132,12 +133,14 @@ class CarriedGrasp(Declared):
     grasp: Annotated[Grasp | None, UNRECORDED]
     """The grasp of the changed part, without regions; None exactly where the status is `gone`."""
 
-    @recorded
+    @computed_field
+    @property
     def id(self) -> str:
         """The id of the grasp of the old part."""
         return self.old.id
 
-    @recorded
+    @computed_field
+    @property
     def new_id(self) -> str | None:
         """The id of the grasp of the changed part; None if it is gone."""
         return None if self.grasp is None else self.grasp.id
@@ -147,20 +150,20 @@ class CarriedGrasp(Declared):
         return summary("CarriedGrasp", f"{self.old.id} -> {now}", self.status, reason=self.reason)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Transfer(Declared):
     """Grasps carried over to a changed part, with what became of its faces."""
 
     old: Annotated[Polyhedron, UNRECORDED]
     new: Annotated[Polyhedron, UNRECORDED]
     friction: Friction
-    distance: Annotated[float, Key("distance_m")]
+    distance: Annotated[float, Field(alias="distance_m")]
     """Largest distance by which a contact was allowed to move [m]."""
-    angle: Annotated[float, Key("angle_rad")]
+    angle: Annotated[float, Field(alias="angle_rad")]
     """Largest angle between the normals of like faces [rad]."""
     faces: tuple[FaceChange, ...]
     """What became of each face of the old part, in order."""
-    added: Annotated[tuple[int, ...], Key("added_faces")]
+    added: Annotated[tuple[int, ...], Field(alias="added_faces")]
     """Faces of the changed part that succeed no old one, ascending."""
     grasps: tuple[CarriedGrasp, ...]
     """What became of each grasp, in the order in which they were given."""
@@ -174,7 +177,8 @@ class Transfer(Declared):
         """Return the number of grasps with a status."""
         return sum(each.status == status for each in self.grasps)
 
-    @recorded
+    @computed_field
+    @property
     def bands(self) -> Mapping[str, float]:
         """Differences that do not count: of critical frictions, and of qualities as a share."""
         return {
@@ -182,7 +186,8 @@ class Transfer(Declared):
             "ferrari_canny_share": QUALITY_BAND,
         }
 
-    @recorded
+    @computed_field
+    @property
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps of each status, and of contacts that moved or were lost."""
         contacts = [each for grasp in self.grasps for each in grasp.contacts]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays import Shape as ArrayShape
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.frames import POSE
 from grasp_core.hands.hand import Hand
@@ -141,7 +141,7 @@ def _grid() -> tuple[Array, Truths]:
     return ways, signs > 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class PosedHand(Declared):
     """A hand in a pose in which its fingertips touch an object."""
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices, Point, Polygon
 from grasp_core.arrays import Shape as ArrayShape
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import convex_hull
 from grasp_core.kinds import Quantity, number
 from grasp_core.objects.polyhedron import Polyhedron
@@ -70,7 +70,7 @@ Extent: TypeAlias = Polyhedron | Alone
 """The place and size of what is drawn: of an object, or of a grasp or hand beside it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class View(Declared):
     """A camera that looks at a point, with z of the object's frame upwards."""
 
@@ -192,7 +192,7 @@ MANY = 60
 POLYGON = 3
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Shape(Declared):
     """One thing to draw: polygons, lines and points in the object's frame, with a role."""
 

@@ -27,7 +27,7 @@ from grasp_core.arrays import Array, rounded, to_digits
 from grasp_core.closure.contacts import contact_frames, listed_contacts, unit_size
 from grasp_core.closure.decision import deepest_forces
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.declared import Declared, InNotebooks
+from grasp_core.declared import Declared, InNotebooks, declared
 from grasp_core.errors import UndecidedError
 from grasp_core.files.text_files import write_parts
 from grasp_core.kinds import Friction, instance, number, one_of, path_of, value_of
@@ -85,7 +85,7 @@ RETREAT = 0.5
 too fast."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class FingerDrive(Declared):
     """How one fingertip is built and driven."""
 
@@ -328,7 +328,7 @@ def _drive(
     if fingers.fingertip_radius_m is not None:
         where = ", the object's radius in m, or None"
         number(
-            fingers.fingertip_radius_m, "fingers.fingertip_radius_m", most=body.radius, where=where
+            fingers.fingertip_radius_m, "fingers.fingertip_radius_m", le=body.radius, where=where
         )
     radius = fingers.fingertip_radius_m or rounded(fitting_radius(body, positions, normals))
     return FingerDrive(

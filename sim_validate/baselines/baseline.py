@@ -6,19 +6,21 @@ part, it holds that shape, so that moves of faces are measured from what was acc
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Self, get_args, get_origin
 
+from pydantic import Field
+
 from grasp_core.arrays import Array, Indices, Shape
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.figures import Figure, Kept, compared, keeps
 from grasp_core.files.file_kinds import BASELINE
 from grasp_core.files.json_text import shown
-from grasp_core.files.records import FLAT, Key, RecordFile, record_of
+from grasp_core.files.records import RecordFile, record_of
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import Count, FrictionOrZero, NotNegative, Number
+from grasp_core.kinds import FLAT, Count, FrictionOrZero, NotNegative, Number
 from grasp_core.objects.build import MeshChoices
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
@@ -69,7 +71,7 @@ class ExecutedFigures(Kept):
         return self.execution is not None and self.execution.trials > 0
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Entry(Declared):
     """What a baseline keeps of one grasp."""
 
@@ -104,7 +106,7 @@ class Entry(Declared):
         return found | {f"execution.{name}": value for name, value in executed.items()}
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class RecordedPart(Declared):
     """The changed part that a baseline was written on."""
 
@@ -133,7 +135,7 @@ class RecordedPart(Declared):
         return found
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class How(Settings):
     """How the grasps of a baseline are simulated."""
 
@@ -143,7 +145,7 @@ class How(Settings):
     """How grasps are executed besides; None if they are not."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Baseline(RecordFile):
     """Verdicts on the grasps of one object, and all settings and versions that they depend on."""
 
@@ -167,7 +169,7 @@ class Baseline(RecordFile):
     part: RecordedPart | None = None
     """The part that it was written on; None where that is the one that the grasps were planned on.
     """
-    entries: Annotated[tuple[Entry, ...], Key("grasps")] = ()
+    entries: Annotated[tuple[Entry, ...], Field(alias="grasps")] = ()
 
     def _check_together(self) -> None:
         if len({entry.id for entry in self.entries}) < len(self.entries):

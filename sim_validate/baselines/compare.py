@@ -15,7 +15,7 @@ from enum import StrEnum
 from math import radians
 from typing import Annotated, Any, cast
 
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.figures import Compared, Shown, Worse, compared, figure, unit_of
 from grasp_core.files.records import UNRECORDED, record_of
 from grasp_core.transferring.transfer import FRICTION_BAND
@@ -236,7 +236,7 @@ class Carried:
     gone: Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Finding(Declared):
     """How one grasp has changed since the baseline."""
 

@@ -1,11 +1,12 @@
 """The flags of the commands about baselines; this module imports nothing that is slow to load."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import Positional, arg, subcommand
 
+from grasp_core.declared import declared
 from grasp_core.kinds import Seed
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import IfChanged
@@ -19,7 +20,7 @@ MeshFile = Annotated[Path | None, arg(help=(
 ))]  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Record(Spoken):
     """Simulate grasps and write a baseline: a file that records how stable each grasp is."""
 
@@ -39,7 +40,7 @@ class Record(Spoken):
     jobs: Jobs = field(default_factory=available_cores)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Check(Spoken):
     """Simulate the grasps of a baseline again, and report how each result has changed."""
 
@@ -58,7 +59,7 @@ class Check(Spoken):
     jobs: Jobs = field(default_factory=available_cores)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Baseline(Settings):
     """Record simulation results of grasps, and notice later when their stability changes."""
 

@@ -5,14 +5,16 @@ own grasps, and says what it demands of them.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
-from grasp_core.declared import Declared
+from annotated_types import Interval
+
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import LARGEST_FRICTION, RandomWrenches, Range, Repeats, Seed, Share, value_of
+from grasp_core.kinds import LARGEST_FRICTION, RandomWrenches, Repeats, Seed, Share, value_of
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
@@ -36,7 +38,7 @@ GIVEN = ("limits", "random_wrenches", "repeats", "noise", "seed")
 """Settings that replace those of the agenda of the baseline."""
 
 
-@dataclass(frozen=True, repr=False)
+@declared(slots=False)
 class Suite(Settings):
     """Grasps that must stay as stable as they were; a setting of None is the baseline's."""
 
@@ -175,7 +177,7 @@ TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")
 SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class GraspCase(Declared):
     """A grasp on its object, and the friction at which to test it."""
 
@@ -256,7 +258,7 @@ def _check_any(grasps: Sequence[Grasp], body: Polyhedron, friction: float) -> No
         )
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Demands(Settings):
     """What a test demands of a grasp, beside holding the usual wrenches.
 
@@ -268,7 +270,7 @@ class Demands(Settings):
     """Which trials the grasp goes through; a test gives those of `TRIALS` by their names."""
     min_pass_rate: Share = 0.0
     """Least share of the repeats with noise in which the grasp must hold."""
-    min_margin: Annotated[float, Range(least=0.0, most=LARGEST_FRICTION)] = 0.0
+    min_margin: Annotated[float, Interval(ge=0.0, le=LARGEST_FRICTION)] = 0.0
     """Least difference between the friction and the critical one, both predicted and simulated."""
     setup: Setup = field(default_factory=Setup)
 

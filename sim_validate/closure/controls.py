@@ -16,16 +16,18 @@ from itertools import combinations
 from typing import Annotated
 
 import numpy as np
+from annotated_types import Len
+from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Wrench, cross, rounded, to_digits
 from grasp_core.closure.contacts import stacked
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import SolverError, UndecidedError
 from grasp_core.figures import Shown
-from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
+from grasp_core.files.records import UNRECORDED
 from grasp_core.forces.contact_forces import least_friction_forces
-from grasp_core.kinds import Friction, Many
+from grasp_core.kinds import FLAT, Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertips import clashes, fitting_radius
@@ -44,7 +46,7 @@ TOWARD_CORNER = 0.95
 """How far a moved contact goes towards a corner of its face, as a share of the way."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Control(Declared):
     """A negative control: contacts that must not hold, with the proof that they cannot."""
 
@@ -146,7 +148,7 @@ class ControlLoad:
     required_friction: float | None
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ControlTrial(Declared):
     """One simulated trial of a negative control under one load."""
 
@@ -158,19 +160,21 @@ class ControlTrial(Declared):
     trace: Annotated[Trace | None, UNRECORDED] = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ControlVerdict(Declared):
     """How a negative control, a contact set proved not to be force-closed, ended in simulation."""
 
     control: Annotated[Control, FLAT]
-    tried: Annotated[tuple[ControlTrial, ...], Many(), Key("trials")]
+    tried: Annotated[tuple[ControlTrial, ...], Len(1), Field(alias="trials")]
 
-    @recorded
+    @computed_field
+    @property
     def held(self) -> bool:
         """Whether the control held any of the loads, which it must not."""
         return any(trial.hold.outcome is Outcome.HELD for trial in self.tried)
 
-    @recorded
+    @computed_field
+    @property
     def let_go(self) -> bool:
         """Whether the object moved in every trial, as it must."""
         return all(trial.hold.outcome in LET_GO for trial in self.tried)

@@ -10,13 +10,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
+from pydantic import Field, computed_field
+
 from grasp_core.arrays import Wrench
 from grasp_core.closure.contacts import contacts_sha256, stacked
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS, VERDICTS
-from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
-from grasp_core.kinds import OrInfinity
+from grasp_core.files.records import UNRECORDED
+from grasp_core.kinds import FLAT, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
@@ -67,11 +69,11 @@ class Recorded:
         return self.outcomes.get(wrench, self.others)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Replayed(Declared):
     """The motion and outcome of one trial that was simulated again."""
 
-    name: Annotated[str, Key("wrench")]
+    name: Annotated[str, Field(alias="wrench")]
     load: Annotated[Load, UNRECORDED]
     predicted_limit: OrInfinity | None
     """Largest multiple of the wrench that is resisted by analysis; None for contacts without force
@@ -83,7 +85,8 @@ class Replayed(Declared):
     watched: Annotated[Watched, UNRECORDED]
     scene: Annotated[Scene, UNRECORDED]
 
-    @recorded
+    @computed_field
+    @property
     def wrench_n_nm(self) -> Wrench:
         """Force, then torque about the centre of mass [N, N m]."""
         return self.load.wrench

@@ -7,19 +7,21 @@ other. They are also what `verdicts.json` holds.
 import importlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
+from annotated_types import Len
+from pydantic import computed_field
 
 from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.declared import Declared, InNotebooks
+from grasp_core.declared import Declared, InNotebooks, declared
 from grasp_core.figures import Compared, Shown, figure, less, more
 from grasp_core.files.file_kinds import VERDICTS
-from grasp_core.files.records import FLAT, UNRECORDED, recorded
-from grasp_core.kinds import Friction, Many, Measured, OrInfinity, path_of
+from grasp_core.files.records import UNRECORDED
+from grasp_core.kinds import FLAT, Friction, Measured, OrInfinity, path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import FingerDrive, Scene
@@ -35,7 +37,7 @@ AGREEMENT = 0.02
 """Largest relative error of simulated limits and frictions: five times the worst measured."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class WrenchVerdict(Declared):
     """One wrench on a grasp, predicted and simulated."""
 
@@ -51,7 +53,8 @@ class WrenchVerdict(Declared):
     found."""
     trace: Annotated[Trace | None, UNRECORDED] = field(default=None, compare=False)
 
-    @recorded
+    @computed_field
+    @property
     def simulated_limit(self) -> float | None:
         """Multiple of the applied wrench at which the object lets go; None if not found."""
         return None if self.let_go_at is None else self.let_go_at.share * self.predicted_limit
@@ -100,7 +103,7 @@ class HoldsWrenches(Declared):
             )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class NoisyTrial(Declared):
     """The outcome of one repeat with noise."""
 
@@ -118,24 +121,27 @@ class NoisyTrial(Declared):
     """Whether a predicted limit is so close to a load that the analysis may err either way."""
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Robustness(Declared):
     """All repeats of a grasp with noise, and their statistics."""
 
     noise: Noise
-    trials: Annotated[tuple[NoisyTrial, ...], Many()]
+    trials: Annotated[tuple[NoisyTrial, ...], Len(1)]
 
-    @recorded
+    @computed_field
+    @property
     def held(self) -> int:
         """Number of repeats in which every load held."""
         return sum(trial.outcome is Outcome.HELD for trial in self.trials)
 
-    @recorded
+    @computed_field
+    @property
     def predicted(self) -> int:
         """Number of repeats in which every load is resisted according to the analysis."""
         return sum(trial.predicted is True for trial in self.trials)
 
-    @recorded
+    @computed_field
+    @property
     def interval(self) -> tuple[float, float]:
         """The 95 % confidence interval of the share of repeats that hold."""
         return interval(self.held, len(self.trials))
@@ -161,7 +167,7 @@ ROWS = 8
 """Largest number of trials that notebooks show."""
 
 
-@dataclass(frozen=True, slots=True, repr=False, eq=False)
+@declared
 class Scale(Declared):
     """The sizes with which the trials of a grasp were simulated."""
 
@@ -193,7 +199,7 @@ CONTRADICTED = Compared(more, "contradictions of the analysis", follows=True)
 """How the figures of a verdict are shown, and compared with those of an earlier one."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Verdict(HoldsWrenches, InNotebooks):
     """The result of simulating a grasp: what it held, and whether that fits the analysis."""
 
@@ -213,33 +219,39 @@ class Verdict(HoldsWrenches, InNotebooks):
     scene: Annotated[Scene | None, UNRECORDED] = field(default=None, compare=False)
     """The scene that was simulated; None if the verdict was read from a file."""
 
-    @recorded
+    @computed_field
+    @property
     def contacts_sha256(self) -> str:
         """Hash of the contacts, which tells grasps of one id apart."""
         return contacts_sha256(self.contacts)
 
-    @recorded
+    @computed_field
+    @property
     def predicted_critical_friction(self) -> Annotated[OrInfinity, PREDICTED_FRICTION]:
         """The critical friction by analysis."""
         return self.critical_friction.predicted
 
-    @recorded
+    @computed_field
+    @property
     def simulated_critical_friction(self) -> Annotated[float | None, SIMULATED_FRICTION]:
         """The one found in simulation; None if it was not measured or not found."""
         return self.critical_friction.simulated
 
-    @recorded
+    @computed_field
+    @property
     def shares_found(self) -> Annotated[tuple[float, float] | None, SHARES]:
         """Least and largest share of predicted limits at which the object let go; None if none."""
         found = [each.let_go_at.share for each in self.wrenches if each.let_go_at]
         return (min(found), max(found)) if found else None
 
-    @recorded
+    @computed_field
+    @property
     def displacement_m(self) -> Annotated[Measured, MICRONS_MOVED]:
         """Largest displacement of the object under any wrench, after friction was lowered [m]."""
         return _largest([trial.hold.displacement_m for trial in self.wrenches])
 
-    @recorded
+    @computed_field
+    @property
     def start_displacement_m(self) -> Annotated[Measured, MICRONS_LOADED]:
         """Largest one before that, at high friction: the fingers give way a little [m]."""
         return _largest([trial.hold.start_displacement_m for trial in self.wrenches])
@@ -263,7 +275,8 @@ class Verdict(HoldsWrenches, InNotebooks):
         found = self._weakest.let_go_at
         return None if found is None else self.limit_n * found.share
 
-    @recorded
+    @computed_field
+    @property
     def outcome(self) -> Annotated[Outcome, Shown("outcome", compared=ENDED)]:
         """`held`, or how the first wrench that was not held ended."""
         return self.failures[0].hold.outcome if self.failures else Outcome.HELD
@@ -275,7 +288,8 @@ class Verdict(HoldsWrenches, InNotebooks):
             return ""
         return self.failures[0].hold.reason
 
-    @recorded
+    @computed_field
+    @property
     def held(self) -> bool:
         """Whether every wrench held."""
         return self.outcome is Outcome.HELD
@@ -285,7 +299,8 @@ class Verdict(HoldsWrenches, InNotebooks):
         """Names of the wrenches that were not held, in order."""
         return tuple(trial.name for trial in self.failures)
 
-    @recorded
+    @computed_field
+    @property
     def controls_let_go(self) -> Annotated[bool, Shown("controls let go", compared=None)]:
         """Whether every negative control let go of the object, as it must."""
         return not self.controls_held
@@ -295,7 +310,8 @@ class Verdict(HoldsWrenches, InNotebooks):
         """Names of the negative controls that did not let go: they held, or are undecided."""
         return tuple(each.control.name for each in self.controls if not each.let_go)
 
-    @recorded
+    @computed_field
+    @property
     def mismatches(self) -> Annotated[tuple[str, ...], CONTRADICTED]:
         """Where simulation contradicts the analysis, one sentence each."""
         found = list(self._contradictions())
@@ -324,7 +340,8 @@ class Verdict(HoldsWrenches, InNotebooks):
     def _repeats(self) -> tuple[NoisyTrial, ...]:
         return () if self.robustness is None else self.robustness.trials
 
-    @recorded
+    @computed_field
+    @property
     def good(self) -> bool:
         """Whether all wrenches held, negative controls let go, and nothing was contradicted."""
         return self.held and self.controls_let_go and not self.mismatches
@@ -366,7 +383,7 @@ def _rows(verdict: Verdict) -> list[tuple[str, ...]]:
     return rows + [(mismatch,) for mismatch in verdict.mismatches]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Verdicts(AboutGrasps[Verdict]):
     """The verdicts on an object's grasps, as `verdicts.json` holds them."""
 
@@ -386,7 +403,8 @@ class Verdicts(AboutGrasps[Verdict]):
         """Collect verdicts on the grasps of an object for a file."""
         return cls(AboutObject.of(body), friction, gate, verdicts, complete=complete)
 
-    @recorded
+    @computed_field
+    @property
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps that held, of controls that let go and did not, and contradictions."""
         controls = [control for verdict in self.verdicts for control in verdict.controls]

@@ -36,6 +36,7 @@ from itertools import groupby, product
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
+from grasp_core.declared import declared
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.file_kinds import UNIT
 from grasp_core.files.records import RecordFile
@@ -89,7 +90,7 @@ OTHERS = "others"
 """Subfolder for those files of a unit that are not tables."""
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class UnitRecord(RecordFile):
     """Record of a finished unit of work: where its rows belong, or why it has none."""
 

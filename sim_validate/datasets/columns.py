@@ -7,17 +7,17 @@ value that could not be measured is null.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
+from annotated_types import Interval
 
 from grasp_core.arrays import Array, Indices, Shape, Wrench
-from grasp_core.declared import Declared, rules, types
+from grasp_core.declared import Declared, declared, rules, types
 from grasp_core.errors import InputError
 from grasp_core.figures import Kept, keeps
-from grasp_core.files.records import FLAT
-from grasp_core.kinds import Family, Friction, Number, Range, Seed, Share
+from grasp_core.kinds import FLAT, Family, Friction, Number, Seed, Share
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
@@ -63,7 +63,7 @@ Joints: TypeAlias = Annotated[Array, Shape("hand")]
 Points: TypeAlias = Annotated[Array, Shape(FINGERS, 3)]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ObjectRow(Declared):
     """An object; its mesh, in metres, is `meshes/OBJECT_ID.obj`."""
 
@@ -104,10 +104,11 @@ class ExecutionCells(Kept):
     """Figures of an execution."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
+@declared
 class GraspRow(Declared):
     """Four contacts on an object at one friction, or a negative control made from them."""
 
+    _: KW_ONLY
     grasp_id: str
     """Identifies the row: made of object, friction and name."""
     object_id: str
@@ -126,7 +127,7 @@ class GraspRow(Declared):
     """Family of the grasp, given by its lines of force; null for controls."""
     faces: Four | None = None
     """Indices of the faces or patches; null for controls."""
-    contacts: Annotated[int, Range(least=1, most=FINGERS)]
+    contacts: Annotated[int, Interval(ge=1, le=FINGERS)]
     """Number of contacts: four, fewer for some controls."""
     contact_points_m: ByFinger
     """Contacts by finger; null after the last."""
@@ -314,7 +315,7 @@ class GraspRow(Declared):
         return seat(body, self.points, self.normals).body if other else body
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class TrialRow(Declared):
     """A grasp or control under one wrench, in simulation."""
 
@@ -335,7 +336,7 @@ class TrialRow(Declared):
     """Multiple of the wrench that slips in simulation."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ExecutionRow(Declared):
     """A grasp in one trial of its execution, in simulation."""
 

@@ -8,11 +8,14 @@ The tables that a dataset has are named here as well, since flags need the names
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias, cast, get_args
 
+from annotated_types import Interval
+
+from grasp_core.declared import declared
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import (
     METHODS,
@@ -22,7 +25,6 @@ from grasp_core.kinds import (
     Friction,
     Method,
     RandomWrenches,
-    Range,
     shown,
 )
 from grasp_core.mesh_files.limits import FaceKind, Lengths
@@ -67,11 +69,11 @@ CONTROLS = 5
 """Number of kinds of synthetic negative controls that a grasp has at most."""
 CREDITS = ("title", "license", "creator", "url", "published")
 """Settings that only inform people; no row depends on them."""
-Varied = Annotated[int, Range(least=0, most=100)]
+Varied = Annotated[int, Interval(ge=0, le=100)]
 """A number of rows of one kind that are made from a grasp."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Learning(Settings):
     """What is added to the tables, and how many rows of each kind are made from a grasp."""
 
@@ -87,9 +89,9 @@ class Learning(Settings):
     """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
     figures: tuple[Figure, ...] = ()
     """Groups of figures that each grasp has; docs/datasets.md says what each costs."""
-    seeds: tuple[Annotated[int, Range(least=0, most=MOST_COUNT)], ...] = ()
+    seeds: tuple[Annotated[int, Interval(ge=0, le=MOST_COUNT)], ...] = ()
     """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
-    synthetic: Annotated[int, Range(least=0, most=CONTROLS)] = CONTROLS
+    synthetic: Annotated[int, Interval(ge=0, le=CONTROLS)] = CONTROLS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
     hand: HandName = ""
     """Built-in hand whose pose is looked for in each grasp in force closure; empty for none."""
@@ -120,7 +122,7 @@ def _joints_of(hand: str) -> int:
     return len(load_hand(hand).joints)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Content(Lengths):
     """What a dataset is made of, whether its grasps are planned or given."""
 
@@ -133,7 +135,7 @@ class Content(Lengths):
     """Also find the largest multiple of each wrench in simulation."""
     random_wrenches: RandomWrenches = 0
     """Number of random wrenches that each grasp must hold as well."""
-    seed: Annotated[int, Range(least=0, most=2**63 - 1)] = 0
+    seed: Annotated[int, Interval(ge=0, le=2**63 - 1)] = 0
     """Seed of all random choices."""
     scenes: bool = False
     """Also write each grasp as a MuJoCo scene."""
@@ -149,7 +151,7 @@ class Content(Lengths):
     """Date of publication, such as 2026-11-22, as a clock would make every build differ."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class PlannedContent(Content):
     """What a dataset of planned grasps is made of."""
 
@@ -162,10 +164,11 @@ class PlannedContent(Content):
     ones too."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@declared
 class DatasetConfig(PlannedContent):
     """Settings of a dataset: objects, frictions, families, and how grasps are planned and tried."""
 
+    _: KW_ONLY
     objects: tuple[str, ...]
     """Mesh files, or names of built-in objects."""
     contacts: str = ""

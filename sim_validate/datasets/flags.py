@@ -1,11 +1,12 @@
 """The flags of the commands about datasets; this module imports nothing that is slow to load."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, subcommand
 
+from grasp_core.declared import declared
 from grasp_core.kinds import Count, Seed, Share
 from grasp_core.settings import Settings
 from sim_validate.datasets.config import Content, Learning, PlannedContent, SplitName
@@ -13,7 +14,7 @@ from sim_validate.kit.command_flags import PLAIN, Positive, Spoken
 from sim_validate.kit.workers import available_cores
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Work(Settings):
     """Where a dataset is computed, and how much time; no row depends on these."""
 
@@ -28,7 +29,7 @@ class Work(Settings):
     """Number of processes; results do not depend on it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Build(Spoken):
     """Plan and simulate grasps of many objects and write tables; run it again to resume."""
 
@@ -42,7 +43,7 @@ class Build(Spoken):
     work: Annotated[Work, PLAIN] = field(default_factory=Work)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Import(Spoken):
     """Judge grasps made by another tool, simulate them, and write them as a dataset."""
 
@@ -58,7 +59,7 @@ class Import(Spoken):
     work: Annotated[Work, PLAIN] = field(default_factory=Work)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Verify(Spoken):
     """Check files and rows of a dataset, prove force closure again, and redo a sample."""
 
@@ -70,7 +71,7 @@ class Verify(Spoken):
     """Seed of the random choice of the sample that is computed again."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Export(Spoken):
     """Write the grasps of a dataset that are in force closure for another program."""
 
@@ -84,7 +85,7 @@ class Export(Spoken):
     """Export only the objects of this split; if not given, all objects."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Dataset(Settings):
     """Build a dataset of grasps of many objects; check or export datasets."""
 

@@ -22,13 +22,16 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any
 
-from grasp_core.declared import Declared, FieldError
+from annotated_types import Interval
+from pydantic import computed_field
+
+from grasp_core.declared import Declared, FieldError, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.file_kinds import MANIFEST
 from grasp_core.files.json_text import object_of
-from grasp_core.files.records import Record, RecordFile, from_record, record_of, recorded
+from grasp_core.files.records import Record, RecordFile, from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import Number, Range, one_of, path_of, shown
+from grasp_core.kinds import Number, one_of, path_of, shown
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
@@ -60,10 +63,10 @@ from sim_validate.planning.asked_objects import NAMED, some
 
 CONFIG = "config.toml"
 QUARANTINE = "quarantine.jsonl"
-Size = Annotated[int, Range(least=0)]
+Size = Annotated[int, Interval(ge=0)]
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Listed(Declared):
     """One file of a dataset, as the manifest lists it."""
 
@@ -93,7 +96,7 @@ class Listed(Declared):
         return ""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Manifest(RecordFile):
     """The files of a dataset, and all that decided their contents."""
 
@@ -129,7 +132,8 @@ class Manifest(RecordFile):
         """Tables of the dataset, with their columns."""
         return dataset_tables(self.groups)
 
-    @recorded
+    @computed_field
+    @property
     def rows(self) -> Mapping[str, int]:
         """Number of rows of each table."""
         return {name: self.count(name) for name in self.tables}
@@ -170,7 +174,7 @@ def read_manifest(folder: Path) -> Manifest:
     return Manifest.read(path)
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class LeftOut(Declared):
     """A unit of work without rows, with the reason."""
 

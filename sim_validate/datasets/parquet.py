@@ -24,13 +24,14 @@ from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_orig
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from grasp_core.arrays import Shape
 from grasp_core.declared import rules, types
 from grasp_core.errors import InputError
 from grasp_core.figures import Figure, figures, meanings, unit_of
 from grasp_core.files.json_text import shown
-from grasp_core.files.records import Key, entries, record_of
+from grasp_core.files.records import entries, record_of
 from grasp_core.kinds import OrInfinity
 from grasp_core.values import FINGERS
 from sim_validate.datasets.config import KEYS, Name
@@ -83,9 +84,8 @@ def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[Column, ...]:
     A group's size is the length that has its name in the shape of an array; a length that is free
     is the number of fingers.
     """
-    own, properties = entries(kind)
     found: list[Column] = []
-    for each in (*own, *properties):
+    for each in entries(kind):
         marks = rules(each.kind)
         if any(isinstance(mark, Asked) and mark.group not in groups for mark in marks):
             continue
@@ -138,7 +138,7 @@ def in_columns(kind: type, told: tuple[str, ...], beginning: str = "") -> Iterat
         form = _form(each.kind, {})
         if form is not None and each.name not in told:
             held = int if form[0] == "int" else each.kind
-            yield each._replace(kind=Annotated[held | None, Key(f"{beginning}{each.name}")])
+            yield each._replace(kind=Annotated[held | None, Field(alias=f"{beginning}{each.name}")])
 
 
 def _plain(value: Any) -> Any:

@@ -24,7 +24,7 @@ from typing import Annotated, Any
 
 from grasp_core.arrays import Array, Shape
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import GraspError, InputError, UnfaithfulError, about
 from grasp_core.files.json_text import json_of
 from grasp_core.files.records import record_of
@@ -64,7 +64,7 @@ NO_FRICTION = 1.0
 has its own."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class GivenGrasp(Declared):
     """Four contacts made by another tool, in the object's frame."""
 

@@ -42,12 +42,12 @@ from functools import lru_cache
 from typing import Protocol, Self
 
 import numpy as np
+from pydantic import computed_field
 
 from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frictions, stacked
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import UnfaithfulError
-from grasp_core.files.records import recorded
 from grasp_core.kinds import Measured, OrInfinity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
@@ -76,7 +76,7 @@ PUSH = 0.6
 """Normal force of the fingers on the box, relative to the largest normal force allowed."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Check(Declared):
     """One figure measured in simulation, and the interval in which it must lie."""
 
@@ -503,14 +503,15 @@ def touch_checks(
 USUAL_FRICTION, USUAL_RADIUS_M = 0.5, 0.07
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Gate(Declared):
     """The results of checking a version of MuJoCo on cases with known answers."""
 
     checks: tuple[Check, ...]
     mujoco: str
 
-    @recorded
+    @computed_field
+    @property
     def passed(self) -> bool:
         """Whether all checks passed."""
         return all(check.passed for check in self.checks)

@@ -40,7 +40,7 @@ from grasp_core.closure.contacts import (
     normal_and_tangential,
     stacked,
 )
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import NoForcesError, SolverError, UndecidedError
 from grasp_core.forces.contact_forces import even_forces
 from grasp_core.kinds import OrInfinity
@@ -258,7 +258,7 @@ same."""
 HELD, SLID, UNKNOWN = 1, 0, -1
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class SimulatedLimit(Declared):
     """Two shares of a wrench's predicted limit: the object holds the first and not the second."""
 
@@ -363,7 +363,7 @@ times the critical friction. A tilt of the object acts like that much additional
 hide a force imbalance of five times as much, in largest normal forces."""
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class CriticalFriction(Declared):
     """The critical friction that the analysis predicts, and the one that simulation finds."""
 

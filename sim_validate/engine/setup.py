@@ -11,22 +11,23 @@ left out, which means zero.
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
+from annotated_types import Interval, Len
 
 from grasp_core.arrays import Wrench, frozen_copy, to_digits
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate, force_closure
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.file_kinds import WRENCH_FILE
 from grasp_core.files.json_text import object_of, shown
 from grasp_core.files.records import UNRECORDED, from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import LARGEST, SMALLEST, Many, Range, Seed, Vector
+from grasp_core.kinds import LARGEST, SMALLEST, Seed, Vector
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.settings import CHOSEN, named
@@ -47,7 +48,7 @@ HARD_FINGER = 3
 """MuJoCo's `condim` of a contact whose force has a normal and two tangential parts."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Setup(ScaledScene):
     """How trials are simulated: physics, fingertips, surface, durations and thresholds.
 
@@ -61,11 +62,11 @@ class Setup(ScaledScene):
     hold: HoldProtocol = field(default_factory=HoldProtocol)
     limit: LimitProtocol = field(default_factory=LimitProtocol)
     friction: FrictionProtocol = field(default_factory=FrictionProtocol)
-    threads: Annotated[int, Range(least=1, most=MOST_THREADS), CHOSEN, UNRECORDED] = field(
+    threads: Annotated[int, Interval(ge=1, le=MOST_THREADS), CHOSEN, UNRECORDED] = field(
         default=1, compare=False
     )
     """Number of threads that the simulator uses; results do not depend on it."""
-    timeout_s: Annotated[float, Range(above=0.0, most=math.inf), CHOSEN, UNRECORDED] = field(
+    timeout_s: Annotated[float, Interval(gt=0.0, le=math.inf), CHOSEN, UNRECORDED] = field(
         default=math.inf, compare=False
     )
     """Time after which the trials of one contact set are stopped [s]."""
@@ -105,7 +106,7 @@ class Setup(ScaledScene):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class NamedWrench(Declared):
     """An external wrench with a name that the user gives it."""
 
@@ -128,7 +129,7 @@ class NamedWrench(Declared):
             )
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Agenda(ChosenTrials):
     """Which trials a grasp goes through.
 
@@ -191,7 +192,7 @@ def physics_from_file(path: Path) -> dict[str, Any]:
 MOST_WRENCHES = 10_000
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class GivenWrench(Declared):
     """A wrench of a file."""
 
@@ -200,11 +201,11 @@ class GivenWrench(Declared):
     torque_n_m: Vector = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class WrenchFile(Declared):
     """The wrenches of a file, all with different names."""
 
-    wrenches: Annotated[tuple[GivenWrench, ...], Many(most=MOST_WRENCHES)]
+    wrenches: Annotated[tuple[GivenWrench, ...], Len(1, MOST_WRENCHES)]
 
     def _check_together(self) -> None:
         names: set[str] = set()

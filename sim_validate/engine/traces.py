@@ -64,7 +64,7 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Shape, cross
 from grasp_core.closure.contacts import cross_matrix, normal_and_tangential
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.figures import Shown
 from grasp_core.kinds import Measured
 from grasp_core.objects.on_faces import within
@@ -211,7 +211,7 @@ LET_GO = (Outcome.SLIPPED, Outcome.LOST_CONTACT)
 it is held."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class HoldVerdict(Declared):
     """The outcome of a trial, with the figures that led to it."""
 

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array
@@ -30,7 +31,7 @@ from grasp_core.closure.contacts import contact_arrays, contacts_sha256, listed_
 from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
-from grasp_core.kinds import Range, instance, one_of, value_of
+from grasp_core.kinds import instance, one_of, value_of
 from grasp_core.objects.on_faces import (
     check_body,
     check_on_faces,
@@ -223,7 +224,7 @@ def execution_of(
     holder: Holder, settings: ExecutionSettings, *, threads: int, enough: bool
 ) -> Execution:
     """Choose the squeeze, simulate its trials, and find what would be enough if they are lost."""
-    value_of(Annotated[int, Range(least=1, most=MOST_THREADS)], threads, "threads")
+    value_of(Annotated[int, Interval(ge=1, le=MOST_THREADS)], threads, "threads")
     value_of(bool, enough, "enough")
     try:
         best = holder.squeeze(settings)

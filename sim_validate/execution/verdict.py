@@ -5,17 +5,19 @@ These are also what `executions.json` holds.
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
+from pydantic import Field, computed_field
+
 from grasp_core.arrays import Array, Shape
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more
 from grasp_core.files.file_kinds import EXECUTIONS
-from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
-from grasp_core.kinds import FieldError, Number, OrInfinity, Quantity, path_of
+from grasp_core.files.records import UNRECORDED
+from grasp_core.kinds import FLAT, FieldError, Number, OrInfinity, Quantity, path_of
 from grasp_core.solvers.ties import first_best
 from scenes.settings import PhysicsSettings
 from sim_validate.kit.files import AboutGrasps
@@ -44,7 +46,7 @@ FAILED = Compared(lambda _, after: after is not None)
 """How figures are compared with those of an earlier execution."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ExecutionTrial(Declared):
     """One trial of an execution, simulated and predicted."""
 
@@ -104,7 +106,7 @@ class ExecutionTrial(Declared):
         return self.fate == "dropped"
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ExecutionControl(Declared):
     """A trial that must slip: the least load that does so, on a grip weaker than certified."""
 
@@ -116,7 +118,7 @@ class ExecutionControl(Declared):
     """Multiple of the load at which a contact slipped."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Skipped(Declared):
     """A kind of trial that was asked for and left out, and why."""
 
@@ -124,7 +126,7 @@ class Skipped(Declared):
     reason: str
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Enough(Declared):
     """The least push that is proved to carry what the trials ask, or the reason why none is."""
 
@@ -161,13 +163,13 @@ class Enough(Declared):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Execution(Declared):
     """The trials of one grasp, executed with one squeeze that was never replanned."""
 
     mass_kg: Quantity
     """Mass of the object [kg]."""
-    squeeze: Annotated[Array, Shape("k", 3), Key("squeeze_n")]
+    squeeze: Annotated[Array, Shape("k", 3), Field(alias="squeeze_n")]
     """Contact forces at rest, on the object, (k, 3) [N]."""
     load_multiple: Annotated[float, Shown("load", ".3g", compared=PREDICTED)]
     """Multiple of the object's weight, in any direction, that the squeeze is certified for; this
@@ -194,38 +196,44 @@ class Execution(Declared):
             raise FieldError("squeeze", "must have a force for each contact, at least two, got "
                              f"{len(self.squeeze)}")  # fmt: skip
 
-    @recorded
+    @computed_field
+    @property
     def payload_kg(self) -> Annotated[float, Shown("payload kg", ".3g", compared=None)]:
         """Largest mass that the squeeze is certified to carry slowly, in any direction [kg]."""
         return self.load_multiple * self.mass_kg
 
-    @recorded
+    @computed_field
+    @property
     def predicted_first_slip(
         self,
     ) -> Annotated[OrInfinity, Shown("slip", MULTIPLE, compared=PREDICTED)]:
         """Least multiple of a trial's load at which a contact slips, predicted."""
         return min((trial.predicted_first_slip for trial in self.trials), default=math.inf)
 
-    @recorded
+    @computed_field
+    @property
     def simulated_first_slip(
         self,
     ) -> Annotated[OrInfinity, Shown("in sim", MULTIPLE, compared=SIMULATED)]:
         """Least multiple of a load that slips in simulation; one also stands for a later slip."""
         return min((trial.simulated_first_slip for trial in self.trials), default=math.inf)
 
-    @recorded
+    @computed_field
+    @property
     def displacement_m(
         self,
     ) -> Annotated[OrInfinity, Shown("mm moved", ".3g", MILLI, UNKNOWN, compared=MOVED)]:
         """Largest displacement of the centre of mass against the palm in any trial [m]."""
         return max((trial.displacement_m for trial in self.trials), default=0.0)
 
-    @recorded
+    @computed_field
+    @property
     def lost(self) -> Annotated[tuple[str, ...], Shown("lost", compared=LOSSES)]:
         """Trials that the object did not survive, by name."""
         return tuple(trial.name for trial in self.trials if not trial.survived)
 
-    @recorded
+    @computed_field
+    @property
     def controls_held(self) -> Annotated[tuple[str, ...], CONTROLS_HELD]:
         """Negative controls that did not slip, as they must, by name."""
         return tuple(control.name for control in self.controls if not control.let_go)
@@ -274,7 +282,7 @@ class Execution(Declared):
         return sum(trial.survived for trial in own), len(own)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ExecutedGrasp(Declared):
     """A grasp with what its execution found, or with the reason why no squeeze holds the object."""
 
@@ -305,17 +313,20 @@ class ExecutedGrasp(Declared):
         if self.survived and self.enough is not None:
             raise FieldError("enough", "must be None (null), as every trial was survived")
 
-    @recorded
+    @computed_field
+    @property
     def survived(self) -> Annotated[bool, Shown("survived", compared=Compared(less))]:
         """Whether the object survived every trial, of at least one."""
         return self.execution is not None and self.execution.survived
 
-    @recorded
+    @computed_field
+    @property
     def controls_let_go(self) -> bool:
         """Whether every negative control slipped, as it must; True where there is none."""
         return self.execution is None or self.execution.controls_let_go
 
-    @recorded
+    @computed_field
+    @property
     def least_predicted_loss(
         self,
     ) -> Annotated[OrInfinity, Shown("least loss", MULTIPLE, compared=None)]:
@@ -332,7 +343,7 @@ class ExecutedGrasp(Declared):
         return () if self.execution is None else self.execution.trials
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Executions(AboutGrasps[ExecutedGrasp]):
     """The executions of an object's grasps, as `executions.json` holds them."""
 
@@ -341,13 +352,14 @@ class Executions(AboutGrasps[ExecutedGrasp]):
 
     settings: ExecutionSettings
     """How they were executed, with the impulse of a knock that was used."""
-    grasps: Annotated[tuple[ExecutedGrasp, ...], Key("executions")]
+    grasps: Annotated[tuple[ExecutedGrasp, ...], Field(alias="executions")]
     """What the execution of each grasp found."""
 
     def _check_together(self) -> None:
         object.__setattr__(self, "settings", self.settings.used)
 
-    @recorded
+    @computed_field
+    @property
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps, trials and negative controls, and how they ended."""
         found = [grasp.execution for grasp in self.grasps if grasp.execution is not None]

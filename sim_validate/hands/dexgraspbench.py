@@ -23,26 +23,28 @@ import io
 import math
 import pickle
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, cast
 
 import numpy as np
+from annotated_types import Len
+from pydantic import Field
 
 from grasp_core.arrays import Array, Shape, to_digits
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.declared import Declared, summary
+from grasp_core.declared import Declared, declared, summary
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown, text_of
-from grasp_core.files.records import Key, from_record, keys, record_of
+from grasp_core.files.records import from_record, keys, record_of
 from grasp_core.files.text_files import read_bytes, write_parts, write_text
 from grasp_core.hands.collisions import tip_gaps
 from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.hand_arrays import places, tip_jacobians
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
-from grasp_core.kinds import Friction, Many, Quantity, instance, number, path_of, value_of
+from grasp_core.kinds import Friction, Quantity, instance, number, path_of, value_of
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
@@ -83,25 +85,25 @@ class _Rooted:
         return "with a quaternion (w, x, y, z) of length 1 in numbers 3 to 6"
 
 
-Configuration = Annotated[Array, Shape("n"), Many(FREE + 1), _Rooted()]
+Configuration = Annotated[Array, Shape("n"), Len(FREE + 1), _Rooted()]
 """Pose of the hand's root, then angles of at least one joint, (7 + j,) [m, rad]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class DexRecord(Declared):
     """A grasp of a hand as DexGraspBench records it."""
 
-    object_path: Annotated[str, Key("obj_path")]
+    object_path: Annotated[str, Field(alias="obj_path")]
     """Folder of the object, as the record names it."""
-    object_scale: Annotated[Quantity, Key("obj_scale")]
+    object_scale: Annotated[Quantity, Field(alias="obj_scale")]
     """Factor on the lengths of the object's mesh."""
-    object_pose: Annotated[Array, Shape(FREE), _Rooted(), Key("obj_pose")]
+    object_pose: Annotated[Array, Shape(FREE), _Rooted(), Field(alias="obj_pose")]
     """Position and quaternion (w, x, y, z) of the object, (7,)."""
-    pregrasp: Annotated[Configuration, Key("pregrasp_qpos")]
+    pregrasp: Annotated[Configuration, Field(alias="pregrasp_qpos")]
     """Pose of the hand's root, then joint angles, (7 + j,) [m, rad]."""
-    grasp: Annotated[Configuration, Key("grasp_qpos")]
+    grasp: Annotated[Configuration, Field(alias="grasp_qpos")]
     """Pose of the root and joint angles where the hand touches, (7 + j,) [m, rad]."""
-    squeeze: Annotated[Configuration, Key("squeeze_qpos")]
+    squeeze: Annotated[Configuration, Field(alias="squeeze_qpos")]
     """Pose of the root and joint angles that servos are told to squeeze with, (7 + j,) [m, rad]."""
 
     def __repr__(self) -> str:
@@ -314,7 +316,7 @@ def hand_file(hand: Hand) -> HandServos:
     return HAND_FILES.get(hand.name, HandServos())
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class RecordedReach(HandReach):
     """What is found of a recorded grasp; tests of other tools judge the record itself."""
 
@@ -422,7 +424,7 @@ def reach_of_record(
     instance(hand, Hand, "hand", "load_hand makes one")
     check_body(body)
     value_of(Friction, friction, "friction")
-    number(touch_m, "touch_m", least=0.0, most=1.0)
+    number(touch_m, "touch_m", ge=0.0, le=1.0)
     value_of(str, name, "name")
     joints = record.grasp[FREE:]
     if len(joints) != len(hand.joints):

@@ -3,12 +3,13 @@
 This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from grasp_core.declared import declared
 from grasp_core.kinds import HANDS, Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
 from sim_validate.kit.command_flags import (
     AtFriction,
@@ -28,7 +29,7 @@ Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
 ))]  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Hand(Spoken):
     """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
 
@@ -36,7 +37,7 @@ class Hand(Spoken):
     fingertips: Fingertips = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Reach(Spoken):
     """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
 

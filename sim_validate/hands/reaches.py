@@ -6,22 +6,21 @@ another hand and is refused.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from pydantic import computed_field
 
 from grasp_core.arrays import UnitVector
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.execution.carried_mass import HandPayload
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import REACHES
-from grasp_core.files.records import FLAT, recorded
 from grasp_core.hands.collisions import tip_distances
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
-from grasp_core.kinds import Direction, HandClearance, NotNegative, Seed, Starts
+from grasp_core.kinds import FLAT, Direction, HandClearance, NotNegative, Seed, Starts
 from grasp_core.settings import Settings
 from sim_validate.execution.verdict import ExecutedGrasp
 from sim_validate.hands.trials import HandVerdict
@@ -32,7 +31,7 @@ TOUCHING_M = 1e-4
 """How far a fingertip of a file may be from its contact [m]: ten times what reaching allows."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class ReachSettings(Settings):
     """What is asked of a pose, as `reach_with` takes it."""
 
@@ -48,7 +47,7 @@ class ReachSettings(Settings):
     """Seed of the postures from which the search starts."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class CarriedMass(Declared):
     """The largest mass that a hand holds in any orientation, its links included."""
 
@@ -65,7 +64,7 @@ class CarriedMass(Declared):
         return cls(found.lower, found.upper, found.weakest)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ReachedGrasp(Declared):
     """What was found of a hand in one grasp."""
 
@@ -84,7 +83,8 @@ class ReachedGrasp(Declared):
         """Id of the grasp."""
         return self.reach.grasp
 
-    @recorded
+    @computed_field
+    @property
     def payload_kg(self) -> Annotated[float | None, Shown("payload kg", ".3g")]:
         """Largest mass that the motors hold whichever way the hand is turned, links included."""
         return None if self.payload is None else self.payload.lower_kg
@@ -100,7 +100,7 @@ class ReachedGrasp(Declared):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Reaches(AboutGrasps[ReachedGrasp]):
     """A hand in the grasps of an object, as `reaches.json` holds it."""
 
@@ -137,7 +137,8 @@ class Reaches(AboutGrasps[ReachedGrasp]):
             return f"a fingertip is {1e3 * float(off.max()):.3g} mm off its contact"
         return ""
 
-    @recorded
+    @computed_field
+    @property
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps by how the search ended: reached, or why not."""
         reasons = [each.reach.reason for each in self.reaches]

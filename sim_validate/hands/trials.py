@@ -38,19 +38,20 @@ from functools import partial
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Shape, rounded, to_digits
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.declared import Declared, summary
+from grasp_core.declared import Declared, declared, summary
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.figures import Shown
-from grasp_core.files.records import FLAT, UNRECORDED, Key, recorded
+from grasp_core.files.records import UNRECORDED
 from grasp_core.hands.hand import Fingertip, Hand, HandFinger, Joint, Link
 from grasp_core.hands.hand_motors import hand_grip
 from grasp_core.hands.reach import HandReach, stance_of
-from grasp_core.kinds import SMALLEST, Friction, Quantity, instance
+from grasp_core.kinds import FLAT, SMALLEST, Friction, Quantity, instance
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.motors import Motors
@@ -101,7 +102,7 @@ FRICTIONS = (0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
 """Frictions that are tried for the control with low friction, over that of the grasp."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class HandControl(Declared):
     """A load that a hand provably cannot hold, after one thing has been changed."""
 
@@ -111,7 +112,7 @@ class HandControl(Declared):
     """What was changed, as a sentence."""
     friction: Friction
     """Coulomb coefficient at every contact."""
-    limits: Annotated[Array, Shape(None), Key("torque_limits_n_m")]
+    limits: Annotated[Array, Shape(None), Field(alias="torque_limits_n_m")]
     """Largest torque of each joint, (joints,) [N m]."""
     share: float
     """What is applied, over the limit before the change."""
@@ -279,26 +280,27 @@ def _displaced(scene: HandScene, setup: Setup) -> Check:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class HandControlVerdict(Declared):
     """How a negative control of a hand ended in simulation."""
 
     control: Annotated[HandControl, FLAT]
     hold: Annotated[HoldVerdict, FLAT]
 
-    @recorded
+    @computed_field
+    @property
     def let_go(self) -> bool:
         """Whether the object moved, as it must."""
         return self.hold.outcome in LET_GO
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class HandVerdict(HoldsWrenches):
     """The result of simulating a hand in a grasp: what it held, and whether that was predicted."""
 
     hand: str
     """Name of the hand."""
-    grasp: Annotated[str, Key("id"), Shown("grasp")]
+    grasp: Annotated[str, Field(alias="id"), Shown("grasp")]
     """Id of the grasp."""
     friction: Friction
     radius_m: Quantity
@@ -316,7 +318,8 @@ class HandVerdict(HoldsWrenches):
         if WEAKEST not in {trial.name for trial in self.wrenches}:
             raise InputError(f"wrenches must have one that is named {WEAKEST!r}, got none")
 
-    @recorded
+    @computed_field
+    @property
     def weakest_n(self) -> Annotated[float, Shown("weakest wrench N", ".3g")]:
         """Size of the weakest wrench that was found, at its predicted limit, torques over radius.
 
@@ -324,27 +327,32 @@ class HandVerdict(HoldsWrenches):
         """
         return self._largest_n(self.radius_m)
 
-    @recorded
+    @computed_field
+    @property
     def held(self) -> Annotated[bool, Shown("held")]:
         """Whether every wrench held, at 80 % of what contacts and motors resist by the analysis."""
         return not self.failures
 
-    @recorded
+    @computed_field
+    @property
     def not_held(self) -> Annotated[tuple[str, ...], Shown("not held")]:
         """Names of the wrenches that were not held."""
         return tuple(trial.name for trial in self.failures)
 
-    @recorded
+    @computed_field
+    @property
     def controls_let_go(self) -> Annotated[bool, Shown("controls let go")]:
         """Whether every negative control let go of the object, as it must."""
         return all(control.let_go for control in self.controls)
 
-    @recorded
+    @computed_field
+    @property
     def mismatches(self) -> tuple[str, ...]:
         """Where simulation contradicts the analysis, one sentence each."""
         return tuple(self._contradictions())
 
-    @recorded
+    @computed_field
+    @property
     def good(self) -> bool:
         """Whether wrenches held, controls let go, and nothing was contradicted."""
         return self.held and self.controls_let_go and not self.mismatches

@@ -3,13 +3,16 @@
 This module imports nothing that is slow to load, so that help and usage errors answer at once.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, field
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
+from annotated_types import Interval
+from pydantic import AfterValidator
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
+from grasp_core.declared import declared
 from grasp_core.kinds import (
     MOST_COUNT,
     RANKINGS,
@@ -17,19 +20,18 @@ from grasp_core.kinds import (
     Count,
     Direction,
     Edges,
-    Ending,
     Friction,
     FrictionOrZero,
     Gap,
     MeasureName,
     Quantity,
-    Range,
     RankBy,
     Seed,
     Share,
-    Size,
     TimeLimit,
     Vector,
+    ending,
+    nonzero,
 )
 from grasp_core.mesh_files.limits import FORMATS, Lengths, MeshChoices, MeshLimits
 from grasp_core.planning.settings import PlanSettings
@@ -39,7 +41,7 @@ from scenes.settings import ENDINGS, GraspFormat, ScaledScene
 from sim_validate.kit.workers import available_cores
 from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
 
-Positive = Annotated[float, Range(above=0.0)]
+Positive = Annotated[float, Interval(gt=0.0)]
 Jobs = Annotated[Count, arg(help="Largest number of processes; results do not depend on it.")]
 ObjectName = Annotated[
     str, arg(help=f"A mesh file ({', '.join(FORMATS)}) or the name of a built-in object.")
@@ -52,7 +54,7 @@ AtFriction = Annotated[
     Friction | None, arg(help="Coulomb coefficient; if not given, the one planned for.")
 ]
 FirstOnly = Annotated[Count | None, arg(help="Take only this many grasps, from the first.")]
-Wrench = Annotated[tuple[float, float, float, float, float, float], Size()]
+Wrench = Annotated[tuple[float, float, float, float, float, float], AfterValidator(nonzero)]
 ProtocolName = Literal[
     "dexgraspbench",
     "dexgraspbench-paper",
@@ -65,7 +67,7 @@ PLAIN = arg(name="")
 """Mark of a group whose flags have no prefix; groups inside it keep theirs."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Speech(Settings):
     """How much a command prints, and in which form."""
 
@@ -77,14 +79,15 @@ class Speech(Settings):
     """Print more, and show where an internal error happened."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@declared
 class Spoken(Settings):
     """The flags that every command has."""
 
+    _: KW_ONLY
     speech: Annotated[Speech, PLAIN] = field(default_factory=Speech)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Mesh(Settings):
     """How a mesh file is read."""
 
@@ -95,7 +98,7 @@ class Mesh(Settings):
     or of the convex hull where the surface has large holes."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Planning(PlanSettings):
     """Which grasps to plan."""
 
@@ -131,7 +134,7 @@ class Planning(PlanSettings):
     than this number; 100000 are enough for most grasps."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Testing(Settings):
     """Which trials to simulate, and how they are simulated."""
 
@@ -157,7 +160,7 @@ RUN_LIMIT = 100
 """Number of grasps that `run` simulates by default, which takes some ten seconds."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Run(Spoken):
     """Plan grasps, simulate them and negative controls (contacts that must fail); write all."""
 
@@ -174,7 +177,7 @@ class Run(Spoken):
     executing: Annotated[ChosenExecution, PLAIN] = field(default_factory=ChosenExecution)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Plan(Spoken):
     """Find force-closure grasps of an object, each with a checked certificate of force closure."""
 
@@ -197,7 +200,7 @@ class Plan(Spoken):
     """Folder for grasps.json; if not given, no file is written."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Validate(Spoken):
     """Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must fail."""
 
@@ -215,7 +218,7 @@ class Validate(Spoken):
     written."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Execute(Spoken):
     """Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze."""
 
@@ -233,7 +236,7 @@ class Execute(Spoken):
     """Folder for executions.json; if not given, no file is written."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Scene(Spoken):
     """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.
 
@@ -251,7 +254,7 @@ class Scene(Spoken):
     """Folder for the scenes; if not given, a single scene is printed."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Export(Spoken):
     """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
 
@@ -270,7 +273,7 @@ class Export(Spoken):
     radius, or less if that does not fit."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class View(Spoken):
     """Look at a grasp: in MuJoCo's viewer if there is a display, or in a file."""
 
@@ -279,13 +282,13 @@ class View(Spoken):
     grasp: str | None = None
     """Id of the grasp to show; if not given, the first one."""
     friction: AtFriction = None
-    picture: Annotated[Annotated[Path, Ending(PICTURES)] | None, arg(help=(
+    picture: Annotated[Annotated[Path, ending(*PICTURES)] | None, arg(help=(
         f"Write the grasp as a picture like the paper's ({', '.join(PICTURES)})."
     ))] = None  # fmt: skip
-    page: Annotated[Annotated[Path, Ending(PAGES)] | None, arg(help=(
+    page: Annotated[Annotated[Path, ending(*PAGES)] | None, arg(help=(
         f"Write a page ({', '.join(PAGES)}) on which the grasp can be turned."
     ))] = None  # fmt: skip
-    clip: Annotated[Annotated[Path, Ending(CLIPS)] | None, arg(help=(
+    clip: Annotated[Annotated[Path, ending(*CLIPS)] | None, arg(help=(
         f"Write a clip ({', '.join(CLIPS)}) of the fingers closing, which MuJoCo renders where "
         "there are graphics."
     ))] = None  # fmt: skip
@@ -294,7 +297,7 @@ class View(Spoken):
     picture and on the page."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Report(Spoken):
     """Write the results of a run as pages that open in a browser, without any network."""
 
@@ -302,7 +305,7 @@ class Report(Spoken):
     """Folder of a run, with its grasps.json; or a folder of such folders."""
     limit: Count | None = None
     """Draw only this many grasps per run, those with problems before others; if not given, all."""
-    clips: Annotated[int, Range(least=0, most=MOST_COUNT)] = 0
+    clips: Annotated[int, Interval(ge=0, le=MOST_COUNT)] = 0
     """Number of grasps per run of which clips of trials are made, those with problems first, if
     graphics are available."""
     jobs: Count = field(default_factory=available_cores)
@@ -311,7 +314,7 @@ class Report(Spoken):
     """Folder for the pages; if not given, `report` in the run's folder."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Regions(Spoken):
     """Prove regions in which each finger may stand anywhere, whatever the others do."""
 
@@ -327,7 +330,7 @@ class Regions(Spoken):
     """Folder for regions.json and the proofs; if not given, no file is written."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Replay(Spoken):
     """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
 
@@ -341,7 +344,7 @@ class Replay(Spoken):
     control: str | None = None
     """Name of a negative control (contacts made from the grasp that must fail) to replay instead of
     the grasp."""
-    trial: Annotated[int, Range(least=0, most=MOST_COUNT)] | None = None
+    trial: Annotated[int, Interval(ge=0, le=MOST_COUNT)] | None = None
     """Number of a repeat with noise to replay instead of the trial without noise."""
     grasps: Path | None = None
     """The grasps.json that the verdicts are about, if it is not beside them."""
@@ -349,7 +352,7 @@ class Replay(Spoken):
     """Folder for scene.xml, trace.csv and, where graphics are available, clip.gif."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Analyze(Spoken):
     """Judge contacts of any origin: force closure with a certificate, quality, wrench limits."""
 
@@ -377,7 +380,7 @@ class Analyze(Spoken):
     jobs: Jobs = field(default_factory=available_cores)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Transfer(Spoken):
     """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
 
@@ -398,23 +401,23 @@ class Transfer(Spoken):
     written."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Inspect(Spoken):
     """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
 
     object: Positional[ObjectName]
-    picture: Annotated[Annotated[Path, Ending(PICTURES)] | None, arg(help=(
+    picture: Annotated[Annotated[Path, ending(*PICTURES)] | None, arg(help=(
         f"Write the object as a picture ({', '.join(PICTURES)})."
     ))] = None  # fmt: skip
     mesh: Annotated[Mesh, PLAIN] = field(default_factory=Mesh)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Objects(Spoken):
     """List the names of the built-in objects."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Doctor(Spoken):
     """Check this installation: versions, solvers and simulator."""
 

@@ -21,14 +21,14 @@ import tomllib
 import zipfile
 from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path, PurePosixPath
 from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.figures import scalars
 from grasp_core.files.file_kinds import BESIDE, GRASPS, REGIONS, VERDICTS
@@ -49,7 +49,7 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class AboutObject(Declared):
     """The object that a file is about."""
 
@@ -68,7 +68,7 @@ class AboutObject(Declared):
 Item = TypeVar("Item", bound=Named)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class ResultFile(RecordFile):
     """Base of files that say which versions made them."""
 
@@ -78,7 +78,7 @@ class ResultFile(RecordFile):
     """Versions of every package that can change a number."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class AboutGrasps(ResultFile, ById[Item]):
     """Base of files about the grasps of an object.
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import computed_field
 
 from grasp_core.arrays import Array, Shape, Wrench, to_digits
 from grasp_core.closure.contacts import contact_torsions
@@ -20,14 +21,13 @@ from grasp_core.closure.critical_friction import critical_friction, critical_fri
 from grasp_core.closure.force_closure import FAR_BELOW, ClosureCertificate, force_closure
 from grasp_core.closure.friction_interval import FrictionInterval
 from grasp_core.closure.wrench_sets import Norm
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, NoForcesError, SolverError, UndecidedError, about
 from grasp_core.figures import NONE, Shown, cell, figures
 from grasp_core.files.file_kinds import ANALYSES
-from grasp_core.files.records import FLAT, recorded
 from grasp_core.files.text_files import read_text
 from grasp_core.forces.contact_forces import contact_forces
-from grasp_core.kinds import Count, Null, OrInfinity, Quantity, Share
+from grasp_core.kinds import FLAT, Count, Null, OrInfinity, Quantity, Share
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
 from grasp_core.quality.metrics import hull_volume, min_weight, smallest_singular_value
 from grasp_core.quality.wrench_limits import axis_wrenches, wrench_limits
@@ -67,7 +67,7 @@ class Outcome(StrEnum):
     UNDECIDED = "undecided"
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Question(Declared):
     """Which questions to answer about contacts, with their settings."""
 
@@ -86,7 +86,7 @@ class Question(Declared):
         return {"torsion_m": self.torsion_m} if self.torsion_m else {}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Resisted(Declared):
     """The largest multiple of a wrench that is resisted, and forces that balance the wrench."""
 
@@ -101,7 +101,7 @@ class Resisted(Declared):
     with torsion."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Analysis(Declared):
     """Results about one grasp; None stands for a result that could not be decided."""
 
@@ -142,20 +142,22 @@ class Analysis(Declared):
     """Torques about the inward normals that balance with the forces, (k,) [m]; None without torsion
     or closure."""
 
-    @recorded
+    @computed_field
+    @property
     def outcome(self) -> Outcome:
         """The answer about force closure."""
         if self.closed is None:
             return Outcome.UNDECIDED
         return Outcome.CLOSED if self.closed else Outcome.OPEN
 
-    @recorded
+    @computed_field
+    @property
     def weakest_axis(self) -> Annotated[OrInfinity | None, Shown("weakest axis")]:
         """Largest multiple that is resisted of the wrench along the weakest axis."""
         return None if self.weakest_axis_wrench is None else self.weakest_axis_wrench.limit
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Analyses(ResultFile):
     """The analyses of all grasps of a contacts file."""
 
@@ -168,7 +170,8 @@ class Analyses(ResultFile):
     grasps: tuple[Analysis, ...]
     complete: bool
 
-    @recorded
+    @computed_field
+    @property
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps, and of grasps of each outcome."""
         counts = Counter(each.outcome for each in self.grasps)

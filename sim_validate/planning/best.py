@@ -4,20 +4,20 @@ The best grasp, and the bound on all others, are held by `best.json`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
 import numpy as np
+from annotated_types import Interval
+from pydantic import computed_field
 
 from grasp_core.arrays import Array, Shape, Wrench
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import BEST
-from grasp_core.files.records import recorded
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import Family, Friction, MeasureName, Number, Quantity, Range
+from grasp_core.kinds import Family, Friction, MeasureName, Number, Quantity
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best_grasp import (
     BestGrasp,
@@ -44,7 +44,7 @@ MEASURES: Mapping[MeasureName, tuple[str, str, str]] = {
 """What each measure says of a grasp, in a word and in full, and its unit."""
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Rated(Declared):
     """A grasp beside the bound that no grasp exceeds."""
 
@@ -56,7 +56,7 @@ class Rated(Declared):
     """Share of the bound that the lower one reaches."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Placed(Declared):
     """Where the fingers of the best grasp stand."""
 
@@ -67,7 +67,7 @@ class Placed(Declared):
     normals: Annotated[Array, Shape(FINGERS, 3, units=True)]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Best(ResultFile):
     """The best grasp of an object by one measure, with the proved bound on all others."""
 
@@ -84,7 +84,7 @@ class Best(ResultFile):
     grasp: Placed
     quality: tuple[float, float]
     """Proved lower and upper bound of what the measure says of the grasp."""
-    bound: Annotated[float, Range(above=0.0)]
+    bound: Annotated[float, Interval(gt=0.0)]
     """What no four contacts exceed that are as far from edges."""
     ended: Ended
     proof: str | None
@@ -125,7 +125,8 @@ class Best(ResultFile):
                 f"{self.bound:g}"
             )
 
-    @recorded
+    @computed_field
+    @property
     def gap(self) -> float:
         """Share of the bound that the grasp does not reach."""
         return 1.0 - self.quality[0] / self.bound

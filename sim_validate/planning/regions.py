@@ -7,24 +7,24 @@ import hashlib
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import computed_field
 
 from grasp_core.arrays import Array, Shape, frozen, frozen_units
 from grasp_core.closure.contacts import contacts_sha256
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, SolverError, about
 from grasp_core.figures import Shown, figures
 from grasp_core.files.file_kinds import REGIONS
-from grasp_core.files.records import FLAT, recorded
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
-from grasp_core.kinds import Count, Family, NotNegative, Share, number, path_of
+from grasp_core.kinds import FLAT, Count, Family, NotNegative, Share, number, path_of
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_placement import misplacement, placement_bound
@@ -66,7 +66,7 @@ SMALLEST_SCALE, LARGEST = 1e-6, 1e6
 """Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class ProofFile(Declared):
     """The file that proves a grasp's regions."""
 
@@ -79,7 +79,7 @@ FourRegions = tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
 Points = Annotated[Array, Shape(FINGERS, 3)]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class GraspRegions(Declared):
     """The certified regions of one grasp, or the reason why it has none."""
 
@@ -150,18 +150,20 @@ class GraspRegions(Declared):
                 f"{self.id}: expected regions with at least {FEWEST_CORNERS} corners each"
             )
 
-    @recorded
+    @computed_field
+    @property
     def inscribed_radius_m(self) -> Annotated[float | None, Shown("inner mm", ".3g", MILLI)]:
         """Radius of the smallest of the discs inscribed in the regions [m]."""
         return min((each.inscribed_radius for each in self.regions or ()), default=None)
 
-    @recorded
+    @computed_field
+    @property
     def area_m2(self) -> Annotated[float | None, Shown("mm2", ".4g", MILLI**2)]:
         """Area of all four regions [m^2]."""
         return None if self.regions is None else sum(map(area_of, self.regions))
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Regions(AboutGrasps[GraspRegions]):
     """The certified regions of an object's grasps, as `regions.json` holds them."""
 
@@ -171,7 +173,8 @@ class Regions(AboutGrasps[GraspRegions]):
     certifying: Annotated[Certifying, FLAT]
     grasps: tuple[GraspRegions, ...]
 
-    @recorded
+    @computed_field
+    @property
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps, and of grasps with regions."""
         proved = sum(each.regions is not None for each in self.grasps)
@@ -240,7 +243,7 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     fields: dict[str, Any] = {field: np.asarray(kept[name])[()] for field, name in FIELDS.items()}
     for optional in ("open_choice", "open_wrench"):  # empty where nothing was found
         fields[optional] = fields[optional] if np.size(fields[optional]) else None
-    scale = number(fields["scale"], "scale_m", least=SMALLEST_SCALE, most=LARGEST)
+    scale = number(fields["scale"], "scale_m", ge=SMALLEST_SCALE, le=LARGEST)
     normals = frozen_units(kept["normals"], (FINGERS, 3), "normals")
     forces = frozen(kept["forces"], (None, FINGERS, 3), "forces")
     return CertifiedRegions(

@@ -1,15 +1,15 @@
 """Runs the command `transfer`, which carries grasps over to a part that has changed."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Self
 
-from grasp_core.declared import counted
+from grasp_core.declared import counted, declared
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS, TRANSFER
-from grasp_core.files.records import FLAT
 from grasp_core.files.text_files import write_text
+from grasp_core.kinds import FLAT
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
@@ -41,7 +41,7 @@ BAD: tuple[Change, ...] = ("worse", "gone")
 """What becomes of a grasp if its part should not have changed like that."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class TransferFile(ResultFile):
     """Grasps carried over to a changed part; both parts are only named, so nothing reads it."""
 

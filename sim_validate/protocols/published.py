@@ -6,14 +6,14 @@ those of the object's frame, whose z axis points up.
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.declared import Declared, summary
+from grasp_core.declared import Declared, declared, summary
 from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.chains import Weld
@@ -23,7 +23,7 @@ Triple: TypeAlias = tuple[float, float, float]
 NOWHERE: Triple = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Source(Declared):
     """Files of a public repository in which a test is stated."""
 
@@ -32,7 +32,7 @@ class Source(Declared):
     paths: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Step(Declared):
     """A part of a run: what acts on the object, and how the palm moves, for some time."""
 
@@ -56,7 +56,7 @@ class Step(Declared):
 Run: TypeAlias = tuple[Step, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Passing(Declared):
     """When a run passes; displacement and turn count from before the fingers close."""
 
@@ -69,7 +69,7 @@ class Passing(Declared):
     where the test does not ask."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class PublishedProtocol(Declared):
     """The test of another tool as it is published."""
 

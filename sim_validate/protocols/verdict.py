@@ -1,20 +1,20 @@
 """What published tests, our trials and the analysis say of grasps, as `judgements.json` has it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated
 
-from grasp_core.declared import Declared, summary
+from pydantic import Field, computed_field
+
+from grasp_core.declared import Declared, declared, summary
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import JUDGEMENTS
-from grasp_core.files.records import FLAT, Key, recorded
-from grasp_core.kinds import Friction, Measured, Number, OrInfinity, Quantity
+from grasp_core.kinds import FLAT, Friction, Measured, Number, OrInfinity, Quantity
 from sim_validate.kit.files import AboutObject, ResultFile
 from sim_validate.protocols.published import PublishedProtocol
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class RunVerdict(Declared):
     """One run of a published test: whether the grasp passed, and what the test saw."""
 
@@ -29,7 +29,7 @@ class RunVerdict(Declared):
     """Least number of fingers on the object at a look, up to the first that did not pass."""
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class OurVerdict(Declared):
     """Our verdict on the loads of a published test, with the prediction."""
 
@@ -43,11 +43,11 @@ class OurVerdict(Declared):
     reason: str
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Judgement(Declared):
     """A grasp judged by a published test, by our trials of the same loads, and by the analysis."""
 
-    grasp: Annotated[str, Key("id"), Shown("grasp")]
+    grasp: Annotated[str, Field(alias="id"), Shown("grasp")]
     """Id of the grasp; empty for contacts without one."""
     protocol: Annotated[str, Shown("test")]
     """Name of the test."""
@@ -63,22 +63,26 @@ class Judgement(Declared):
     hand: str = ""
     """Name of the hand that held the object; empty for fingertips."""
 
-    @recorded
+    @computed_field
+    @property
     def theirs(self) -> Annotated[bool, Shown("passes theirs")]:
         """Whether the grasp passes the published test: all of its runs."""
         return all(each.passed for each in self.runs)
 
-    @recorded
+    @computed_field
+    @property
     def predicted(self) -> bool:
         """Whether the analysis says that the grasp resists all loads of the test."""
         return self.ours.closed and self.ours.margin >= 1.0
 
-    @recorded
+    @computed_field
+    @property
     def displacement_m(self) -> Annotated[float | None, Shown("moved mm", ".2g", 1e3)]:
         """Largest displacement of the object in any run [m]."""
         return max((run.displacement_m for run in self.runs), default=None)
 
-    @recorded
+    @computed_field
+    @property
     def turn_deg(self) -> Annotated[float | None, Shown("deg", ".2g")]:
         """Largest turn of the object in any run [deg]."""
         return max((run.turn_deg for run in self.runs), default=None)
@@ -95,7 +99,7 @@ class Judgement(Declared):
         return summary("Judgement", *told, margin=self.ours.margin)
 
 
-@dataclass(frozen=True, slots=True)
+@declared
 class Totals(Declared):
     """Numbers of grasps that were judged by one test."""
 
@@ -111,7 +115,7 @@ class Totals(Declared):
     """Grasps for which the published test and our trials say the same."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Judgements(ResultFile):
     """The judgements of an object's grasps by published tests."""
 
@@ -133,7 +137,8 @@ class Judgements(ResultFile):
                     f"{each.grasp}: expected a test among protocols, got {each.protocol}"
                 )
 
-    @recorded
+    @computed_field
+    @property
     def summary(self) -> Mapping[str, Totals]:
         """For each test the numbers of grasps, by its verdict, ours, and what was predicted."""
         found: dict[str, Totals] = {}

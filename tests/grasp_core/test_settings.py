@@ -2,34 +2,36 @@
 
 import math
 import pickle
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 import pytest
+from annotated_types import Interval
 
+from grasp_core.declared import declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Direction, Ending, FieldError, Range, Vector
+from grasp_core.kinds import Direction, FieldError, Vector, ending
 from grasp_core.settings import CHOSEN, Settings, for_users
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Inner(Settings):
-    share: Annotated[float, Range(above=0.0, most=1.0)] = 0.5
+    share: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.5
     drive: Annotated[Literal["servo", "rigid"], CHOSEN] = "servo"
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared
 class Outer(Settings):
     size_m: float
-    count: Annotated[int, Range(least=1, most=9)] | None = None
+    count: Annotated[int, Interval(ge=1, le=9)] | None = None
     point_m: Vector = (0.0, 0.0, 0.0)
     down: tuple[Direction, ...] = ()
-    time_s: Annotated[float, Range(above=0.0, most=math.inf)] = math.inf
+    time_s: Annotated[float, Interval(gt=0.0, le=math.inf)] = math.inf
     kind: Literal[1, "two"] = 1
     quick: bool = False
-    path: Annotated[Path, Ending((".svg", ".png"))] | None = None
+    path: Annotated[Path, ending(*(".svg", ".png"))] | None = None
     inner: Inner = field(default_factory=Inner)
 
     def _check_together(self) -> None:

@@ -1,19 +1,19 @@
 """Records with a part whose fields stand among their own, and which some of them lack."""
 
 import math
-from dataclasses import dataclass
 from typing import Annotated
 
 import pytest
+from pydantic import computed_field
 
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown, scalars, table
-from grasp_core.files.records import FLAT, from_record, record_of, recorded
-from grasp_core.kinds import OrInfinity
+from grasp_core.files.records import from_record, record_of
+from grasp_core.kinds import FLAT, OrInfinity
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Part(Declared):
     """What a trial found."""
 
@@ -21,7 +21,7 @@ class Part(Declared):
     names: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@declared
 class Whole(Declared):
     """A trial, or the reason why there is none."""
 
@@ -29,7 +29,8 @@ class Whole(Declared):
     found: Annotated[Part | None, FLAT]
     reason: str | None = None
 
-    @recorded
+    @computed_field
+    @property
     def survived(self) -> Annotated[bool, Shown("survived")]:
         """Whether it was survived."""
         return self.found is not None

@@ -1,28 +1,22 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
+from annotated_types import Len
+from pydantic import Field, computed_field
 
 import grasp_core as gc
 from grasp_core.arrays import Array, Indices, Point, Shape, UnitVector
-from grasp_core.declared import Declared
+from grasp_core.declared import Declared, declared
 from grasp_core.files.json_text import json_of
-from grasp_core.files.records import (
-    FLAT,
-    UNRECORDED,
-    Key,
-    RecordFile,
-    from_record,
-    record_of,
-    recorded,
-)
-from grasp_core.kinds import Count, Direction, Many, Measured, OrInfinity, Quantity, Seed, Vector
+from grasp_core.files.records import UNRECORDED, RecordFile, from_record, record_of
+from grasp_core.kinds import FLAT, Count, Direction, Measured, OrInfinity, Quantity, Seed, Vector
 from tests.damaged import check_refused, optional_keys, value_at
 
 
@@ -31,28 +25,30 @@ class Colour(StrEnum):
     BLUE = "blue"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Part(Declared):
-    point: Annotated[Point, Key("point_m")]
+    point: Annotated[Point, Field(alias="point_m")]
     way: UnitVector
-    size: Annotated[Quantity, Key("size_m")] = 1.0
+    size: Annotated[Quantity, Field(alias="size_m")] = 1.0
 
-    @recorded
+    @computed_field
+    @property
     def double_m(self) -> float:
         return 2.0 * self.size
 
-    @recorded
+    @computed_field
+    @property
     def turned(self) -> Array:
         return -self.way
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Flat(Declared):
     shift: Vector = (0.0, 0.0, 1.0)
     axis: Direction = (0.0, 0.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class Whole(Declared):
     hidden: Annotated[object, UNRECORDED]
     text: str
@@ -65,9 +61,9 @@ class Whole(Declared):
     never: OrInfinity
     lost: Measured
     pair: tuple[Count, str]
-    parts: Annotated[tuple[Part, ...], Many(1, 3)]
+    parts: Annotated[tuple[Part, ...], Len(1, 3)]
     table: Mapping[str, Part]
-    numbers: Annotated[Mapping[Literal["x", "y"], Quantity], Key("numbers_n")]
+    numbers: Annotated[Mapping[Literal["x", "y"], Quantity], Field(alias="numbers_n")]
     places: Annotated[Indices, Shape("k", whole=True)]
     rows: Annotated[Array, Shape("k", 3)]
     gaps: Annotated[Array, Shape(None, nan=True)]
@@ -104,7 +100,7 @@ def test_a_value_is_read_as_it_was_written(change):
     assert record_of(found) == record_of(value)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@declared
 class PartFile(RecordFile):
     FILE, SCHEMA = "part", 3
     part: Annotated[Part, FLAT]
