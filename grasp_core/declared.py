@@ -80,9 +80,7 @@ class ByValue:
         return shorten(f"{type(self).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
 
     @classmethod
-    def __get_pydantic_core_schema__(
-        cls, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Take only instances of the class."""
         return core_schema.is_instance_schema(cls)
 

@@ -9,13 +9,13 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from functools import lru_cache
+from functools import lru_cache, partial
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
 
-from annotated_types import Interval, Len
+from annotated_types import Interval
 from pydantic import AfterValidator, ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
@@ -195,6 +195,9 @@ def strictly(schema: Any) -> None:
         part["strict"] = True
     if kind == "float" and math.inf in (part.get("le"), -part.get("ge", 0.0)):
         part["allow_inf_nan"] = True
+    if kind == "tuple":
+        part["fail_fast"] = True
+        before = partial(_listed, part.pop("min_length", 0), part.pop("max_length", None))
     if before is not None:
         inner = {key: part.pop(key) for key in list(part)}
         part.update(core_schema.no_info_before_validator_function(before, cast("Any", inner)))
@@ -215,14 +218,20 @@ def _whole(value: Any) -> Any:
     return int(value) if whole else value
 
 
-def _listed(value: Any) -> Any:
-    """Return the numbers of an array as lists."""
+def _listed(least: int, most: int | None, value: Any) -> Any:
+    """Return the numbers of an array as lists; too few or too many items are refused unseen."""
     entries = getattr(getattr(value, "dtype", None), "kind", None)
-    return value.tolist() if entries in ("i", "u", "f") else value
+    listed = value.tolist() if entries in ("i", "u", "f") else value
+    if isinstance(listed, list | tuple):
+        count = len(cast("list[Any]", listed))
+        if not least <= count <= (count if most is None else most):
+            ends = f"{least}" if most is None else f"{least} and at most {most}"
+            raise UnfitError(f"must have a length of at least {ends}, got {count}")
+    return listed
 
 
 STRICT = ("float", "int", "bool", "str")
-BEFORE: Mapping[str, Callable[[Any], Any]] = {"float": _real, "int": _whole, "tuple": _listed}
+BEFORE: Mapping[str, Callable[[Any], Any]] = {"float": _real, "int": _whole}
 """What is done with a value before pydantic takes it, by the type of the schema."""
 
 
@@ -299,7 +308,7 @@ def input_error(kind: Any, error: ValidationError, where: str = "") -> InputErro
     fault = error.errors(include_url=False)[0]
     said, place = fault["type"], fault["loc"]
     if said == "missing" and isinstance(place[-1], int):  # a vector is too short
-        said, place = "too_short", place[:-1]
+        said, place = "", place[:-1]
     place, kind, name = _located(kind, place, where)
     came, ctx = fault["input"], fault.get("ctx", {})
     ours = ctx["error"].args[0] if said == "value_error" else None
@@ -317,10 +326,11 @@ def input_error(kind: Any, error: ValidationError, where: str = "") -> InputErro
             return InputError(f"{place}: {ours}") if place else ours
         case "value_error":
             return FieldError(place, str(ours))
-        case "too_short" | "too_long" if counts := [r for r in rules(kind) if isinstance(r, Len)]:
-            least, most = counts[0].min_length, counts[0].max_length
-            ends = f"{least}" if most is None else f"{least} and at most {most}"
-            return FieldError(place, f"must have a length of at least {ends}, got {len(came)}")
+        case "too_short" | "too_long":
+            end = "least" if said == "too_short" else "most"
+            least = ctx["min_length" if said == "too_short" else "max_length"]
+            came = ctx["actual_length"]
+            return FieldError(place, f"must have a length of at {end} {least}, got {came}")
         case _:
             return FieldError(place, f"must be {words(kind)}, got {shown(came)}")
 
@@ -372,24 +382,30 @@ def inside(kind: Any, wanted: type) -> Any:
 def words(kind: Any) -> str:
     """Return in words what values a kind allows: 'a number from 0 to 1'."""
     plain, parts = bare(kind), get_args(bare(kind))
-    said = NAMES.get(plain) or f"a {getattr(get_origin(plain) or plain, '__name__', 'value')}"
-    if get_origin(plain) is Literal:
-        said = f"one of {', '.join(map(str, parts))}"
-    elif isinstance(plain, type) and issubclass(plain, Enum):
-        said = f"one of {', '.join(str(each.value) for each in plain)}"
-    elif get_origin(plain) in (Union, UnionType):
-        said = " or ".join(map(words, parts))
-    elif get_origin(plain) is tuple and parts[-1] is not Ellipsis:
-        each = "numbers" if set(map(bare, parts)) <= {float, int} else "items"
-        said = f"{len(parts)} {each}"
-    elif get_origin(plain) is tuple:
-        said = f"a sequence, each item {words(parts[0])}"
-    elif parts:
-        said = f"a table, each key {words(parts[0])}, each value {words(parts[1])}"
-    ends = [f"{word} {getattr(rule, name):g}" for rule in rules(kind)
-            if isinstance(rule, Interval) for name, word in ENDS.items()
+    origin = get_origin(plain)
+    if origin is Literal:
+        return f"one of {', '.join(map(str, parts))}"
+    if origin in (Union, UnionType):
+        return " or ".join(map(words, parts))
+    if origin is tuple:
+        return _words_of_items(parts)
+    if parts:
+        return f"a table, each key {words(parts[0])}, each value {words(parts[1])}"
+    if isinstance(plain, type) and issubclass(plain, Enum):
+        return f"one of {', '.join(str(each.value) for each in plain)}"
+    ends = [f"{word} {getattr(rule, name):g}" for rule in rules(kind) if isinstance(rule, Interval)
+            for name, word in ENDS.items()
             if getattr(rule, name) is not None and math.isfinite(getattr(rule, name))]  # fmt: skip
-    return " ".join([said, *ends])
+    return " ".join([NAMES.get(plain) or f"a {getattr(plain, '__name__', 'value')}", *ends])
+
+
+def _words_of_items(parts: tuple[Any, ...]) -> str:
+    if parts[-1] is Ellipsis:
+        return f"a sequence, each item {words(parts[0])}"
+    if any(part != parts[0] for part in parts):
+        return f"{len(parts)} items: {', '.join(map(words, parts))}"
+    each = "" if parts[0] is float else f", each {words(parts[0])}"
+    return f"{len(parts)} {'numbers' if bare(parts[0]) in (float, int) else 'items'}{each}"
 
 
 NAMES: Mapping[Any, str] = {

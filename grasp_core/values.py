@@ -13,10 +13,11 @@ import numpy as np
 from annotated_types import Interval
 from pydantic import Field, computed_field
 
-from grasp_core.arrays import Array, Shape, UnitVector
+from grasp_core.arrays import Array, Shape, UnitVector, UnitVectors
 from grasp_core.declared import Declared, counted, declared, summary, vector
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
+from grasp_core.files.records import UNRECORDED
 from grasp_core.frames import poses_along
 from grasp_core.kinds import Family, FieldError, NotNegative, Null, Number, Signed, shown, value_of
 
@@ -86,7 +87,7 @@ class Witness(Declared):
 
     @computed_field
     @property
-    def directions(self) -> Array:
+    def directions(self) -> UnitVectors:
         """Return unit vectors along the lines, (4, 3)."""
         return self.forces / np.linalg.norm(self.forces, axis=1, keepdims=True)
 
@@ -142,7 +143,7 @@ class Grasp(Declared):
     approach_directions: Annotated[Array, Shape(FINGERS, 3, units=True)] | None = None
     """Unit vector along which each finger moves in to its contact on a free line, (4, 3); None if
     no free lines were asked for (`plan(finger=...)`)."""
-    _figures: Any = field(default=None, init=False, compare=False)
+    _figures: Annotated[Any, UNRECORDED] = field(default=None, init=False, compare=False)
     """Has a method for each figure that is `PUT_OFF`, by its name; None where they were given."""
 
     def _check_together(self) -> None:

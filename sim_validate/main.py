@@ -129,9 +129,10 @@ def _parsed(arguments: list[str]) -> Command:
             registry=REGISTRY,
         )
     except FieldError as error:
+        field = error.name.partition("[")[0]
         names = (each.name for each in flags_of(Command)
-                 if (each.owner, each.field) == (error.owner, error.name))  # fmt: skip
-        flag = "--" + next(names, error.name).replace("_", "-")
+                 if (each.owner, each.field) == (error.owner, field))  # fmt: skip
+        flag = "--" + next(names, field).replace("_", "-")
         raise FlagsError(f"{flag} {error.fault}") from error
     except InputError as error:  # settings that do not fit each other
         raise FlagsError(str(error)) from error

@@ -98,7 +98,7 @@ def check_refused(read_text, document, *, optional=(), loose=(), large=(), count
 def optional_keys(kind):
     """Return the keys that files need not have, of a class of records and of those inside it."""
     found = set()
-    for each in entries(kind).fields:
+    for each in entries(kind):
         found |= {each.key} if each.default is not MISSING else set()
         for inner in _records_in(each.kind):
             found |= optional_keys(inner)

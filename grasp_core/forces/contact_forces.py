@@ -453,7 +453,7 @@ def even_forces(
 
 
 def _check_limits(normal_force: tuple[float, float]) -> None:
-    each = partial(number, name="normal_force", least=0.0, most=math.inf)
+    each = partial(number, name="normal_force", ge=0.0, le=math.inf)
     limits = several(normal_force, each, "normal_force", "limits")
     if len(limits) != len(("least", "largest")) or not limits[0] < limits[1]:
         raise InputError(f"normal_force must be (least, largest), got {shown(normal_force)}")

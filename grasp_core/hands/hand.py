@@ -46,7 +46,7 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Interval, Len
 from numpy.typing import ArrayLike
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen_each
 from grasp_core.declared import Declared, counted, declared, summary
@@ -54,7 +54,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import HANDS, TorqueLimit, shown, value_of
+from grasp_core.kinds import HANDS, TorqueLimit, UnfitError, shown, value_of
 
 LARGEST_SIZE = 2.0  # largest length of a hand [m]: a larger one is in other units
 MOST_TURN = 2.0 * np.pi  # largest angle of a joint, in either direction [rad]
@@ -74,20 +74,15 @@ LARGEST_RATIO, SMALLEST_RATIO, LARGEST_OFFSET = 100.0, 0.01, 100.0
 PALM = "palm"  # name of the palm among the links
 
 
-class _Turn:
-    """The rule that a matrix is a rotation."""
-
-    def holds(self, turned: Array) -> bool:
-        """Return whether rows are orthonormal and right-handed."""
-        off = float(np.abs(turned @ turned.T - np.eye(3)).max())
-        return off <= RIGID_SLACK and bool(np.linalg.det(turned) > 0.0)
-
-    def __str__(self) -> str:
-        """Return what is asked for in words."""
-        return "that is a rotation matrix, right-handed with orthonormal rows"
+def _turn(turned: Array) -> Array:
+    """Refuse a matrix whose rows are not orthonormal and right-handed."""
+    off = float(np.abs(turned @ turned.T - np.eye(3)).max())
+    if off > RIGID_SLACK or not np.linalg.det(turned) > 0.0:
+        raise UnfitError("must be a rotation matrix, right-handed with orthonormal rows")
+    return turned
 
 
-Rotation = Annotated[Array, Shape(3, 3), _Turn()]
+Rotation = Annotated[Array, Shape(3, 3), AfterValidator(_turn)]
 Place = Annotated[Array, Shape(3, least=-LARGEST_SIZE, most=LARGEST_SIZE)]
 """A point of a hand, (3,) [m]."""
 Corners = Annotated[

