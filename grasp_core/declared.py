@@ -170,7 +170,7 @@ def _nested(found: Any, flat: Mapping[str, type]) -> Any:
     given, nested = cast("dict[str, Any]", found), dict[str, Any]()
     for name, kind in flat.items():
         infos: Mapping[str, Any] = cast("Any", kind).__pydantic_fields__
-        some = any((info.alias or key) in given for key, info in infos.items())
+        some = any((info.alias or key) in given for key, info in infos.items() if not info.exclude)
         nested[name] = given if some else None
     return given | nested
 

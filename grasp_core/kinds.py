@@ -303,7 +303,9 @@ def several(value: Any, each: Callable[[Any], Value], name: str, kind: str) -> t
     return tuple(each(thing) for thing in cast("Iterable[Any]", value))
 
 
-def input_error(kind: Any, error: ValidationError, where: str = "") -> InputError:
+def input_error(
+    kind: Any, error: ValidationError, where: str = "", *, in_file: bool = False
+) -> InputError:
     """Return the first fault that pydantic found as our error: the field, the wanted, the given."""
     fault = error.errors(include_url=False)[0]
     said, place = fault["type"], fault["loc"]
@@ -321,7 +323,8 @@ def input_error(kind: Any, error: ValidationError, where: str = "") -> InputErro
             hint = near(name, known) or f"choose from {', '.join(known)}"
             return InputError(f"{where and f'{where}: '}no field is named {shown(name)}; {hint}")
         case "value_error" if isinstance(ours, FieldError):
-            return FieldError(at(place, ours.name), ours.fault)
+            field = bare(kind).__pydantic_fields__.get(ours.name) if in_file else None
+            return FieldError(at(place, (field and field.alias) or ours.name), ours.fault)
         case "value_error" if isinstance(ours, InputError):
             return InputError(f"{place}: {ours}") if place else ours
         case "value_error":
@@ -383,6 +386,8 @@ def words(kind: Any) -> str:
     """Return in words what values a kind allows: 'a number from 0 to 1'."""
     plain, parts = bare(kind), get_args(bare(kind))
     origin = get_origin(plain)
+    if shapes := [rule for rule in rules(kind) if hasattr(rule, "take")]:
+        return str(shapes[0])
     if origin is Literal:
         return f"one of {', '.join(map(str, parts))}"
     if origin in (Union, UnionType):
@@ -396,6 +401,7 @@ def words(kind: Any) -> str:
     ends = [f"{word} {getattr(rule, name):g}" for rule in rules(kind) if isinstance(rule, Interval)
             for name, word in ENDS.items()
             if getattr(rule, name) is not None and math.isfinite(getattr(rule, name))]  # fmt: skip
+    ends += [f"or {rule.value}" for rule in rules(kind) if isinstance(rule, Null)]
     return " ".join([NAMES.get(plain) or f"a {getattr(plain, '__name__', 'value')}", *ends])
 
 

@@ -9,9 +9,10 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
+from grasp_core.declared import Declared
 from grasp_core.figures import meanings
-from grasp_core.files.records import entries, inside_record
-from grasp_core.kinds import RANKINGS, words
+from grasp_core.files.records import entries
+from grasp_core.kinds import RANKINGS, inside, words
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.columns import TABLES, dataset_tables
@@ -52,10 +53,9 @@ def described(kind: type) -> list[Part]:
 
 def _rows_of(kind: type, where: str) -> tuple[list[tuple[str, str]], list[tuple[str, type]]]:
     """Return the keys of a record with their meaning, and the records inside it."""
-    own, properties = entries(kind)
     rows: list[tuple[str, str]] = []
     inner: list[tuple[str, type]] = []
-    for each in (*own, *properties):
+    for each in entries(kind):
         found = record_within(each.kind)
         if each.flat is not None:
             more, deeper = _rows_of(each.flat, where)
@@ -71,7 +71,7 @@ def _rows_of(kind: type, where: str) -> tuple[list[tuple[str, str]], list[tuple[
 
 def record_within(kind: Any) -> type | None:
     """Return the class of the records that a kind holds, also as items or values; or None."""
-    own = inside_record(kind)
+    own = inside(kind, Declared)
     inner = (record_within(part) for part in get_args(kind))
     return own or next((found for found in inner if found is not None), None)
 

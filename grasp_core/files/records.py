@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast, get_type_hints
 
 from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import to_json
 
 from grasp_core.declared import Declared, default_of, flat_parts, types
 from grasp_core.errors import InputError, about
@@ -39,6 +40,7 @@ class Entry(NamedTuple):
     default: Any
     flat: type | None
     """The class whose keys stand among those of the outer record; None for other fields."""
+    computed: bool = False
 
 
 @cache
@@ -52,7 +54,10 @@ def entries(kind: type) -> tuple[Entry, ...]:
         for name, each in types(kind).items() if not infos[name].exclude
     ]  # fmt: skip
     computed = cast("Any", kind).__pydantic_decorators__.computed_fields
-    return (*own, *(Entry(name, name, returned(kind, name), MISSING, None) for name in computed))
+    return (
+        *own,
+        *(Entry(name, name, returned(kind, name), MISSING, None, True) for name in computed),
+    )
 
 
 def returned(kind: type, name: str) -> Any:
@@ -88,9 +93,9 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
             said | beside, by_alias=True, by_name=False, extra="ignore", context=kind
         )
     except ValidationError as error:
-        raise input_error(kind, error, where) from None
+        raise input_error(kind, error, where, in_file=True) from None
     ours = record_of(made)
-    if said != ours:
+    if to_json(said) != to_json(ours):  # which tell true from 1, unlike Python
         _check_said(said, ours, record_of(made, exclude_computed_fields=True), where)
     return made
 
@@ -104,7 +109,7 @@ def _check_said(said: Any, ours: Any, own: Any, where: str) -> None:
 
     `ours` is what the record would be written as, and `own` the same without computed fields.
     """
-    if said == ours:
+    if said == ours == own:  # nothing is computed
         return
     if isinstance(said, dict) and isinstance(ours, dict):
         given, full = cast("dict[str, Any]", said), cast("dict[str, Any]", ours)
@@ -131,8 +136,9 @@ def _check_said(said: Any, ours: Any, own: Any, where: str) -> None:
 
 
 def _close(said: Any, ours: Any) -> bool:
-    numbers = type(said) is float and type(ours) in (float, int)
-    return numbers and math.isclose(said, ours, rel_tol=SAME, abs_tol=SAME * SAME)
+    if type(said) is float and type(ours) in (float, int):
+        return math.isclose(said, ours, rel_tol=SAME, abs_tol=SAME * SAME)
+    return type(said) is type(ours) and said == ours
 
 
 def _told(value: Any) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, computed_field
 
-from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen
+from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen, frozen_indices
 from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, declared, summary
 from grasp_core.errors import InputError
@@ -96,7 +96,7 @@ class HandReach(Declared):
 
     def __post_init__(self) -> None:
         if self.fingers is not None and self.used is None:
-            object.__setattr__(self, "used", range(FINGERS))
+            object.__setattr__(self, "used", frozen_indices(range(FINGERS), (FINGERS,), "used"))
         Declared.__post_init__(self)
 
     def _check_together(self) -> None:

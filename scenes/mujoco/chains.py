@@ -35,7 +35,7 @@ from typing import Any, Self
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.declared import ByValue
+from grasp_core.declared import ByValue, Declared, declared
 from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
 from grasp_core.hands.hand_arrays import (
     HandPlaces,
@@ -111,8 +111,8 @@ def _volume(shape: LinkShape) -> float:
     return a * b * c + area * r + math.pi * r**2 * edges + 4.0 / 3.0 * math.pi * r**3
 
 
-@dataclass(frozen=True, slots=True)
-class Weld:
+@declared
+class Weld(Declared):
     """How a hand's root is welded to a body that moves as told: MJCF's `solref` and `solimp`."""
 
     solref: tuple[float, float] = (0.02, 1.0)

@@ -221,9 +221,11 @@ def _record(found: Any) -> DexRecord:
 
 
 def _plain(found: Any) -> Any:
-    """Return the numbers of an array, and a number for an array without axes."""
+    """Return an array as lists, and one with a single number as that number."""
     values: Any = found.values if isinstance(found, _Numbers) else found
-    return values.item() if getattr(values, "size", None) == 1 else values
+    if not hasattr(values, "tolist"):
+        return values
+    return values.item() if values.size == 1 else values.tolist()
 
 
 def write_dex_record(record: DexRecord, path: str | Path) -> Path:

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import numpy as np
 
 from grasp_core.arrays import Point, UnitVector
 from grasp_core.cones.spanning import count_spanning
-from grasp_core.declared import vector
+from grasp_core.declared import Declared, declared, vector
 from grasp_core.figures import Shown
 from grasp_core.files.records import record_of
 from grasp_core.objects.planar_faces import MAX_FACES
@@ -31,8 +31,8 @@ NOTHING_MM = 1e-6
 """Coordinate that is written as zero [mm]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ListedFace:
+@declared
+class ListedFace(Declared):
     """A face in a list."""
 
     number: Annotated[int, Shown("face")]

@@ -118,7 +118,7 @@ REGIONS = {
 }  # fmt: skip
 
 
-FOLLOWS = {each.key for each in entries(ExecutedGrasp).recorded}
+FOLLOWS = {each.key for each in entries(ExecutedGrasp) if each.computed}
 """What follows from other fields is made again, and may be off by rounding."""
 
 

@@ -196,7 +196,7 @@ def test_nothing_is_loaded_where_any_byte_is_another(copy):
 
 def test_a_line_of_the_quarantine_that_is_none_is_named(copy):
     path = copy / "quarantine.jsonl"
-    path.write_text('{"object": 3}\n')
+    path.write_text('{"object": "wedge"}\n')
     relisted(copy, path)
     (fault,) = verify(copy)
     assert "quarantine.jsonl: line 1: source_sha256: missing; add it" in fault

@@ -109,7 +109,7 @@ BAD_DEMANDS = [
     ("assert_stable(grasp_case, repeats=2, min_pass_rate=80)", "from 0 up to 1, got 80"),
     ("assert_stable(grasp_case, min_margin=float('nan'))", "min_margin must be a number from 0"),
     ("assert_stable(grasp_case, trial=2)", "no setting is named 'trial'; choose from wrenches"),
-    ("assert_stable(grasp_case, wrenches=[[1, 2]])", "each item a NamedWrench"),
+    ("assert_stable(grasp_case, wrenches=[[1, 2]])", "must be a NamedWrench"),
     ("assert_stable(grasp_case.grasp)", "expected a grasp_case"),
 ]
 
