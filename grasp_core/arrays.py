@@ -150,7 +150,7 @@ class Shape:
             items = [*chain.from_iterable(items)]
         if any(isinstance(item, bool) for item in items):
             raise UnfitError("must hold numbers, got true or false among them")
-        return value
+        return cast("Any", value)
 
     def _listed(self, array: NDArray[Any]) -> Any:
         if not self.nan:

@@ -17,6 +17,7 @@ that a copy equals its original. Fields that are declared with `compare=False` d
 from collections.abc import Callable, Mapping, Sized
 from dataclasses import MISSING, Field, field, fields
 from functools import cache
+from inspect import Parameter, Signature
 from textwrap import shorten
 from typing import (
     TYPE_CHECKING,
@@ -90,6 +91,22 @@ class InOurWords(type):
 
     if not TYPE_CHECKING:
 
+        @property
+        def __signature__(cls) -> Signature:
+            """Return the arguments of the constructor, which pydantic knows once it is used."""
+            ways = {True: Parameter.KEYWORD_ONLY, False: Parameter.POSITIONAL_OR_KEYWORD}
+            listed = sorted(fields(cls), key=lambda each: bool(each.kw_only))
+            return Signature([
+                Parameter(each.name, ways[bool(each.kw_only)], annotation=each.type,
+                          default=Parameter.empty if (usual := default_of(each)) is MISSING
+                          else usual)
+                for each in listed if each.init
+            ])  # fmt: skip
+
+        @__signature__.setter
+        def __signature__(cls, _: object) -> None:
+            """Leave pydantic's own aside."""
+
         def __call__(cls, *args, **kwargs):  # noqa: ANN002, ANN003, ANN204, D102
             try:
                 return super().__call__(*args, **kwargs)
@@ -142,7 +159,7 @@ class Declared(ByValue, metaclass=InOurWords):
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Take no text for numbers, and take keys of flat parts from among the record's own."""
         made = handler(source)
-        own = handler.resolve_ref_schema(made)
+        own: Any = handler.resolve_ref_schema(made)
         strictly(own["schema"])
         flat = flat_parts(cls)
         if not flat:
@@ -261,7 +278,7 @@ def _is_kept(kept: Any, value: Any) -> bool:
         table, given = cast("Mapping[Any, Any]", kept), cast("Mapping[Any, Any]", value)
         return (isinstance(value, Mapping) and table.keys() == given.keys()
                 and all(_is_kept(table[key], given[key]) for key in table))  # fmt: skip
-    plain = (float, int) if isinstance(kept, float) else type(kept)
+    plain = (float, int) if isinstance(kept, float) else (type(cast("object", kept)),)
     return isinstance(value, plain) and _same(kept, value)
 
 

@@ -93,24 +93,24 @@ class Null:
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Take null for the number, where a file says it, and write null for it."""
-        inner = handler(source)
+        inner: Any = handler(source)
         inner["allow_inf_nan"] = True
-
-        def take(value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
-            if value is None and info.context:
-                return self.value
-            odd = isinstance(value, float) and not math.isfinite(value)
-            if odd and math.isnan(value) != math.isnan(self.value):
-                raise UnfitError(f"must be a number, got {value}")
-            return value
-
+        written = core_schema.plain_serializer_function_ser_schema(_finite)
         return core_schema.with_info_before_validator_function(
-            take,
-            inner,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda value: value if math.isfinite(value) else None
-            ),
+            self._taken, inner, serialization=written
         )
+
+    def _taken(self, value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
+        if value is None and info.context:
+            return self.value
+        odd = isinstance(value, float) and not math.isfinite(value)
+        if odd and (value != value) != (self.value != self.value):  # noqa: PLR0124 - NaN
+            raise UnfitError(f"must be a number, got {value}")
+        return value
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 Quantity = Annotated[float, Interval(ge=SMALLEST, le=LARGEST)]
@@ -214,24 +214,33 @@ def _real(value: Any) -> Any:
 
 
 def _whole(value: Any) -> Any:
-    whole = type(value) is not int and isinstance(value, Integral) and not isinstance(value, bool)
-    return int(value) if whole else value
+    if type(value) in (int, bool) or not isinstance(value, Integral):
+        return value
+    return int(value)
+
+
+def _no_truth(value: Any) -> Any:
+    if isinstance(value, bool):  # which equals 0 or 1
+        raise UnfitError(f"must be one of the words and numbers allowed, got {value}")
+    return value
 
 
 def _listed(least: int, most: int | None, value: Any) -> Any:
     """Return the numbers of an array as lists; too few or too many items are refused unseen."""
     entries = getattr(getattr(value, "dtype", None), "kind", None)
-    listed = value.tolist() if entries in ("i", "u", "f") else value
+    if entries not in (None, "i", "u", "f"):
+        raise UnfitError(f"must be a sequence of numbers, got {shown(value)}")
+    listed: Any = value if entries is None else value.tolist()
     if isinstance(listed, list | tuple):
         count = len(cast("list[Any]", listed))
         if not least <= count <= (count if most is None else most):
             ends = f"{least}" if most is None else f"{least} and at most {most}"
             raise UnfitError(f"must have a length of at least {ends}, got {count}")
-    return listed
+    return cast("Any", listed)
 
 
 STRICT = ("float", "int", "bool", "str")
-BEFORE: Mapping[str, Callable[[Any], Any]] = {"float": _real, "int": _whole}
+BEFORE: Mapping[str, Callable[[Any], Any]] = {"float": _real, "int": _whole, "literal": _no_truth}
 """What is done with a value before pydantic takes it, by the type of the schema."""
 
 
@@ -247,7 +256,8 @@ class _Strictly:
 @lru_cache(maxsize=256)
 def _adapter(kind: Any) -> TypeAdapter[Any]:
     config = ConfigDict(allow_inf_nan=False, arbitrary_types_allowed=True)
-    return TypeAdapter(Annotated[kind, _Strictly()], config=config)
+    kept: Any = Annotated[kind, _Strictly()]
+    return TypeAdapter[Any](kept, config=config)
 
 
 def value_of(kind: Any, value: Any, name: str) -> Any:
@@ -307,35 +317,34 @@ def input_error(
     kind: Any, error: ValidationError, where: str = "", *, in_file: bool = False
 ) -> InputError:
     """Return the first fault that pydantic found as our error: the field, the wanted, the given."""
-    fault = error.errors(include_url=False)[0]
-    said, place = fault["type"], fault["loc"]
+    first = error.errors(include_url=False)[0]
+    said, place = first["type"], first["loc"]
     if said == "missing" and isinstance(place[-1], int):  # a vector is too short
         said, place = "", place[:-1]
     place, kind, name = _located(kind, place, where)
-    came, ctx = fault["input"], fault.get("ctx", {})
+    came, ctx = first["input"], first.get("ctx", {})
     ours = ctx["error"].args[0] if said == "value_error" else None
-    match said:
-        case "missing":
-            hint = near(name, came) if isinstance(came, dict) else ""
-            return InputError(f"{place}: missing; add it{hint and f' ({hint})'}")
-        case "unexpected_keyword_argument":
-            known = [*bare(kind).__pydantic_fields__]
-            hint = near(name, known) or f"choose from {', '.join(known)}"
-            return InputError(f"{where and f'{where}: '}no field is named {shown(name)}; {hint}")
-        case "value_error" if isinstance(ours, FieldError):
-            field = bare(kind).__pydantic_fields__.get(ours.name) if in_file else None
-            return FieldError(at(place, (field and field.alias) or ours.name), ours.fault)
-        case "value_error" if isinstance(ours, InputError):
-            return InputError(f"{place}: {ours}") if place else ours
-        case "value_error":
-            return FieldError(place, str(ours))
-        case "too_short" | "too_long":
-            end = "least" if said == "too_short" else "most"
-            least = ctx["min_length" if said == "too_short" else "max_length"]
-            came = ctx["actual_length"]
-            return FieldError(place, f"must have a length of at {end} {least}, got {came}")
-        case _:
-            return FieldError(place, f"must be {words(kind)}, got {shown(came)}")
+    fault = f"must be {words(kind)}, got {shown(came)}"
+    if said == "missing":
+        hint = near(name, cast("dict[str, Any]", came)) if isinstance(came, dict) else ""
+        return InputError(f"{place}: missing; add it{hint and f' ({hint})'}")
+    if said == "unexpected_keyword_argument":
+        known = [*bare(kind).__pydantic_fields__]
+        hint = near(name, known) or f"choose from {', '.join(known)}"
+        return InputError(f"{where and f'{where}: '}no field is named {shown(name)}; {hint}")
+    if isinstance(ours, InputError) and not isinstance(ours, FieldError):
+        return InputError(f"{place}: {ours}") if place else ours
+    if isinstance(ours, FieldError):
+        field = bare(kind).__pydantic_fields__.get(ours.name) if in_file else None
+        place, fault = at(place, (field and field.alias) or ours.name), ours.fault
+    elif ours is not None:
+        fault = str(ours)
+    elif said in ("too_short", "too_long"):
+        end, most = ("least", "min") if said == "too_short" else ("most", "max")
+        fault = (
+            f"must have a length of at {end} {ctx[f'{most}_length']}, got {ctx['actual_length']}"
+        )
+    return FieldError(place, fault)
 
 
 def at(where: str, name: str) -> str:
@@ -388,21 +397,22 @@ def words(kind: Any) -> str:
     origin = get_origin(plain)
     if shapes := [rule for rule in rules(kind) if hasattr(rule, "take")]:
         return str(shapes[0])
-    if origin is Literal:
-        return f"one of {', '.join(map(str, parts))}"
     if origin in (Union, UnionType):
         return " or ".join(map(words, parts))
     if origin is tuple:
         return _words_of_items(parts)
+    if isinstance(plain, type) and issubclass(plain, Enum):
+        origin, parts = Literal, [each.value for each in plain]
+    if origin is Literal:
+        return f"one of {', '.join(map(str, parts))}"
     if parts:
         return f"a table, each key {words(parts[0])}, each value {words(parts[1])}"
-    if isinstance(plain, type) and issubclass(plain, Enum):
-        return f"one of {', '.join(str(each.value) for each in plain)}"
     ends = [f"{word} {getattr(rule, name):g}" for rule in rules(kind) if isinstance(rule, Interval)
             for name, word in ENDS.items()
             if getattr(rule, name) is not None and math.isfinite(getattr(rule, name))]  # fmt: skip
     ends += [f"or {rule.value}" for rule in rules(kind) if isinstance(rule, Null)]
-    return " ".join([NAMES.get(plain) or f"a {getattr(plain, '__name__', 'value')}", *ends])
+    name: str = getattr(cast("Any", plain), "__name__", "value")
+    return " ".join([NAMES.get(plain) or f"a {name}", *ends])
 
 
 def _words_of_items(parts: tuple[Any, ...]) -> str:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from functools import cache
+from itertools import repeat
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast, get_type_hints
 
@@ -78,9 +79,11 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def record_of(value: object, **how: bool) -> dict[str, Any]:
-    """Return a value as an object of JSON."""
-    return _adapter(type(value)).dump_python(value, mode="json", **how)
+def record_of(value: object, *, computed: bool = True) -> dict[str, Any]:
+    """Return a value as an object of JSON, with its computed fields unless they are not wanted."""
+    return _adapter(type(value)).dump_python(
+        value, mode="json", exclude_computed_fields=not computed
+    )
 
 
 def from_record(kind: type[Record], found: object, where: str = "", **beside: Any) -> Record:
@@ -96,7 +99,7 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
         raise input_error(kind, error, where, in_file=True) from None
     ours = record_of(made)
     if to_json(said) != to_json(ours):  # which tell true from 1, unlike Python
-        _check_said(said, ours, record_of(made, exclude_computed_fields=True), where)
+        _check_said(said, ours, record_of(made, computed=False), where)
     return made
 
 
@@ -111,28 +114,33 @@ def _check_said(said: Any, ours: Any, own: Any, where: str) -> None:
     """
     if said == ours == own:  # nothing is computed
         return
-    if isinstance(said, dict) and isinstance(ours, dict):
-        given, full = cast("dict[str, Any]", said), cast("dict[str, Any]", ours)
-        for key in given:
-            if key not in full:
-                hint = near(key, full) or f"choose from {', '.join(full)}"
-                raise InputError(f"{where and f'{where}: '}no field is named {shown(key)}; {hint}")
-        for key, value in full.items():
-            bare = own.get(key, ABSENT) if isinstance(own, dict) else ABSENT
-            if key in given:
-                _check_said(given[key], value, bare, at(where, key))
-            elif bare is ABSENT:
-                raise InputError(f"{at(where, key)}: missing; add it")
-    elif isinstance(said, list) and isinstance(ours, list) and len(said) == len(ours):
-        parts = own if isinstance(own, list) else [own] * len(said)
-        for number, (one, two, bare) in enumerate(zip(said, ours, parts, strict=True)):
-            if not (isinstance(one, str) and isinstance(two, str)):  # sentences may be reworded
-                _check_said(one, two, bare, f"{where}[{number}]")
+    both: Any = (type(said), type(ours))
+    if both == (dict, dict):
+        _check_keys(said, ours, own if type(own) is dict else {}, where)
+    elif both == (list, list) and len(said) == len(ours):
+        parts: Any = own if type(own) is list else repeat(ABSENT)
+        for number, each in enumerate(zip(said, ours, parts, strict=False)):
+            if set(map(type, each[:2])) != {str}:  # sentences may be reworded
+                _check_said(*each, f"{where}[{number}]")
     elif own is ABSENT and not _close(said, ours):
         raise InputError(
             f"{where}: {_told(said)} contradicts the other fields, which say {_told(ours)}; write "
             "the file again, or remove it"
         )
+
+
+def _check_keys(
+    said: dict[str, Any], ours: dict[str, Any], own: dict[str, Any], where: str
+) -> None:
+    for key in said:
+        if key not in ours:
+            hint = near(key, ours) or f"choose from {', '.join(ours)}"
+            raise InputError(f"{where and f'{where}: '}no field is named {shown(key)}; {hint}")
+    for key, value in ours.items():
+        if key in said:
+            _check_said(said[key], value, own.get(key, ABSENT), at(where, key))
+        elif key not in own:
+            raise InputError(f"{at(where, key)}: missing; add it")
 
 
 def _close(said: Any, ours: Any) -> bool:

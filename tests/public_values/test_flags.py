@@ -3,15 +3,16 @@
 import math
 from typing import get_args, get_origin
 
-from grasp_core.kinds import takes
+from grasp_core.errors import InputError
+from grasp_core.kinds import value_of
 from sim_validate.kit.flag_values import flags_of, parts_of
 from sim_validate.main import COMMANDS
 
 
 def refuses(kind, value):
     try:
-        takes(kind)(value)
-    except ValueError:
+        value_of(kind, value, "flag")
+    except InputError:
         return True
     return False
 
