@@ -82,6 +82,7 @@ from sim_validate.datasets.work_units import (
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
 from sim_validate.kit.files import alone_in, path_inside, whole_folder
+from sim_validate.kit.locks import entries
 from sim_validate.kit.workers import Cluster, check_interrupted
 
 HASH = re.compile(r"[0-9a-f]{64}")
@@ -388,7 +389,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
     stated = folder / CONFIG
     own = OWN if stated.is_file() else ()
     half_written = tuple(f".{name}." for name in OWN)
-    for path in sorted(folder.iterdir()):
+    for path in entries(folder):
         if path.name.startswith(half_written):
             path.unlink()
         elif path.name not in own:
