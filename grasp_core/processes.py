@@ -273,10 +273,12 @@ def main() -> None:
     """Do the tasks that come through standard input until it ends; errors are answers, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt ends it through its parent
     gc.set_threshold(COLLECTED_AFTER)
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what code prints is no answer
+    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, 0)  # code that looks at its input would wait for the thread that reads tasks
+    os.dup2(nothing, 1)  # what code prints is no answer
     messages = SimpleQueue[bytes]()
-    Thread(target=_listen, args=(sys.stdin.buffer, messages), daemon=True).start()
+    Thread(target=_listen, args=(asked, messages), daemon=True).start()
     function: Callable[[Any], Any] = repr
     try:
         while True:

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parent.parent
 
 HEAVY = (
     "numpy", "scipy", "numba", "clarabel", "qpsolvers", "manifold3d", "trimesh",
-    "mujoco", "resvg_py",
+    "mujoco", "resvg_py", "filelock",
 )  # fmt: skip
 NOT_TO_PLAN = ("mujoco", "trimesh", "qpsolvers", "scipy.spatial", "scipy.optimize")
 

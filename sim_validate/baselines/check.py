@@ -75,7 +75,7 @@ def measured(
     now = now.testable(limit)
     saved, chosen = now.saved, now.saved.grasps
     baseline, grasps = (path.resolve() for path in files)
-    where = Path(os.path.relpath(grasps, baseline.parent)).as_posix()
+    where = _as_seen_from(baseline, grasps)
     if not chosen:
         raise InputError(f"{where}: expected at least one grasp to simulate, found none")
     require_faithful(how.setup, saved.friction, saved.body.radius)
@@ -118,6 +118,17 @@ def measured(
         entries=tuple(sorted(entries, key=lambda entry: entry.id)),
     )
     return Measured(now, files, kept, verdicts, refused, executions)
+
+
+def _as_seen_from(baseline: Path, grasps: Path) -> str:
+    """Return the path by which a baseline names its grasps."""
+    try:
+        return Path(os.path.relpath(grasps, baseline.parent)).as_posix()
+    except ValueError as error:
+        raise InputError(
+            f"{grasps}: expected grasps on the drive of {baseline}, which names them by a relative "
+            "path; copy one of the two to the other's drive"
+        ) from error
 
 
 def _or_refusal(work: Callable[[Any], Any], beginning: str, job: Any) -> Any:

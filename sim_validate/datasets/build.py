@@ -5,7 +5,7 @@ or that takes too long, is tried once more when nothing else is under way; then 
 left out, with the reason recorded. A unit that fails with an error of this project is quarantined
 at once, because it would fail again. A failure that would befall every unit - a full disk, a worker
 with other packages - ends the build. A worker process must run the same code and packages as the
-process that started it, or its rows could differ. A timer of the system ends a process in which a
+process that started it, or its rows could differ. A timer beside Python ends a process in which a
 unit takes too long, also inside a call that never comes back.
 
 Finished units are kept in a staging folder: one subfolder per unit, renamed in one step, so every
@@ -22,18 +22,20 @@ the header as quoted strings, in the text as Markdown.
 """
 
 import errno
+import faulthandler
 import inspect
 import os
 import re
 import shutil
-import signal
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import groupby, product
 from pathlib import Path
+from threading import TIMEOUT_MAX
 from typing import Any, NamedTuple, TypeAlias
 
 from grasp_core.declared import declared
@@ -83,6 +85,7 @@ from sim_validate.datasets.work_units import (
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
 from sim_validate.kit.files import alone_in, path_inside, whole_folder
+from sim_validate.kit.locks import entries
 from sim_validate.kit.workers import Cluster, check_interrupted
 
 HASH = re.compile(r"[0-9a-f]{64}")
@@ -241,11 +244,23 @@ def do_task(task: Task) -> None:
             f"{task.staging.folder}: a worker process cannot see this folder; --out must be on a "
             "file system that all processes share"
         )
-    signal.setitimer(signal.ITIMER_REAL, task.timeout_s or 0.0)  # none for zero
-    try:
+    with _ending_after(task.timeout_s):
         task.work(task.unit, task.staging)
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+@contextmanager
+def _ending_after(timeout_s: float | None) -> Generator[None]:
+    """End this process, whatever it does, when the block takes longer [s]."""
+    if timeout_s is None:
+        yield
+        return
+    with Path(os.devnull).open("w") as unread:
+        # a thread that needs nothing of Python: also calls that never give it back are ended
+        faulthandler.dump_traceback_later(min(timeout_s, TIMEOUT_MAX), exit=True, file=unread)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
 
 def drive(
@@ -389,7 +404,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
     stated = folder / CONFIG
     own = OWN if stated.is_file() else ()
     half_written = tuple(f".{name}." for name in OWN)
-    for path in sorted(folder.iterdir()):
+    for path in entries(folder):
         if path.name.startswith(half_written):
             path.unlink()
         elif path.name not in own:

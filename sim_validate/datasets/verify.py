@@ -56,6 +56,7 @@ from sim_validate.datasets.work_units import PLANNED, WorkUnit, made_of, provena
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip
+from sim_validate.kit.locks import LOCK
 
 MOST_NAMED = 20
 """Largest number of faults that are listed for one object at one friction."""
@@ -96,7 +97,7 @@ def _file_faults(dataset: Dataset) -> Iterator[str]:
     """Yield sentences on files that are not as the manifest lists them, or that it does not."""
     folder, files = dataset.folder, dataset.manifest.files
     there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    more = there - {MANIFEST, *(each.path for each in files)}
+    more = there - {MANIFEST, LOCK, *(each.path for each in files)}
     # staged files no longer matter
     yield from (
         f"{path}: this file is not listed in the manifest"

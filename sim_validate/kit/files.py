@@ -4,16 +4,12 @@ An npz archive may claim any size, or hold a name twice: that is checked before 
 Only arrays of numbers and truth values are read, and nothing in a file is executed. Files and
 folders that are written are complete or absent.
 
-A folder of results is kept whole: one command at a time writes to it, and removes old results. The
-folder itself is locked, without a lock file: the lock ends with the process, however that ends.
+A folder of results is kept whole: one command at a time writes to it, and removes old results.
 Results that would contradict new ones are removed first, so that old and new results never mix,
 whatever ends a command. Files of other names are left alone.
 """
 
-import errno
-import fcntl
 import io
-import os
 import re
 import shutil
 import tempfile
@@ -47,6 +43,7 @@ from grasp_core.grasp_tables import ById, Named, frame_of
 from grasp_core.kinds import Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
+from sim_validate.kit.locks import entries, locked
 
 
 @declared
@@ -249,6 +246,10 @@ def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
     return write_parts(path, [held.getvalue()])
 
 
+MADE = "made"
+"""Name of a folder that is being filled, inside its temporary folder."""
+
+
 @contextmanager
 def whole_folder(folder: Path) -> Generator[Path]:
     """Yield a temporary folder that becomes `folder` on success, and is removed on failure."""
@@ -259,32 +260,28 @@ def whole_folder(folder: Path) -> Generator[Path]:
     prefix = f".{named.name[:SHOWN]}{UNFINISHED}"
     for path in named.parent.iterdir():
         if path.name.startswith(prefix):
-            with suppress(OSError), _locked(path) as refused:
-                if not refused:  # its command has ended
-                    shutil.rmtree(path)
+            with suppress(OSError), locked(path) as ended:
+                if ended:
+                    shutil.rmtree(path / MADE, ignore_errors=True)
+            with suppress(OSError):  # it holds something while its command is at work
+                path.rmdir()
     temporary = Path(tempfile.mkdtemp(dir=named.parent, prefix=prefix))
     try:
-        with _locked(temporary):
-            yield temporary
-            temporary.chmod(0o755)
-            temporary.replace(named)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
-
-
-@contextmanager
-def _locked(folder: Path) -> Generator[int]:
-    """Lock a folder until the end of the block, or of the process; yield why not, as an errno."""
-    handle, refused = os.open(folder, os.O_RDONLY), 0
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:  # another process has locked it, or the file system has no locks
-            refused = error.errno or errno.ENOLCK
-        yield refused
+        with locked(temporary) as alone:
+            if alone is False:
+                raise _taken(folder)
+            made = temporary / MADE
+            made.mkdir()
+            yield made
+            with suppress(FileNotFoundError):  # Windows renames onto nothing
+                named.rmdir()
+            made.rename(named)
     finally:
-        os.close(handle)
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _taken(folder: Path) -> InputError:
+    return InputError(f"{folder}: another command is writing to it; wait, or give another --out")
 
 
 REPORT, INDEX, GRASP_PAGES = "report", "index.html", "grasps"
@@ -334,7 +331,7 @@ def _remove(paths: Iterable[Path]) -> None:
 
 def require_report_folder(folder: Path) -> None:
     """Refuse to write pages into a folder that is neither empty nor a report."""
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
+    if folder.is_dir() and entries(folder) and not (folder / MARK).is_file():
         raise InputError(
             f"{folder}: this folder holds other files than a report; give another --out"
         )
@@ -376,9 +373,10 @@ def remove_report(folder: Path) -> None:
     if not (folder / MARK).is_file():
         return
     remove_pages(folder)
-    if [path.name for path in folder.iterdir()] == [MARK]:
+    if entries(folder) == [folder / MARK]:
         (folder / MARK).unlink()
-        folder.rmdir()
+        with suppress(OSError):  # a command is at work in it
+            folder.rmdir()
 
 
 def remove_pages(folder: Path) -> None:
@@ -402,20 +400,17 @@ def alone_in(folder: Path | None) -> Generator[None]:
         yield
         return
     made = _make(folder)
-    with _locked(folder) as refused:
-        # a file system may have no locks: then its users take care
-        if refused == errno.EWOULDBLOCK or not folder.exists():
-            raise InputError(
-                f"{folder}: another command is writing to it; wait, or give another --out"
-            )
-        for part in PARTS:
-            remove_unfinished(folder / part)
-        try:
+    try:
+        with locked(folder) as alone:
+            if alone is False:
+                raise _taken(folder)
+            for part in PARTS:
+                remove_unfinished(folder / part)
             yield
-        finally:
-            with suppress(OSError):  # a folder that holds something stays
-                for path in made:
-                    path.rmdir()
+    finally:
+        with suppress(OSError):  # a folder that holds something stays
+            for path in made:
+                path.rmdir()
 
 
 def _make(folder: Path) -> list[Path]:

@@ -42,7 +42,8 @@ takes as long as eight validations."""
 
 def available_cores() -> int:
     """Count the cores that this process may use, limited by the share of its container."""
-    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    allowed: Callable[[int], set[int]] | None = getattr(os, "sched_getaffinity", None)  # on Linux
+    own = os.cpu_count() if allowed is None else len(allowed(0))
     try:
         share, period = SHARE.read_text().split()
         return max(1, min(own or 1, int(share) // int(period)))

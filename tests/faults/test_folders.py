@@ -1,6 +1,5 @@
 """Folders that are taken, have strange names, or hold what others or killed commands left."""
 
-import fcntl
 import json
 import os
 import shutil
@@ -9,6 +8,7 @@ import pytest
 
 from grasp_core.files.text_files import UNFINISHED
 from sim_validate.kit.files import alone_in
+from sim_validate.kit.locks import LOCK
 from sim_validate.main import main
 from tests.faults.conftest import contents
 
@@ -35,16 +35,14 @@ def test_strange_names_are_names(name, tmp_path, capsys):
 
 
 def test_a_folder_that_another_command_is_at_work_in_is_refused(tmp_path, capsys):
-    handle = os.open(tmp_path, os.O_RDONLY)
-    fcntl.flock(handle, fcntl.LOCK_EX)
-    try:
+    with alone_in(tmp_path):
         for command in ([*PLAN], ["run", "tetrahedron", "-q"], ["report", str(tmp_path)]):
             asked = command if command[0] == "report" else [*command, "--out", str(tmp_path)]
             assert main(asked) == 4
             assert "another command is writing to it" in capsys.readouterr().err
-    finally:
-        os.close(handle)
+    (tmp_path / LOCK).touch()  # as a killed command leaves it
     assert main([*PLAN, "--out", str(tmp_path)]) == 0
+    assert set(contents(tmp_path)) == {"grasps.json"}
 
 
 def test_only_folders_that_were_made_for_nothing_go_again(tmp_path):

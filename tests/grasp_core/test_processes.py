@@ -49,6 +49,11 @@ def test_a_function_is_sent_once_with_all_that_it_holds(other):
     assert one.calls == two.calls == 0
 
 
+def test_code_that_reads_input_finds_none_and_takes_no_task(other):
+    assert other.submit(tasks.all_input, None).result(HANGING_S) == ""
+    assert other.submit(abs, -2).result() == 2
+
+
 def test_an_error_is_raised_with_its_own_type_in_the_place_of_its_result(other):
     done = other.in_order(tasks.three_or_refusal, [2, 3, 4] * 20)
     assert next(done) == 4

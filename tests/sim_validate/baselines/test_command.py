@@ -111,3 +111,13 @@ def test_grasps_are_not_overwritten(copy, capsys):
     assert main(["baseline", "record", str(grasps), "-o", str(grasps)]) == Exit.INPUT
     assert "will not be overwritten" in capsys.readouterr().err
     assert grasps.read_bytes() == before
+
+
+def test_grasps_on_another_drive_are_refused(copy, monkeypatch, capsys):
+    def across_drives(*_):
+        raise ValueError("path is on mount 'C:', start on mount 'D:'")
+
+    monkeypatch.setattr("os.path.relpath", across_drives)
+    line = ["baseline", "record", str(copy / "grasps.json"), "-o", str(copy / "new.json"), "-q"]
+    assert main(line) == Exit.INPUT
+    assert "expected grasps on the drive of" in capsys.readouterr().err

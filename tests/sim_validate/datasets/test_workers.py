@@ -53,6 +53,15 @@ def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path):
         do_task(task(Staging(tmp_path / "elsewhere"), sleep))
 
 
+@pytest.mark.parametrize("timeout_s", [None, HANGING_S, 1e300])
+def test_a_time_limit_needs_nothing_that_windows_lacks(staging, timeout_s):
+    given = task(staging, lambda unit, to: to.quarantine(unit, "done"), timeout_s)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.delattr("signal.setitimer", raising=False)
+        do_task(given)
+    assert staging.record(given.unit).reason == "done"
+
+
 def test_rows_that_do_not_arrive_end_the_run(staging):
     class Elsewhere(Here):
         def submit(self, function, given):
