@@ -40,6 +40,8 @@ LARGEST_ENTRY = 1e50
 """Largest size of an array entry: the product of three such numbers has a finite square."""
 SMALLEST_SIZE = 1e-50
 """Smallest length above zero: the square of a smaller one would vanish."""
+FLOAT_BYTES = 8
+"""Number of bytes of a float; those of extended precision have more."""
 REAL = "iuf"
 """Numpy's letters for kinds of integers and floats; no other entries are accepted."""
 UNIT_SLACK = 1e-9
@@ -146,9 +148,9 @@ class Shape:
         if isinstance(value, list) and not value and not isinstance(self.shape[0], int):
             return np.empty((0, *(size for size in self.shape[1:] if isinstance(size, int))))
         items: list[Any] = [value]
-        while set(map(type, items)) == {list}:
+        while (found := set(map(type, items))) == {list}:
             items = [*chain.from_iterable(items)]
-        if any(isinstance(item, bool) for item in items):
+        if bool in found:
             raise UnfitError("must hold numbers, got true or false among them")
         return cast("Any", value)
 
@@ -233,6 +235,8 @@ def real_array(value: ArrayLike, name: str) -> Array:
     if given.dtype.kind not in REAL:
         got = shown(value) if given.ndim == 0 else f"entries of type {given.dtype}"
         raise InputError(f"{name} must be an array of numbers, got {got}")
+    if given.dtype.itemsize <= FLOAT_BYTES:
+        return np.array(given, dtype=np.float64)
     with np.errstate(over="ignore"):  # extended precision may exceed doubles; `frozen` refuses that
         return np.array(given, dtype=np.float64)
 

@@ -103,6 +103,8 @@ class Null:
     def _taken(self, value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
         if value is None and info.context:
             return self.value
+        if info.context and isinstance(value, float) and not math.isfinite(value):
+            raise UnfitError(f"must be a finite number, or null for {self.value}, got {value}")
         odd = isinstance(value, float) and not math.isfinite(value)
         if odd and (value != value) != (self.value != self.value):  # noqa: PLR0124 - NaN
             raise UnfitError(f"must be a number, got {value}")
@@ -193,6 +195,8 @@ def strictly(schema: Any) -> None:
         strictly(each)
     if kind in STRICT:
         part["strict"] = True
+    if kind == "int":  # larger ones are no seeds, counts or indices, nor fit into arrays
+        part |= {"ge": part.get("ge", -MOST_SEED), "le": part.get("le", MOST_SEED)}
     if kind == "float" and math.inf in (part.get("le"), -part.get("ge", 0.0)):
         part["allow_inf_nan"] = True
     if kind == "tuple":

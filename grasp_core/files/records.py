@@ -98,7 +98,7 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
     except ValidationError as error:
         raise input_error(kind, error, where, in_file=True) from None
     ours = record_of(made)
-    if to_json(said) != to_json(ours):  # which tell true from 1, unlike Python
+    if to_json(said, inf_nan_mode="constants") != to_json(ours):  # where true is not 1
         _check_said(said, ours, record_of(made, computed=False), where)
     return made
 

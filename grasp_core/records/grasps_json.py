@@ -271,7 +271,7 @@ def contact_sets_from_json(text: str, overrides: Overrides = Overrides()) -> tup
     found = json_of(text)
     if isinstance(found, dict) and "schema" in found and "contacts" not in found:
         return _planned(text, overrides)
-    file = from_record(ContactsFile, object_of(text, CONTACTS_FILE, nulls=False))
+    file = from_record(ContactsFile, object_of(text, CONTACTS_FILE))
     if file.contacts is not None:
         return (_contact_set(file, file.contacts, "0", "contacts", overrides),)
     listed = file.grasps or ()

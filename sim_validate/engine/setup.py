@@ -227,7 +227,7 @@ def wrenches_from_file(path: Path) -> tuple[NamedWrench, ...]:
 
 def wrenches_from_json(text: str) -> tuple[NamedWrench, ...]:
     """Parse the wrenches in the text of a file."""
-    given = from_record(WrenchFile, object_of(text, WRENCH_FILE, nulls=False))
+    given = from_record(WrenchFile, object_of(text, WRENCH_FILE))
     return tuple(
         NamedWrench(each.name, np.array([*each.force_n, *each.torque_n_m]))
         for each in given.wrenches

@@ -28,7 +28,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.figures import scalars
 from grasp_core.files.file_kinds import BESIDE, GRASPS, REGIONS, VERDICTS
-from grasp_core.files.json_text import DEEPEST, check_values, shown
+from grasp_core.files.json_text import shown
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import (
     SHOWN,
@@ -140,6 +140,8 @@ ASIDE = re.compile(
     re.DOTALL,
 )
 """Pattern of quoted text and comments, in which dots are no key separators."""
+DEEPEST = 64
+"""Largest number of parts of a key."""
 LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 """Pattern of a key `a.b.c` with too many parts. The time of tomllib grows with the cube of their
 number: two minutes for a hundred kilobytes."""
@@ -164,7 +166,6 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         ) from error
     except ValueError as error:  # numbers of thousands of digits and days that do not exist, too
         raise InputError(f"the text is not TOML: {str(error)[:MOST_SAID]}") from error
-    check_values(found)
     return found
 
 

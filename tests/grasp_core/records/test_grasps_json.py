@@ -39,7 +39,7 @@ def test_every_damaged_field_is_refused_by_its_name(text):
 FIRST = ("grasps", 0)
 CHANGES = {
     "schema from the future": (("schema",), 3, "got 3: a newer graspproof"),
-    "schema of before": (("schema",), 1, "got 1 of an older graspproof"),
+    "schema of before": (("schema",), 1, "got 1: an older graspproof"),
     "mesh of another object": (("object", "content_sha256"), 64 * "0", "content"),
     "an approach that is no direction": (
         (*FIRST, "approach_directions"), [[0.0, 0.0, 0.5]] * 4, "approach_directions"),

@@ -11,7 +11,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.files.file_kinds import BESIDE, GRASPS
-from grasp_core.files.json_text import DEEPEST, object_of
+from grasp_core.files.json_text import object_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.kit import files
 from sim_validate.kit.exit_codes import Exit
@@ -79,22 +79,16 @@ def test_long_settings_are_refused_before_they_are_read(tmp_path):
     for key in ("a.", '"a b" . ', "'=,'."):  # tomllib would take hours
         with pytest.raises(gc.InputError, match="has more than 64 parts"):
             tables_of_toml("x = 1\n" + key * (MOST_LETTERS // 8) + "a = 1")
-    with pytest.raises(gc.InputError, match="more than 64 deep"):
-        tables_of_toml("[a.a]\na = " + "[" * 65 + "]" * 65)
     assert tables_of_toml("a = '" + "1.2." * 5 + "'\nb.c.d = 1.5")["b"] == {"c": {"d": 1.5}}
 
 
 JSON = {
     '{"a": 1, "a": 2}': "a: the key occurs twice",
-    '{"a": NaN}': "a: expected a finite number, got nan",
-    '{"a": [{"b": 1e999}]}': r"a\[0\].b: expected a finite number, got inf",
-    '{"a": %s}' % ("9" * 400): "a: a whole number of 1329 bits is larger than 2",
     '{"a": %s}' % ("9" * 5000): "thousands of digits",
-    '{"a": "\\ud800"}': "a: the text holds half a character",
-    '{"\\ud800": 1}': "the key holds half a character",
+    '{"a": "\\ud800"}': "the text holds half a character",
+    '{"\\ud800": 1}': "the text holds half a character",
     '{"a": "\0"}': "not complete JSON",
-    "[" * 100_000: "are nested more than 64 deep",
-    "[" * (DEEPEST + 1) + "]" * (DEEPEST + 1): "more than 64 deep",
+    "[" * 100_000: "are nested too deeply",
     '{"a": 1': "not complete JSON .*line 1, column 8",
     "\ufeff{}": "not complete JSON",
     "3": "a thing must hold one JSON object, got 3",
