@@ -13,6 +13,7 @@ from grasp_core import kinds
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import check_kind, with_article
 
+TOO_DEEP = "objects and lists are nested too deeply; flatten the file"
 LONGEST_ECHO = 40
 """Largest number of characters of a key that a message repeats."""
 
@@ -36,7 +37,7 @@ def json_of(text: str) -> Any:
         if "\\ud" in text.lower():  # a half character has no encoding
             json.dumps(found, ensure_ascii=False).encode()
     except RecursionError as error:
-        raise InputError("objects and lists are nested too deeply; flatten the file") from error
+        raise InputError(TOO_DEEP) from error
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         said = error.msg if error.msg.isprintable() else "unexpected text"

@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast, get_type_hints
 
 from pydantic import Field, TypeAdapter, ValidationError
-from pydantic_core import to_json
+from pydantic_core import PydanticSerializationError, to_json
 
 from grasp_core.declared import Declared, default_of, flat_parts, types
 from grasp_core.errors import InputError, about
-from grasp_core.files.json_text import object_of, shown, text_of
+from grasp_core.files.json_text import TOO_DEEP, object_of, shown, text_of
 from grasp_core.files.text_files import read_text
 from grasp_core.kinds import at, input_error, near
 
@@ -98,7 +98,11 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
     except ValidationError as error:
         raise input_error(kind, error, where, in_file=True) from None
     ours = record_of(made)
-    if to_json(said, inf_nan_mode="constants") != to_json(ours):  # where true is not 1
+    try:
+        same = to_json(said, inf_nan_mode="constants") == to_json(ours)  # where true is not 1
+    except PydanticSerializationError as error:
+        raise InputError(f"{where and f'{where}: '}{TOO_DEEP}") from error
+    if not same:
         _check_said(said, ours, record_of(made, computed=False), where)
     return made
 
