@@ -8,17 +8,13 @@
         \"\"\"Unit vector into the object.\"\"\"
 
 The constructor checks each field by its type (see `kinds`) and keeps it in plain form: arrays
-copied and read-only. Two values are equal if they are of one class and all their fields are equal:
-arrays entry by entry, tuples and mappings item by item, numbers exactly; two NaN count as equal, so
-that a copy equals its original. Fields that are declared with `compare=False` do not count.
-`is_sound` checks a value again that may come from anywhere.
+copied and read-only. `is_sound` checks a value again that may come from anywhere.
 """
 
-from collections.abc import Callable, Mapping, Sized
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, field, fields
 from functools import cache
 from inspect import Parameter, Signature
-from textwrap import shorten
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -34,56 +30,11 @@ from pydantic import ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic.dataclasses import dataclass
 from pydantic_core import CoreSchema, core_schema
 
+from grasp_core.by_value import ByValue, is_array, same
 from grasp_core.errors import InputError
-from grasp_core.kinds import FLAT, FieldError, bare, input_error, rules, shown, strictly
+from grasp_core.kinds import FLAT, FieldError, bare, input_error, rules, strictly
 
-HASHED = (str, int, bool)
-"""Classes of the fields that a hash is made from."""
-HASHED_ENTRIES = 3
-"""Number of entries of an array that a hash is made from: a point tells contacts apart when they
-are looked up in a cache, without looking at each entry of a large mesh."""
-MOST = 300
-"""Largest number of characters of a value's text: two lines and a half."""
-SHORT_VECTOR = 6
-"""Largest number of components of a vector that is written in full."""
-NOTHING = 1e-12
-"""Share of a vector's largest number below which a number is shown as zero."""
 Item = TypeVar("Item")
-Draw = Callable[[Any], str | None]
-"""A function that returns the HTML of a value, or None where it has no picture of it."""
-_DRAWN_WITH: list[Draw] = []
-"""The function that was handed over, or none."""
-
-
-class ByValue:
-    """Base of frozen dataclasses that are compared by their fields, also where these are arrays."""
-
-    __slots__ = ()
-
-    def __eq__(self, other: object) -> bool:
-        if self is other:
-            return True
-        if type(self) is not type(other):
-            return NotImplemented
-        compared = (field.name for field in fields(cast("Any", self)) if field.compare)
-        return all(_same(getattr(self, name), getattr(other, name)) for name in compared)
-
-    def __hash__(self) -> int:
-        """Return a hash of the texts, whole numbers and first entries of arrays in the fields."""
-        named = (field for field in fields(cast("Any", self)) if field.compare)
-        kinds = (_hashed(self, field.name) for field in named)
-        return hash((type(self).__name__, *kinds))
-
-    def __repr__(self) -> str:
-        """Return at most `MOST` characters with the figures that are short, and sizes of others."""
-        told = (field.name for field in fields(cast("Any", self)) if field.repr)
-        parts = (f"{name}={_size(getattr(self, name))}" for name in told)
-        return shorten(f"{type(self).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Take only instances of the class."""
-        return core_schema.is_instance_schema(cls)
 
 
 class InOurWords(type):
@@ -256,20 +207,12 @@ def altered(value: Item, /, **given: Any) -> Item:
     return trusted(type(value), **own | given)
 
 
-def kept(value: object, name: str) -> Any:
-    """Return a field as it is; None where it would have to be computed first."""
-    try:
-        return object.__getattribute__(value, name)
-    except AttributeError:
-        return None
-
-
 def _is_kept(kept: Any, value: Any) -> bool:
     """Return whether a value is what the constructor keeps of it, and not only equal to that."""
     if isinstance(kept, Declared):
         return kept is value and kept.is_sound()
-    if _is_array(kept):
-        return type(value) is type(kept) and value.dtype == kept.dtype and _same(kept, value)
+    if is_array(kept):
+        return type(value) is type(kept) and value.dtype == kept.dtype and same(kept, value)
     if isinstance(kept, tuple):
         items = cast("tuple[Any, ...]", kept)
         return (isinstance(value, tuple) and len(items) == len(cast("Any", value))
@@ -279,96 +222,4 @@ def _is_kept(kept: Any, value: Any) -> bool:
         return (isinstance(value, Mapping) and table.keys() == given.keys()
                 and all(_is_kept(table[key], given[key]) for key in table))  # fmt: skip
     plain = (float, int) if isinstance(kept, float) else (type(cast("object", kept)),)
-    return isinstance(value, plain) and _same(kept, value)
-
-
-def _same(one: Any, other: Any) -> bool:
-    if one is other:
-        return True
-    if _is_array(one) and _is_array(other):
-        import numpy as np
-
-        return np.array_equal(one, other, equal_nan="f" in one.dtype.kind + other.dtype.kind)
-    if _is_array(one) or _is_array(other):
-        return False
-    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
-        ours, theirs = cast("tuple[Any, ...]", one), cast("tuple[Any, ...]", other)
-        return len(ours) == len(theirs) and all(map(_same, ours, theirs))
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        mine, its = cast("Mapping[Any, Any]", one), cast("Mapping[Any, Any]", other)
-        return mine.keys() == its.keys() and all(_same(mine[key], its[key]) for key in mine)
-    return bool(one == other) or (_is_nan(one) and _is_nan(other))
-
-
-def _is_array(value: Any) -> bool:
-    return hasattr(value, "dtype") and hasattr(value, "flat")
-
-
-def _is_nan(value: Any) -> bool:
-    return isinstance(value, float) and value != value  # noqa: PLR0124 - only NaN differs from itself
-
-
-def _hashed(value: object, name: str) -> object:
-    known = kept(value, name)
-    if _is_array(known):
-        first = known.flat[:HASHED_ENTRIES].tolist()
-        return (known.shape, *(0.0 if _is_nan(entry) else entry for entry in first))
-    return known if isinstance(known, HASHED) else None
-
-
-def summary(kind: str, *said: str, **figures: object) -> str:
-    """Write `Kind(words, name=figure, ..)`, like a constructor call but not meant as code."""
-    parts = [*said, *(f"{name}={_figure(value)}" for name, value in figures.items())]
-    return f"{kind}({', '.join(parts)})"
-
-
-def _size(value: Any) -> str:
-    """Write a number, a short vector or a short text; else what the value is and its size."""
-    if _is_array(value):
-        if value.ndim == 1 and value.size <= SHORT_VECTOR and value.dtype.kind == "f":
-            return vector(value)
-        return f"array {value.shape}"
-    if isinstance(value, tuple | list | Mapping):
-        return counted(len(cast("Sized", value)), "item")
-    plain = value is None or isinstance(value, str | bool | int | float)
-    return _figure(value) if plain else type(value).__name__
-
-
-def counted(number: int, thing: str) -> str:
-    """Write a number with its noun, such as `1 hole` or `2 holes`."""
-    irregular = {"vertex": "vertices", "patch": "patches"}
-    return f"{number} {thing if number == 1 else irregular.get(thing, thing + 's')}"
-
-
-def _figure(value: Any) -> str:
-    if _is_array(value):
-        return vector(value)
-    return f"{value:.6g}" if isinstance(value, float) else shown(value)
-
-
-def vector(value: Any) -> str:
-    """Write a vector to six digits; a number that is rounding beside the largest is zero."""
-    sizes = [float(x) for x in value]
-    nothing = NOTHING * max(map(abs, sizes), default=0.0)
-    return f"({', '.join(f'{0.0 if abs(x) < nothing else x:.6g}' for x in sizes)})"
-
-
-class InNotebooks:
-    """Base of values that show a picture at the end of a notebook's cell, if `scenes` draws one."""
-
-    __slots__ = ()
-
-    def _repr_html_(self) -> str | None:
-        """Return HTML with a picture; None where there is none, so that notebooks show `repr`."""
-        try:
-            return self._html()
-        except Exception:  # a picture that fails must not hide the value, which still has a text
-            return None
-
-    def _html(self) -> str | None:
-        return _DRAWN_WITH[0](self) if _DRAWN_WITH else None
-
-
-def draw_with(draw: Draw) -> None:
-    """Hand over the function that draws values; a second one takes the place of the first."""
-    _DRAWN_WITH[:] = [draw]
+    return isinstance(value, plain) and same(kept, value)

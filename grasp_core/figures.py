@@ -16,13 +16,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar, cast
+from typing import Any, NamedTuple, cast
 
-from grasp_core.declared import Declared, declared, rules, types
+from grasp_core.declared import rules
 from grasp_core.files.records import entries, returned
-from grasp_core.kinds import inside
 
-Own = TypeVar("Own", bound="Kept")
 NONE = "-"
 """What a cell shows where there is no figure."""
 UNITS = {
@@ -153,49 +151,6 @@ def _marked(kind: type, *marks: type[Shown | Compared]) -> Iterator[Figure]:
             yield Figure(name, own_kind, shown, how, said.get(name, ""), (name,))
 
 
-class Kept(Declared):
-    """Base of records of the figures of another class, which `keeps` gives them."""
-
-    __slots__ = ()
-    FIGURES: ClassVar[Mapping[str, Figure]] = {}
-    """The figures, by name; a class may have other parts of the records besides."""
-    DIGITS: ClassVar[int | None] = None
-    """Number of digits that numbers are kept to; None for all of them."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Return a figure; which there are says the other class."""
-
-    @classmethod
-    def of(cls, record: object) -> Self:
-        """Take the figures of a record: of a list that is kept as a number, how many items."""
-        found: dict[str, Any] = {}
-        for name, kind in types(cls).items():
-            own, part = cls.FIGURES.get(name), inside(kind, Kept)
-            value = getattr(record, name) if own is None else own.of(record)
-            if part is not None:
-                value = None if value is None else part.of(value)
-            elif isinstance(value, tuple) and inside(kind, int):
-                value = len(cast("tuple[Any, ...]", value))
-            elif isinstance(value, float) and cls.DIGITS:
-                value = float(f"{value:.{cls.DIGITS}g}")
-            found[name] = value
-        return cls(**found)
-
-
-def keeps(listed: Iterable[Figure], digits: int | None = None) -> Callable[[type[Own]], type[Own]]:
-    """Return what makes a class of records of some figures, with fields of their kinds."""
-
-    def made(own: type[Own]) -> type[Own]:
-        own.FIGURES, own.DIGITS = {each.name: each for each in listed}, digits
-        kinds = {name: each.kind for name, each in own.FIGURES.items()}
-        own.__annotations__ = {**inspect.get_annotations(own), **kinds}
-        return declared(own)
-
-    return made
-
-
 def cell(value: Any, shown: Shown) -> str:
     """Write a figure for people: ends of a range that differ, and the number of other items."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -251,8 +206,8 @@ def scalars(record: object) -> Mapping[str, Any]:
 def meanings(kind: type) -> Mapping[str, str]:
     """Return what the fields and recorded properties of a class mean: their docstrings."""
     found: dict[str, str] = {}
-    if issubclass(kind, Kept):
-        found |= {name: each.meaning for name, each in kind.FIGURES.items()}
+    kept: Mapping[str, Figure] = getattr(kind, "FIGURES", {})
+    found |= {name: each.meaning for name, each in kept.items()}
     for base in (base for base in reversed(kind.__mro__) if base.__module__ != "builtins"):
         (body,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
         statements = body.body if isinstance(body, ast.ClassDef) else []

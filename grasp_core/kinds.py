@@ -13,7 +13,7 @@ from functools import lru_cache, partial
 from numbers import Integral, Real
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
 from annotated_types import Interval
 from pydantic import AfterValidator, ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationError
@@ -146,32 +146,6 @@ FaceSets = Annotated[int, Interval(ge=0, le=10**18)]
 Seed = Annotated[int, Interval(ge=0, le=MOST_SEED)]
 Vector = tuple[float, float, float]
 Direction = Annotated[Vector, AfterValidator(nonzero)]
-Family: TypeAlias = Literal["concurrent", "pencil", "regulus"]
-"""The family of a grasp, by how its four lines of force meet."""
-Method: TypeAlias = Literal["concurrent", "pencil", "regulus", "free"]
-"""How grasps are searched for: by one of the paper's three constructions, or free of any family."""
-METHODS: tuple[Method, ...] = get_args(Method)
-ConeKind: TypeAlias = Literal["tilted", "normal"]
-RankBy: TypeAlias = Literal[
-    "radius", "friction-margin", "ferrari-canny", "payload", "placement", "diverse"
-]  # fmt: skip
-"""What makes one grasp better than another (see `plan`)."""
-RANKINGS: Mapping[RankBy, str] = {
-    "radius": "the largest discs, of each family in turn",
-    "friction-margin": "the least critical friction",
-    "ferrari-canny": "the largest Ferrari-Canny quality",
-    "payload": "the largest mass in any orientation under one squeeze with pushes up to 10 N, less "
-    "for objects with a radius below 25 mm",
-    "placement": "the largest proved chance of closure where the object is off by 2 mm, less for "
-    "objects with a radius below 25 mm, and 2 degrees",
-    "diverse": "for each next grasp, the largest distance from those before it",
-}
-"""What the best grasps have by each ranking."""
-MeasureName: TypeAlias = Literal["ferrari-canny", "weight", "task"]
-"""Which loads count: wrenches of unit length, the weight in every orientation, or a user's loads.
-"""
-HANDS = ("allegro", "allegro-urdf", "leap")
-"""The names of the built-in hands."""
 OrInfinity = Annotated[float, Null(math.inf)]
 """A number that is infinite where nothing ever happens; null in files."""
 Measured = Annotated[float, Null(math.nan)]
@@ -258,7 +232,10 @@ class _Strictly:
 
 
 @lru_cache(maxsize=256)
-def _adapter(kind: Any) -> TypeAdapter[Any]:
+def adapter(kind: Any) -> TypeAdapter[Any]:
+    """Return what checks and writes values of a type, which may be a class of `declared`."""
+    if hasattr(kind, "__pydantic_fields__"):
+        return TypeAdapter[Any](kind)
     config = ConfigDict(allow_inf_nan=False, arbitrary_types_allowed=True)
     kept: Any = Annotated[kind, _Strictly()]
     return TypeAdapter[Any](kept, config=config)
@@ -267,7 +244,7 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 def value_of(kind: Any, value: Any, name: str) -> Any:
     """Return a value in the plain form of a kind; one that is not of it is an error."""
     try:
-        return _adapter(kind).validate_python(value)
+        return adapter(kind).validate_python(value)
     except ValidationError as error:
         raise input_error(kind, error, name) from None
 

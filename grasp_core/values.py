@@ -14,12 +14,14 @@ from annotated_types import Interval
 from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Shape, UnitVector, UnitVectors
-from grasp_core.declared import Declared, counted, declared, summary, vector
+from grasp_core.by_value import counted, summary, vector
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import UNRECORDED
 from grasp_core.frames import poses_along
-from grasp_core.kinds import Family, FieldError, NotNegative, Null, Number, Signed, shown, value_of
+from grasp_core.kinds import FieldError, NotNegative, Null, Number, Signed, shown, value_of
+from grasp_core.names import Family
 
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]
 FaceQuadruple: TypeAlias = tuple[Number, Number, Number, Number]

@@ -6,8 +6,8 @@ this package, objects, grasps and plans show pictures in notebooks.
 
 from typing import Any
 
-from grasp_core.declared import draw_with
 from grasp_core.lazy_names import names_in_stub
+from grasp_core.notebooks import draw_with
 
 __getattr__, __dir__, __all__ = names_in_stub(__name__, __file__)
 

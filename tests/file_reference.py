@@ -12,7 +12,8 @@ from typing import Any, NamedTuple, get_args
 from grasp_core.declared import Declared
 from grasp_core.figures import meanings
 from grasp_core.files.records import entries
-from grasp_core.kinds import RANKINGS, inside, words
+from grasp_core.kinds import inside, words
+from grasp_core.names import RANKINGS
 from grasp_core.settings import Settings
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.datasets.columns import TABLES, dataset_tables

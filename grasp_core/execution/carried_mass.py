@@ -98,9 +98,10 @@ from grasp_core.arrays import (
     cross,
     of_order_one,
 )
+from grasp_core.by_value import summary
 from grasp_core.closure.contacts import WRENCH, contact_frames, in_frames
 from grasp_core.closure.wrench_sets import WrenchSet
-from grasp_core.declared import Declared, declared, summary, trusted
+from grasp_core.declared import Declared, declared, trusted
 from grasp_core.errors import InputError
 from grasp_core.execution.best_squeeze import searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, TIP_RADIUS_M, Bounded, Grip, unsqueezed

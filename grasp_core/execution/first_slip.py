@@ -38,8 +38,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, cross, frozen
+from grasp_core.by_value import ByValue
 from grasp_core.closure.contacts import cross_matrix, grasp_map
-from grasp_core.declared import ByValue, trusted
+from grasp_core.declared import trusted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.execution.grips import Grip, check_grip
 from grasp_core.kinds import LARGEST, SMALLEST, number, one_of

@@ -16,14 +16,14 @@ from itertools import repeat
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast, get_type_hints
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
 from grasp_core.declared import Declared, default_of, flat_parts, types
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import TOO_DEEP, object_of, shown, text_of
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import at, input_error, near
+from grasp_core.kinds import adapter, at, input_error, near
 
 UNRECORDED: Any = Field(exclude=True)
 """Mark in the type of a field that no file holds."""
@@ -74,14 +74,9 @@ def keys(kind: type) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-@cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
-
-
 def record_of(value: object, *, computed: bool = True) -> dict[str, Any]:
     """Return a value as an object of JSON, with its computed fields unless they are not wanted."""
-    return _adapter(type(value)).dump_python(
+    return adapter(type(value)).dump_python(
         value, mode="json", exclude_computed_fields=not computed
     )
 
@@ -92,7 +87,7 @@ def from_record(kind: type[Record], found: object, where: str = "", **beside: An
         raise InputError(f"{where and f'{where}: '}expected an object, got {shown(found)}")
     said = cast("dict[str, Any]", found)
     try:
-        made: Record = _adapter(kind).validate_python(
+        made: Record = adapter(kind).validate_python(
             said | beside, by_alias=True, by_name=False, extra="ignore", context=kind
         )
     except ValidationError as error:
@@ -120,9 +115,9 @@ def _check_said(said: Any, ours: Any, own: Any, where: str) -> None:
         return
     both: Any = (type(said), type(ours))
     if both == (dict, dict):
-        _check_keys(said, ours, own if type(own) is dict else {}, where)
+        _check_keys(said, ours, {} if own is ABSENT else own, where)
     elif both == (list, list) and len(said) == len(ours):
-        parts: Any = own if type(own) is list else repeat(ABSENT)
+        parts: Any = repeat(ABSENT) if own is ABSENT else own
         for number, each in enumerate(zip(said, ours, parts, strict=False)):
             if set(map(type, each[:2])) != {str}:  # sentences may be reworded
                 _check_said(*each, f"{where}[{number}]")

@@ -49,12 +49,14 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen_each
-from grasp_core.declared import Declared, counted, declared, summary
+from grasp_core.by_value import counted, summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import HANDS, TorqueLimit, UnfitError, shown, value_of
+from grasp_core.kinds import TorqueLimit, UnfitError, shown, value_of
+from grasp_core.names import HANDS
 
 LARGEST_SIZE = 2.0  # largest length of a hand [m]: a larger one is in other units
 MOST_TURN = 2.0 * np.pi  # largest angle of a joint, in either direction [rad]

@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike
 from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Indices, Shape, UnitVector, frozen, frozen_indices
+from grasp_core.by_value import summary
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared, declared, summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.frames import POSE

@@ -17,11 +17,13 @@ from annotated_types import Interval
 from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
-from grasp_core.declared import Declared, InNotebooks, counted, declared, summary
+from grasp_core.by_value import counted, summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import LARGEST, Quantity, instance, one_of, path_of, shown, value_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
 from grasp_core.objects.surface import Face, Surface
 from grasp_core.settings import extended

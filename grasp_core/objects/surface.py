@@ -16,7 +16,8 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Point, Polygon, Shape, UnitVector
-from grasp_core.declared import Declared, counted, declared, summary
+from grasp_core.by_value import counted, summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.kinds import LARGEST, NotNegative, Number
 from grasp_core.values import RIGHT_ANGLE

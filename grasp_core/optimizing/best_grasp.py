@@ -46,7 +46,6 @@ from grasp_core.kinds import (
     Count,
     Friction,
     Gap,
-    MeasureName,
     Seed,
     TimeLimit,
     function,
@@ -54,6 +53,7 @@ from grasp_core.kinds import (
     several,
     value_of,
 )
+from grasp_core.names import MeasureName
 from grasp_core.objects.face_pieces import inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron

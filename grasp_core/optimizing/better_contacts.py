@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.declared import ByValue
+from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
 from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.families.placing import point_regions

@@ -45,7 +45,7 @@ from grasp_core.families.placing import (
     on_true_surface,
     point_regions,
 )
-from grasp_core.kinds import Method
+from grasp_core.names import Method
 from grasp_core.objects.face_pieces import FacePiece, FaceShape, Shapes, choices_near
 from grasp_core.objects.standard_order import Standard
 from grasp_core.planning.certify import Candidate, Certified, certify_each, named

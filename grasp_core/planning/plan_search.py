@@ -26,7 +26,7 @@ from grasp_core.execution.best_squeeze import GAP, searched
 from grasp_core.execution.grips import STIFFNESS_N_PER_M, Grip, springs
 from grasp_core.execution.loads import any_direction
 from grasp_core.families.placing import CONSTRUCTIONS, chosen_shapes
-from grasp_core.kinds import METHODS, Family, Method
+from grasp_core.names import METHODS, Family, Method
 from grasp_core.objects.face_pieces import clear_of_edges, with_halves
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.standard_order import Standard, standard

@@ -18,7 +18,8 @@ from typing import cast
 from grasp_core.cones.spanning import count_spanning
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
-from grasp_core.kinds import METHODS, ConeKind, Count, Method, RankBy, function, value_of
+from grasp_core.kinds import Count, function, value_of
+from grasp_core.names import METHODS, ConeKind, Method, RankBy
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified, absence_as_given, faces_as_given, to_grasp

@@ -60,7 +60,8 @@ from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program, into_cones
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, SolverError
-from grasp_core.kinds import LARGEST, SMALLEST, MeasureName, one_of
+from grasp_core.kinds import LARGEST, SMALLEST, one_of
+from grasp_core.names import MeasureName
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
     GAP,

@@ -37,9 +37,10 @@ import numpy as np
 from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array
+from grasp_core.by_value import counted, summary
 from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import ClosureCertificate
-from grasp_core.declared import Declared, counted, declared, summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.families.free import of_general_type
 from grasp_core.families.placements import Placement

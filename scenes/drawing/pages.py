@@ -23,7 +23,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.declared import ByValue, counted
+from grasp_core.by_value import ByValue, counted
 from grasp_core.files.text_files import write_parts
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach

@@ -30,7 +30,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.declared import ByValue
+from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.kinds import path_of

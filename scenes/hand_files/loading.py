@@ -9,7 +9,8 @@ from typing import Any
 from grasp_core.errors import InputError, about
 from grasp_core.hands.hand import FEWEST_FINGERS, MOST_FINGERS, Hand
 from grasp_core.hands.hand import load_hand as built_in_hand
-from grasp_core.kinds import HANDS, path_of, several, value_of
+from grasp_core.kinds import path_of, several, value_of
+from grasp_core.names import HANDS
 
 ENDINGS = (".xml", ".mjcf", ".urdf")
 

@@ -35,7 +35,8 @@ from typing import Any, Self
 import numpy as np
 
 from grasp_core.arrays import Array, to_digits
-from grasp_core.declared import ByValue, Declared, declared
+from grasp_core.by_value import ByValue
+from grasp_core.declared import Declared, declared
 from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
 from grasp_core.hands.hand_arrays import (
     HandPlaces,

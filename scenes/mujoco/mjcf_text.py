@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.declared import ByValue
+from grasp_core.by_value import ByValue
 from grasp_core.solvers.ties import first_best
 
 COMPILER = {"angle": "radian", "autolimits": "false", "inertiafromgeom": "false"}

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from grasp_core.arrays import Array, Indices
-from grasp_core.declared import ByValue
+from grasp_core.by_value import ByValue
 from scenes.mujoco.mjcf_text import (
     COMPILER,
     FINGERTIPS,

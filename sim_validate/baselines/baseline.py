@@ -15,7 +15,7 @@ from pydantic import Field
 from grasp_core.arrays import Array, Indices, Shape
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
-from grasp_core.figures import Figure, Kept, compared, keeps
+from grasp_core.figures import Figure, compared
 from grasp_core.files.file_kinds import BASELINE
 from grasp_core.files.json_text import shown
 from grasp_core.files.records import RecordFile, record_of
@@ -31,6 +31,7 @@ from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
 from sim_validate.kit.files import AboutObject
+from sim_validate.kit.kept_figures import Kept, keeps
 from sim_validate.settings import ExecutionSettings
 
 DIGITS = 12

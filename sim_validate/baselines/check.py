@@ -12,7 +12,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from grasp_core.declared import Declared, counted
+from grasp_core.by_value import counted
+from grasp_core.declared import Declared
 from grasp_core.errors import InputError
 from grasp_core.figures import NONE, Shown, cell, compared
 from grasp_core.planning.result import Plan

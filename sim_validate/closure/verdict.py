@@ -17,11 +17,12 @@ from pydantic import computed_field
 
 from grasp_core.arrays import Array, Shape, Wrench
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.declared import Declared, InNotebooks, declared
+from grasp_core.declared import Declared, declared
 from grasp_core.figures import Compared, Shown, figure, less, more
 from grasp_core.files.file_kinds import VERDICTS
 from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import FLAT, Friction, Measured, OrInfinity, path_of
+from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import FingerDrive, Scene

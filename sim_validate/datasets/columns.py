@@ -16,8 +16,8 @@ from annotated_types import Interval
 from grasp_core.arrays import Array, Indices, Shape, Wrench
 from grasp_core.declared import Declared, declared, rules, types
 from grasp_core.errors import InputError
-from grasp_core.figures import Kept, keeps
-from grasp_core.kinds import FLAT, Family, Friction, Number, Seed, Share
+from grasp_core.kinds import FLAT, Friction, Number, Seed, Share
+from grasp_core.names import Family
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
@@ -35,6 +35,7 @@ from sim_validate.datasets.parquet import (
 )
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
+from sim_validate.kit.kept_figures import Kept, keeps
 
 GIVEN = "given"
 """Label of grasps that another tool made."""

@@ -4,7 +4,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from grasp_core.declared import counted
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError
 from grasp_core.files.records import record_of
 from grasp_core.mesh_files.limits import FORMATS

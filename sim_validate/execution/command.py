@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from grasp_core.declared import counted
+from grasp_core.by_value import counted
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.figures import NONE, figures
 from grasp_core.files.text_files import write_text

@@ -13,8 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
+from grasp_core.by_value import counted
 from grasp_core.closure.contacts import contacts_sha256
-from grasp_core.declared import counted
 from grasp_core.errors import InputError, SolverError
 from grasp_core.figures import NONE, meanings, table
 from grasp_core.files.file_kinds import GRASPS, REACHES
@@ -22,7 +22,7 @@ from grasp_core.files.records import RecordFile, record_of
 from grasp_core.hands.hand import Coupling, Hand
 from grasp_core.hands.hand_motors import hand_payload
 from grasp_core.hands.reach import HandReach, reach_with, uncoupled
-from grasp_core.kinds import HANDS
+from grasp_core.names import HANDS
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp

@@ -33,8 +33,9 @@ from annotated_types import Len
 from pydantic import AfterValidator, Field
 
 from grasp_core.arrays import Array, Shape, to_digits
+from grasp_core.by_value import summary
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.declared import Declared, declared, summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown, text_of
 from grasp_core.files.records import from_record, keys, record_of

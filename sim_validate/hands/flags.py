@@ -10,7 +10,8 @@ from typing import Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from grasp_core.declared import declared
-from grasp_core.kinds import HANDS, Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
+from grasp_core.kinds import Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
+from grasp_core.names import HANDS
 from sim_validate.kit.command_flags import (
     AtFriction,
     FirstOnly,

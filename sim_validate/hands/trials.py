@@ -41,8 +41,9 @@ import numpy as np
 from pydantic import Field, computed_field
 
 from grasp_core.arrays import Array, Shape, rounded, to_digits
+from grasp_core.by_value import summary
 from grasp_core.closure.force_closure import force_closure
-from grasp_core.declared import Declared, declared, summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze

@@ -15,7 +15,6 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 from grasp_core.declared import declared
 from grasp_core.kinds import (
     MOST_COUNT,
-    RANKINGS,
     Cases,
     Count,
     Direction,
@@ -23,9 +22,7 @@ from grasp_core.kinds import (
     Friction,
     FrictionOrZero,
     Gap,
-    MeasureName,
     Quantity,
-    RankBy,
     Seed,
     Share,
     TimeLimit,
@@ -34,6 +31,7 @@ from grasp_core.kinds import (
     nonzero,
 )
 from grasp_core.mesh_files.limits import FORMATS, Lengths, MeshChoices, MeshLimits
+from grasp_core.names import RANKINGS, MeasureName, RankBy
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import Carrying

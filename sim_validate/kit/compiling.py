@@ -17,7 +17,7 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import is_kept
 from grasp_core.cones.tilting import toward
-from grasp_core.kinds import Family
+from grasp_core.names import Family
 from grasp_core.planning.planner import plan
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.qp import least_distance

@@ -17,7 +17,8 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import BEST
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import Family, Friction, MeasureName, Number, Quantity
+from grasp_core.kinds import Friction, Number, Quantity
+from grasp_core.names import Family, MeasureName
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best_grasp import (
     BestGrasp,

@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from grasp_core.arrays import Point, UnitVector
+from grasp_core.by_value import vector
 from grasp_core.cones.spanning import count_spanning
-from grasp_core.declared import Declared, declared, vector
+from grasp_core.declared import Declared, declared
 from grasp_core.figures import Shown
 from grasp_core.files.records import record_of
 from grasp_core.objects.planar_faces import MAX_FACES

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.declared import counted
+from grasp_core.by_value import counted
 from grasp_core.errors import GraspError
 from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.text_files import write_text
-from grasp_core.kinds import METHODS, RankBy
+from grasp_core.names import METHODS, RankBy
 from grasp_core.objects.on_faces import nearest_edge
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.plan_search import carried

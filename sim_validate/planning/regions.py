@@ -24,7 +24,8 @@ from grasp_core.errors import InputError, SolverError, about
 from grasp_core.figures import Shown, figures
 from grasp_core.files.file_kinds import REGIONS
 from grasp_core.geometry.polygons import FEWEST_CORNERS, edge_rows, plane_frame
-from grasp_core.kinds import FLAT, Count, Family, NotNegative, Share, number, path_of
+from grasp_core.kinds import FLAT, Count, NotNegative, Share, number, path_of
+from grasp_core.names import Family
 from grasp_core.objects.face_pieces import inscribed_radius
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.certify_placement import misplacement, placement_bound

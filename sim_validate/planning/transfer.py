@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Self
 
-from grasp_core.declared import counted, declared
+from grasp_core.by_value import counted
+from grasp_core.declared import declared
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS, TRANSFER
 from grasp_core.files.text_files import write_text

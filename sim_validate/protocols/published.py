@@ -13,7 +13,8 @@ from typing import TypeAlias
 import numpy as np
 
 from grasp_core.arrays import Array
-from grasp_core.declared import Declared, declared, summary
+from grasp_core.by_value import summary
+from grasp_core.declared import Declared, declared
 from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.chains import Weld

@@ -5,7 +5,8 @@ from typing import Annotated
 
 from pydantic import Field, computed_field
 
-from grasp_core.declared import Declared, declared, summary
+from grasp_core.by_value import summary
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import JUDGEMENTS

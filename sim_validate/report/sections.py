@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from grasp_core.declared import counted
+from grasp_core.by_value import counted
 from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
-from grasp_core.kinds import HANDS
+from grasp_core.names import HANDS
 from scenes.drawing.pages import Fact, number
 from sim_validate.execution.verdict import (
     ExecutedGrasp,

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.declared import MOST, ByValue
+from grasp_core.by_value import MOST, ByValue
 from scenes.example_objects import example_object
 
 FRICTION = 0.5

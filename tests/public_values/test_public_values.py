@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.declared import MOST
+from grasp_core.by_value import MOST
 from tests.public_values import calls_of_execution, calls_of_grasp_core, calls_of_simulation
 
 PACKAGES = {"gc": gc, "scenes": scenes, "sv": sv}

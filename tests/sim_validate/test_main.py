@@ -11,8 +11,8 @@ from typing import get_args
 import pytest
 import trimesh
 
-from grasp_core.kinds import HANDS, RANKINGS, RankBy
 from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.names import HANDS, RANKINGS, RankBy
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import FAMILIES
 from grasp_core.provenance import versions

@@ -8,7 +8,7 @@ import trimesh
 import grasp_core as gc
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.families.placing import CONSTRUCTIONS
-from grasp_core.kinds import METHODS, RankBy
+from grasp_core.names import METHODS, RankBy
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.objects.standard_order import standard
 from grasp_core.planning.plan_search import PlanSearch
