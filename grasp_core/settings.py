@@ -10,7 +10,7 @@ What functions take, tables of files and flags of commands are such classes, and
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import fields, replace
+from dataclasses import MISSING, fields, replace
 from textwrap import shorten
 from typing import Any, Self, TypeVar, cast, get_args
 
