@@ -5,10 +5,9 @@ poses; an item of the build is an object with a pose. A pose is four rows of thr
 a point and a 1 are multiplied from the left. Where it mirrors, the triangles are wound the other
 way, so that normals still point outwards.
 
-trimesh reads 3MF, too, but silently loses one of two items with equal part numbers, all numbers
-from the first on that it cannot read, and some of many nested components; it takes supports for
-parts, and all meshes of another file for each that is asked for. Expat, which reads the XML here,
-is part of Python and needs no tree in memory.
+trimesh reads 3MF, too, but without a word it loses one of two items with equal part numbers and
+most of many nested components, takes supports for solids, and every mesh of another file for the
+one that is asked for. Expat, which reads the XML here, is a part of Python and keeps no tree.
 
 Elements and attributes that would change the shape and are not read are refused. The model and the
 settings of slicers may together take as many bytes as a mesh file, and a token of XML as many as

@@ -238,7 +238,7 @@ CASES += [
 ]
 CASES += [
     Case("3mf: in another unit than asked", "inspect part.3mf --unit in",
-         "SIZE|part.3mf|m,|--unit|--scale", 4, {"part.3mf": GOOD}),
+         "SIZE|part.3mf|(m), got in|--unit|--scale", 4, {"part.3mf": GOOD}),
     refused("3mf: four triangles of three", "part.3mf", GOOD, "--max-triangles",
             "inspect --max-triangles 3"),
     refused("3mf: more bytes unpacked than allowed", "part.3mf", threemf(model() + " " * 9000),

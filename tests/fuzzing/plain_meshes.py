@@ -201,15 +201,14 @@ def matrix_of(node):
 def of_3mf(data: bytes) -> list[Triangle]:
     core = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        parts = {name.lower(): archive.read(name) for name in archive.namelist()}
-    named = "3d/3dmodel.model"
-    if "_rels/.rels" in parts:
-        (relation,) = (
-            each for each in ElementTree.fromstring(parts["_rels/.rels"]).iter()  # noqa: S314 - ours
-            if each.get("Type", "").endswith("/3dmodel")
-        )  # fmt: skip
-        named = relation.get("Target").removeprefix("/").lower()
-    root = ElementTree.fromstring(parts[named])  # noqa: S314 - the reader has refused entities
+        parts = {name.lower(): name for name in archive.namelist()}
+        named = "3d/3dmodel.model"
+        if "_rels/.rels" in parts:
+            relations = ElementTree.fromstring(archive.read(parts["_rels/.rels"]))  # noqa: S314
+            (relation,) = (r for r in relations.iter() if r.get("Type", "").endswith("/3dmodel"))
+            named = relation.get("Target").removeprefix("/").lower()
+        # the reader has refused entities before
+        root = ElementTree.fromstring(archive.read(parts[named]))  # noqa: S314
     objects = {int(each.get("id")): each for each in root.iter(f"{core}object")}
     found = []
 
