@@ -266,7 +266,7 @@ class ModelPart:
         number = whole(_word(attributes["id"]))
         if number in self.solids:
             raise ValueError(f"two objects have the number {number}")
-        if any(name.endswith(" slicestackid") for name in attributes):
+        if any(name.endswith(" slicestackid") for name in attributes):  # the mesh may be a box
             unsupported("an object of slices", "export plain triangles")
         self.seen.clear()
         kind = attributes.get("type", "model")

@@ -214,8 +214,8 @@ def _unit_of(mesh: MeshFile, given: str | None) -> str:
     """Return the unit of a mesh file: as it states, as it is given, or the metre."""
     if mesh.unit is not None and given not in (None, mesh.unit):
         message = (
-            f"expected the unit that the file states ({mesh.unit}), got {given}; leave out the unit "
-            "(--unit), or correct the size by a factor (--scale)"
+            f"expected the unit that the file states ({mesh.unit}), got {given}; leave out the "
+            "unit (--unit), or correct the size by a factor (--scale)"
         )
         raise MeshError(MeshRefusal.SIZE, message)
     return mesh.unit or given or "m"
