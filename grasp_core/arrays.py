@@ -152,6 +152,8 @@ class Shape:
             items = [*chain.from_iterable(items)]
         if bool in found:
             raise UnfitError("must hold numbers, got true or false among them")
+        if self.nan and any(isinstance(x, float) and not math.isfinite(x) for x in items):
+            raise UnfitError("must hold finite numbers, got NaN or infinity")
         return cast("Any", value)
 
     def _listed(self, array: NDArray[Any]) -> Any:

@@ -25,20 +25,19 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+from grasp_core.cache_folders import BYTECODE, cache_folders
 from grasp_core.errors import InputError
 
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 
 NUMBA_FAILS = (ImportError, RuntimeError, OSError, ValueError)
 """What numba raises when it is imported with settings that it refuses, or cannot be."""
-OWN = "graspproof"
-"""Name of the folder for compiled code in the user's cache folder."""
 DIGITS = 16
 """Number of digits of the hash in a copy's name."""
 IMPORTED = re.compile(r"^from ((?:grasp_core|scenes)(?:\.\w+)+) import", re.MULTILINE)
@@ -109,14 +108,13 @@ def is_kept(module: str) -> bool:
         return True
     # below the copy's folder, or beside it where NUMBA_CACHE_DIR is set
     folder = copy.parent
-    names = (
-        name
-        for top in folder.parent.glob(f"{folder.name}*")
+    for top in folder.parent.glob(f"{folder.name}*"):
         # a walk passes over folders that other processes remove meanwhile, and a glob does not
-        for _, _, inside in os.walk(top)
-        for name in inside
-    )
-    return any(name.startswith(f"{copy.stem}.") and name.endswith(".nbi") for name in names)
+        for _, below, names in os.walk(top):
+            if any(name.startswith(f"{copy.stem}.") and name.endswith(".nbi") for name in names):
+                return True
+            below[:] = [name for name in below if name != BYTECODE]
+    return False
 
 
 @cache
@@ -162,13 +160,7 @@ def why_not_kept() -> str:
 
 def folders(path: Path) -> Iterator[Path]:
     """Yield folders that may keep compiled loops: a chosen one, the user's, or the module's."""
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        yield Path(chosen).absolute() / OWN
-    users = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    with suppress(RuntimeError):  # there may be no home
-        users = users if users.is_absolute() else Path.home() / ".cache"
-    if users.is_absolute():
-        yield users / OWN
+    yield from cache_folders()
     yield path.parent / "__pycache__"
 
 

@@ -223,6 +223,7 @@ def test_the_settings_of_a_dataset_are_all_shown_and_its_contacts_are_read(tmp_p
     assert config.execution.mass_kg == 0.3
     plain = DatasetConfig(objects=config.objects)
     told = {"objects", "frictions", "title", "license", "creator", "url", "published", "execution"}
+    told |= {"unit"}  # none is given, if not
     for name in shown - told:
         assert getattr(config, name) == getattr(plain, name)
     (given,) = blocks(DATASETS, "json")

@@ -17,7 +17,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.polygons import check_corners, too_many
+from grasp_core.mesh_files.polygons import check_corners, too_many, unsupported
 
 HEAD = "<4sIIII"
 JSON_CHUNK = 0x4E4F534A
@@ -80,8 +80,7 @@ def _check_features(tree: Tree) -> None:
         "sparse numbers": any("sparse" in a or "bufferView" not in a for a in accessors),
     }
     for feature in (name for name, there in wrong.items() if there):
-        message = f"the file has a feature that is not read: {feature}; export plain triangles"
-        raise MeshError(MeshRefusal.UNSUPPORTED, message)
+        unsupported(feature, "export plain triangles")
     for node in nodes:
         _check_pose(node)
     for part in parts:

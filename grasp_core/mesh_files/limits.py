@@ -9,9 +9,9 @@ from grasp_core.kinds import Count, Quantity
 from grasp_core.settings import Settings
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
-FORMATS = ("obj", "stl", "ply", "off", "glb")
+FORMATS = ("obj", "stl", "ply", "off", "glb", "3mf")
 """Endings of mesh files, which say their format."""
-Unit: TypeAlias = Literal["m", "cm", "mm", "in"]
+Unit: TypeAlias = Literal["m", "cm", "mm", "um", "in", "ft"]
 
 
 @declared
@@ -49,8 +49,9 @@ class PatchLimits(Settings):
 class Lengths(Settings):
     """What lengths the numbers of a mesh file mean."""
 
-    unit: Unit = "m"
-    """Unit of length in a mesh file."""
+    unit: Unit | None = None
+    """Unit of length in a mesh file. If not given, it is the one that a 3MF file states, and the
+    metre in other files."""
     scale: Quantity = 1.0
     """Factor on the coordinates of a mesh file, besides its unit."""
 

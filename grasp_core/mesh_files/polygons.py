@@ -41,6 +41,17 @@ def too_many(triangles: int, most: int) -> NoReturn:
     raise MeshError(MeshRefusal.TOO_MANY, message)
 
 
+def unsupported(said: str, remedy: str) -> NoReturn:
+    """Refuse a file that has something which is not read."""
+    message = f"the file has a feature that is not read: {said}; {remedy}"
+    raise MeshError(MeshRefusal.UNSUPPORTED, message)
+
+
+def whole(word: bytes) -> int:
+    """Read a word as a whole number, without the underscores that Python allows."""
+    return int(word.replace(b"_", b"?"))
+
+
 def check_corners(corners: Indices, vertices: int) -> None:
     """Refuse corners of triangles that are no numbers of vertices."""
     low, high = int(corners.min(initial=0)), int(corners.max(initial=-1))
@@ -151,6 +162,12 @@ class TextPoints:
         fixed = len(decimals) == 1 and min(decimals) >= FEWEST_DIGITS
         return digits if fixed or digits >= FEWEST_DIGITS else 0
 
+    @property
+    def rounding(self) -> float:
+        """The largest rounding error of a coordinate that the numbers show; 0 if they show none."""
+        points, digits = self.array, self.digits
+        return single_rounding(points, digits) + text_rounding(points, digits)
+
 
 def most_digits(words: Iterable[bytes]) -> int:
     """Return the most significant digits of some numbers, zeros at the end of decimals included."""
@@ -163,14 +180,14 @@ def most_digits(words: Iterable[bytes]) -> int:
 def text_rounding(points: Array, digits: int) -> float:
     """Return the rounding of coordinates (n, 3) written with at most so many digits."""
     largest = float(np.abs(points).max(initial=0.0))
-    if not 0 < digits < ALL_DIGITS or largest == 0.0:
+    if not 0 < digits < ALL_DIGITS or not 0.0 < largest < math.inf:
         return 0.0
     return 0.5 * 10.0 ** (math.floor(math.log10(largest)) + 1 - digits)
 
 
 def single_rounding(points: Array, digits: int = 0) -> float:
     """Return the rounding of coordinates (n, 3) if all are of single precision; 0 otherwise."""
-    with np.errstate(over="ignore", under="ignore", divide="ignore"):
+    with np.errstate(all="ignore"):  # what is not finite is refused later
         sizes = np.abs(points)
         last = 10.0 ** (np.floor(np.log10(sizes)) + 1 - digits) if digits else np.zeros(())
         if not (np.abs(points - points.astype(np.float32)) <= WRITTEN * last).all():

@@ -1,10 +1,11 @@
 """Reads a mesh file: one regular file, by the rules of the format that its ending names.
 
 OBJ, OFF and some STL files are text, others of STL are rows of numbers, PLY files are tables that
-their header describes, and `glb` reads GLB files. What breaks a format is raised as `ValueError`,
-also by Python and numpy where numbers do not fit. Words that say nothing of the surface, such as
-colours, are passed over unread. Reading takes time and memory in proportion to the bytes of the
-file, and no more triangles than are allowed are kept: `MeshLimits` bounds both.
+their header describes; `glb` reads GLB files, and `threemf` 3MF files. What breaks a format is
+raised as `ValueError`, also by Python and numpy where numbers do not fit. Words that say nothing of
+the surface, such as colours, are passed over unread. Reading takes time and memory in proportion to
+the bytes of the file, unpacked, and no more triangles than are allowed are kept: `MeshLimits`
+bounds both.
 """
 
 import io
@@ -22,14 +23,16 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal, about
 from grasp_core.files.text_files import bounded_bytes
 from grasp_core.mesh_files.glb import read_glb
-from grasp_core.mesh_files.limits import FORMATS, MeshLimits
+from grasp_core.mesh_files.limits import FORMATS, MeshLimits, Unit
 from grasp_core.mesh_files.polygons import (
     Polygons,
     TextPoints,
     single_rounding,
-    text_rounding,
     too_many,
+    unsupported,
+    whole,
 )
+from grasp_core.mesh_files.threemf import read_3mf
 
 BEGINNINGS = {"ply": b"ply", "glb": b"gltf"}
 """First bytes of files of some formats, in small letters."""
@@ -48,6 +51,8 @@ class MeshFile(NamedTuple):
     rounding: float
     """Largest rounding error of a coordinate that the numbers of the file show; 0 if they show
     none."""
+    unit: Unit | None
+    """Unit of length that the file states; None if its format has none."""
     data: bytes
 
 
@@ -67,7 +72,7 @@ def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
                     "(--max-mesh-bytes, and perhaps --max-triangles)"
                 )
                 raise MeshError(MeshRefusal.TOO_MANY, message)
-            return mesh_of_bytes(kind, data, limits.max_triangles)
+            return mesh_of_bytes(kind, data, limits.max_triangles, limits.max_mesh_bytes)
         except OSError as error:
             message = f"the file cannot be read ({error.strerror}); check the path"
             raise MeshError(MeshRefusal.UNREADABLE, message) from error
@@ -80,14 +85,17 @@ def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
             raise MeshError(MeshRefusal.LIMIT, message) from error
 
 
-def mesh_of_bytes(kind: str, data: bytes, most: int) -> MeshFile:
-    """Read the bytes of a mesh file, and judge the numbers that it holds."""
+def mesh_of_bytes(
+    kind: str, data: bytes, most: int, room: int = MeshLimits().max_mesh_bytes
+) -> MeshFile:
+    """Read the bytes of a mesh file, unpacked at most as many as there is room, and judge them."""
     for other, beginning in BEGINNINGS.items():
         if other != kind and data[:4].lower().startswith(beginning):
             message = f"the file is {other.upper()} by its first bytes; rename it to .{other}"
             raise MeshError(MeshRefusal.FORMAT, message)
     try:
-        points, triangles, digits = _surface(kind, data, most)
+        read = partial(read_3mf, room=room) if kind == "3mf" else partial(_surface, kind)
+        points, triangles, rounding, unit = read(data, most)
     except (ValueError, OverflowError) as error:
         fault = "".join(c if c.isascii() and c.isprintable() else "?" for c in str(error)[:SHOWN])
         message = f"the file breaks the rules of {kind.upper()} ({fault}); export it again"
@@ -97,29 +105,29 @@ def mesh_of_bytes(kind: str, data: bytes, most: int) -> MeshFile:
     if not np.isfinite(points).all():
         message = "a coordinate is infinite, not a number, or too large; repair the mesh"
         raise MeshError(MeshRefusal.NON_FINITE, message)
-    rounding = single_rounding(points, digits) + text_rounding(points, digits)
-    return MeshFile(points, triangles, rounding, data)
+    return MeshFile(points, triangles, rounding, unit, data)
 
 
-def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, int]:
-    """Return the vertices (n, 3), triangles (t, 3) and coordinates' digits of a file."""
+def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, float, None]:
+    """Return the vertices (n, 3), triangles (t, 3) and rounding of a file that states no unit."""
     count = int.from_bytes(data[STL_HEAD : STL_HEAD + 4], "little")
     if kind == "stl" and len(data) == STL_HEAD + 4 + STL_ROW.itemsize * count:
         if count > most:
             too_many(count, most)
         rows = np.frombuffer(data, STL_ROW, offset=STL_HEAD + 4)
         corners = rows["corners"].reshape(-1, 3).astype(np.float64)
-        return corners, np.arange(3 * count).reshape(-1, 3), 0
+        return corners, np.arange(3 * count).reshape(-1, 3), single_rounding(corners), None
     if data.startswith(UTF_16):
         data = data.decode("utf-16", "replace").encode()
     data = data.removeprefix(BYTE_ORDER_MARK)
     if not data[:4].lower().startswith(BEGINNINGS.get(kind, b"")):
         raise ValueError("it begins otherwise")
     if kind == "glb":
-        return *read_glb(data, most), 0
+        points, triangles = read_glb(data, most)
+        return points, triangles, single_rounding(points), None
     read = {"ply": read_ply, "obj": read_obj, "off": read_off, "stl": read_stl_text}[kind]
     written, polygons = read(data, most)
-    return written.array, polygons.fans(written.array), written.digits
+    return written.array, polygons.fans(written.array), written.rounding, None
 
 
 PLY_TYPES = {
@@ -330,11 +338,6 @@ def worded_lines(text: bytes) -> Iterator[list[bytes]]:
             yield words
 
 
-def whole(word: bytes) -> int:
-    """Read a word as a whole number, without the underscores that Python allows."""
-    return int(word.replace(b"_", b"?"))
-
-
 def read_obj(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
     """Read an OBJ file; a comment whose backslash might hide a vertex or a face is refused."""
     text = plain_text(data)
@@ -348,12 +351,12 @@ def read_obj(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
             if len(words) not in OBJ_WIDTHS:
                 raise ValueError(f"a vertex needs three numbers, got {len(words)}")
             if len(words) == WEIGHTED and float(words[-1]) != 1.0:
-                _unsupported("a vertex has a weight", "export weights of 1")
+                unsupported("a vertex has a weight", "export weights of 1")
             points.add(words[:3])
         elif keyword == b"f":
             polygons.add([_obj_corner(word, len(points)) for word in words])
         elif keyword not in OBJ_PASSED_OVER and not keyword.startswith(OTHER_COMMENTS):
-            _unsupported(f"keyword {keyword[:40].decode()!r}", "export polygons only")
+            unsupported(f"keyword {keyword[:40].decode()!r}", "export polygons only")
     return points, polygons
 
 
@@ -366,11 +369,6 @@ def _obj_corner(word: bytes, vertices: int) -> int:
         message = f"a face names vertex {number}, of {vertices} so far; export it again"
         raise MeshError(MeshRefusal.INDEX, message)
     return number - 1 if number > 0 else vertices + number
-
-
-def _unsupported(said: str, remedy: str) -> None:
-    message = f"the file has a feature that is not read: {said}; {remedy}"
-    raise MeshError(MeshRefusal.UNSUPPORTED, message)
 
 
 def read_off(data: bytes, most: int) -> tuple[TextPoints, Polygons]:

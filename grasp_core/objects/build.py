@@ -226,7 +226,7 @@ def _checked_arrays(vertices: ArrayLike, triangles: ArrayLike, most: int) -> tup
         extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     if not SMALLEST_EXTENT_M <= extent <= LARGEST_EXTENT_M:
         wrong = (
-            "small (without --unit it is metres; --scale multiplies it)"
+            "small (without --unit it is metres, or what a 3MF file states; --scale multiplies it)"
             if extent < 1.0
             else "large (--unit mm, perhaps, or --scale)"
         )

@@ -19,16 +19,18 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
 from grasp_core.by_value import counted, summary
 from grasp_core.declared import Declared, declared
-from grasp_core.errors import InputError, about
+from grasp_core.errors import InputError, MeshError, MeshRefusal, about
 from grasp_core.kinds import LARGEST, Quantity, instance, one_of, path_of, shown, value_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
-from grasp_core.mesh_files.reading import read_triangles
+from grasp_core.mesh_files.reading import MeshFile, read_triangles
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
 from grasp_core.objects.surface import Face, Surface
 from grasp_core.settings import extended
 
-UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+UNITS_M = {
+    "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048
+}  # fmt: skip
 
 
 @declared
@@ -155,7 +157,7 @@ AnyPolyhedron = TypeVar("AnyPolyhedron", bound=Polyhedron)
 def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     path: str | Path,
     *,
-    unit: str = "m",
+    unit: str | None = None,
     scale: float = 1.0,
     faces: FaceKind = "auto",
     patches: PatchLimits | None = None,
@@ -169,8 +171,9 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
     Small holes are closed, and parts that overlap are united; the notes of the result say so.
 
     Args:
-        path: An OBJ, STL, PLY, OFF or GLB file.
-        unit: Unit of length of the file: "m", "cm", "mm" or "in".
+        path: An OBJ, STL, PLY, OFF, GLB or 3MF file.
+        unit: Unit of length of the file: "m", "cm", "mm", "um", "in" or "ft". If not given, it is
+            the one that a 3MF file states, and the metre in other files.
         scale: Factor on the coordinates of the file, besides its unit.
         faces: `planar` for exact planar faces; `patches` for the nearly flat parts of a curved or
             scanned surface, which may have large holes; `auto` takes patches where there are more
@@ -188,15 +191,17 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         InputError: The unit is unknown, or a number is out of range.
         MeshError: The file is not a solid; its `reason` says why.
     """
-    one_of(unit, UNITS_M, "unit")
+    if unit is not None:
+        one_of(unit, UNITS_M, "unit")
     choices = extended(
         MeshChoices, instance(limits, MeshLimits, "limits"), faces=faces,
         patches=patches or PatchLimits(), flatness_m=flatness_m, largest_part=largest_part,
     )  # fmt: skip
-    size = UNITS_M[unit] * value_of(Quantity, scale, "scale")
+    scale = value_of(Quantity, scale, "scale")
     path = path_of(path, "path")
     mesh = read_triangles(path, limits)
     with about(path):
+        size = UNITS_M[_unit_of(mesh, unit)] * scale
         return polyhedron_from_mesh(
             mesh.vertices * size,
             mesh.triangles,
@@ -206,6 +211,17 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
             center_of_mass=center_of_mass,
             rounding=mesh.rounding * size,
         )
+
+
+def _unit_of(mesh: MeshFile, given: str | None) -> str:
+    """Return the unit of a mesh file: as it states, as it is given, or the metre."""
+    if mesh.unit is not None and given not in (None, mesh.unit):
+        message = (
+            f"expected the unit that the file states ({mesh.unit}), got {given}; leave out the "
+            "unit (--unit), or correct the size by a factor (--scale)"
+        )
+        raise MeshError(MeshRefusal.SIZE, message)
+    return mesh.unit or given or "m"
 
 
 def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword each

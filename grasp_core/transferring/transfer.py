@@ -18,10 +18,10 @@ An id that a plan has made of face numbers, such as `c-0-1-2-7`, gets the new fa
 other id stays. Where a new id is taken, the later grasp gets `-2`, `-3` and so on behind it.
 
 The mesh file of a changed part is read the way the old one was. A `grasps.json` does not say in
-which unit that was. Where the user does not say so either, it is taken to be the unit in which the
-changed part is most nearly as large as the old one, by the diagonals of their bounding boxes. A
-part that has then become larger or smaller by more than `SURE_GROWTH` could be in another unit, so
-it is refused.
+which unit that was. Where neither the file nor the user says so, it is taken to be the unit in
+which the changed part is most nearly as large as the old one, by the diagonals of their bounding
+boxes. A part that has then become larger or smaller by more than `SURE_GROWTH` could be in another
+unit, so it is refused.
 """
 
 import math
@@ -383,6 +383,8 @@ def _id_on(grasp: Grasp, contacts: Iterable[CarriedContact]) -> str:
     return "-".join([parts[1], *now])
 
 
+GUESSED = ("m", "cm", "mm", "in")
+"""Units in which a mesh file may be that does not state its own."""
 SURE_GROWTH = 1.5
 """Largest ratio of the two sizes at which the unit is sure: an inch and a centimetre, the two units
 nearest to each other, differ by 2.54, which is more than the square of it."""
@@ -408,9 +410,13 @@ def fitting_unit(
     path: Path, old: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS, *, scale: float = 1.0
 ) -> str:
     """Find the unit in which a mesh file holds a part about as large as the old one."""
-    size = scale * _times(path, old, limits)
-    off = {unit: abs(math.log(size * length)) if size > 0.0 else math.inf
-           for unit, length in UNITS_M.items()}  # fmt: skip
+    stated, times = _times(path, old, limits)
+    if stated is not None:
+        return stated
+    size = scale * times
+    off = {
+        unit: abs(math.log(size * UNITS_M[unit])) if size > 0.0 else math.inf for unit in GUESSED
+    }
     best = min(off, key=off.__getitem__)
     if off[best] > math.log(SURE_GROWTH):
         raise InputError(
@@ -425,17 +431,18 @@ def fitting_lengths(
     path: Path, body: Polyhedron, limits: MeshLimits = DEFAULT_LIMITS
 ) -> tuple[str, float]:
     """Find a unit and a scale at which a mesh file is as large as the body read from it."""
-    length = float(f"{1.0 / _times(path, body, limits):.9g}")
-    for unit, metres in UNITS_M.items():
-        if math.isclose(length, metres, rel_tol=SAME_LENGTH):
+    stated, times = _times(path, body, limits)
+    for unit in GUESSED if stated is None else (stated,):
+        if math.isclose(times * UNITS_M[unit], 1.0, rel_tol=SAME_LENGTH):
             return unit, 1.0
-    return "m", length
+    unit = stated or "m"
+    return unit, float(f"{1.0 / (times * UNITS_M[unit]):.9g}")
 
 
-def _times(path: Path, body: Polyhedron, limits: MeshLimits) -> float:
-    """Return the size of a mesh file, in its own unit, relative to that of a body."""
+def _times(path: Path, body: Polyhedron, limits: MeshLimits) -> tuple[str | None, float]:
+    """Return the unit that a mesh file states, and its size in its unit relative to a body's."""
     mesh = read_triangles(path, limits)
-    return _diagonal(mesh.vertices[np.unique(mesh.triangles)]) / _diagonal(body.vertices)
+    return mesh.unit, _diagonal(mesh.vertices[np.unique(mesh.triangles)]) / _diagonal(body.vertices)
 
 
 def _diagonal(vertices: Array) -> float:

@@ -16,7 +16,7 @@ from tests.bad_input.good_files import good
 from tests.patience import HANGING_S
 
 GROUPS = (
-    "of_files", "of_obj", "of_binary_meshes", "of_topology", "of_physics",
+    "of_files", "of_obj", "of_binary_meshes", "of_threemf", "of_topology", "of_physics",
     "of_data_files", "of_surroundings",
 )  # fmt: skip
 """Modules of cases; the last three make whole files first, which takes a while."""

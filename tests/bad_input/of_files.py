@@ -61,7 +61,7 @@ def zipped(name: str, data: bytes) -> bytes:
 
 
 OTHERS = {
-    "a bomb called 3mf": ("part.3mf", zipped("3dmodel.model", bytes(50_000_000)), "ending"),
+    "a bomb called 3mf": ("part.3mf", zipped("3dmodel.model", bytes(50_000_000)), "model|export"),
     "a zip bomb called obj": ("part.obj", zipped("part.obj", bytes(50_000_000)), "export"),
     "entities called off": ("part.off", ENTITIES, "export"),
     "an entity outside": ("part.x3d", OUTSIDE, "ending"),

@@ -12,6 +12,8 @@ from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.mesh_files.reading import mesh_of_bytes
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES
 from tests.bad_input.of_binary_meshes import glb, tree
+from tests.bad_input.of_threemf import components, item, model, object_, threemf
+from tests.bad_input.of_threemf import mesh as mesh_xml
 from tests.fuzzing.array_files import npz
 from tests.fuzzing.plain_meshes import PLAIN
 from tests.fuzzing.targets import Target
@@ -42,7 +44,7 @@ def same_triangles(kind, data, found):
     assert len(rows) == len(plain), (len(rows), len(plain))
     if rows == plain:
         return
-    assert kind == "glb"  # products of matrices are rounded
+    assert kind in {"glb", "3mf"}  # products of matrices are rounded
     one, other = (np.array(each).reshape(-1, 3, 3) for each in (rows, plain))
     gap = [
         np.abs(np.roll(one, k, axis=1)[:, None] - other[None]).max(axis=(2, 3)) for k in range(3)
@@ -115,6 +117,13 @@ def moved_scene():
     return glb(scene)
 
 
+def placed_twice():
+    """A 3MF file of a mesh in two places, as a part of a part and by itself, mirrored."""
+    objects = object_(mesh_xml()) + object_(components(1, more=f'transform="{TURNED}"'), 2)
+    return threemf(model(objects, item(2, TURNED) + item(1, "1 0 0 0 -1 0 0 0 1 -1 0 0"), ""))
+
+
+TURNED = "0 2 0 -1 0 0 0 0 1 5 6 .5"
 SEEDS = {
     "obj": lambda: [OBJ.encode(), tetrahedron().export(file_type="obj").encode()],
     "stl": lambda: [tetrahedron().export(file_type=kind) for kind in ("stl", "stl_ascii")],
@@ -124,8 +133,11 @@ SEEDS = {
         tetrahedron().export(file_type="ply", encoding="ascii"),
     ],
     "glb": lambda: [tetrahedron().export(file_type="glb"), moved_scene()],
+    "3mf": lambda: [threemf(), placed_twice()],
 }  # fmt: skip
-WRITTEN = {"obj": "words", "off": "words", "glb": "glb", "stl": "words", "ply": "words"}
+WRITTEN = {
+    "obj": "words", "off": "words", "glb": "glb", "stl": "words", "ply": "words", "3mf": "3mf"
+}  # fmt: skip
 
 
 def seeds(kind):

@@ -1,7 +1,9 @@
 """Files changed as people and attackers change them: values, keys, words and lines, not bytes."""
 
+import io
 import json
 import random
+import zipfile
 from typing import Any
 
 RAW = (
@@ -28,7 +30,12 @@ HOLE = "\u2603hole\u2603"
 
 def changed(written: str, data: bytes, rng: random.Random) -> bytes | None:
     """An input changed in the way of its kind; None where bytes are to be changed."""
-    ways = {"json": json_changed, "words": words_changed, "glb": glb_changed}
+    ways = {
+        "json": json_changed,
+        "words": words_changed,
+        "glb": glb_changed,
+        "3mf": archive_changed,
+    }
     return ways[written](data, rng) if written in ways and rng.random() < 0.85 else None
 
 
@@ -118,3 +125,40 @@ def glb_changed(data: bytes, rng: random.Random) -> bytes | None:
     tree += b" " * (-len(tree) % 4)
     rest = len(tree).to_bytes(4, "little") + b"JSON" + tree + data[20 + size :]
     return data[:8] + (12 + len(rest)).to_bytes(4, "little") + rest
+
+
+XML_WORDS = (
+    b"", b"2", b"3", b"inch", b"model", b"other", b"&#48;", b"&a;", b"<", b">", b"1 0 0 0 1",
+    b"1 0 0 0 1 0 0 0 1 5 0 0", b"0 0 0 0 0 0 0 0 0 0 0 0",
+)  # fmt: skip
+"""Values of attributes in 3MF files, besides `WORDS`."""
+
+
+def archive_changed(data: bytes, rng: random.Random) -> bytes | None:
+    """An archive with some XML changed: a value, or a tag gone, twice or moved."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            parts = {name: archive.read(name) for name in archive.namelist()}
+    except Exception:  # no archive any more
+        return None
+    name = rng.choice(list(parts))
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        values, tags = parts[name].split(b'"'), parts[name].split(b"<")
+        kind, at = rng.randrange(6), rng.randrange(len(tags))
+        if kind <= 2:
+            place = rng.randrange(len(values) // 2 + 1) * 2 - 1
+            values[place] = rng.choice(XML_WORDS + WORDS)
+            parts[name] = b'"'.join(values)
+            continue
+        if kind == 3:
+            tags.insert(rng.randrange(len(tags) + 1), tags[at])
+        elif kind == 4:
+            del tags[at]
+        else:
+            tags.append(tags.pop(at))
+        parts[name] = b"<".join(tags)
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w") as archive:
+        for name, text in parts.items():
+            archive.writestr(zipfile.ZipInfo(name), text)
+    return held.getvalue()

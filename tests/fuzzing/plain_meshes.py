@@ -1,9 +1,12 @@
 """Mesh files read once more, in the plainest way: lists of triangles of three points."""
 
+import io
 import json
 import math
 import re
 import struct
+import zipfile
+from xml.etree import ElementTree
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -195,4 +198,40 @@ def matrix_of(node):
     return made
 
 
-PLAIN = {"obj": of_obj, "stl": of_stl, "off": of_off, "ply": of_ply, "glb": of_glb}
+def of_3mf(data: bytes) -> list[Triangle]:
+    core = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        parts = {name.lower(): name for name in archive.namelist()}
+        named = "3d/3dmodel.model"
+        if "_rels/.rels" in parts:
+            relations = ElementTree.fromstring(archive.read(parts["_rels/.rels"]))  # noqa: S314
+            (relation,) = (r for r in relations.iter() if r.get("Type", "").endswith("/3dmodel"))
+            named = relation.get("Target").removeprefix("/").lower()
+        # the reader has refused entities before
+        root = ElementTree.fromstring(archive.read(parts[named]))  # noqa: S314
+    objects = {int(each.get("id")): each for each in root.iter(f"{core}object")}
+    found = []
+
+    def placed(said, above):
+        rows = np.eye(4)
+        if said.get("transform") is not None:
+            rows[:, :3] = np.reshape([float(x) for x in said.get("transform").split()], (4, 3))
+        here, given = rows @ above, objects[int(said.get("objectid"))]
+        points = [
+            tuple((np.array([*(float(each.get(axis)) for axis in "xyz"), 1.0]) @ here)[:3].tolist())
+            for each in given.findall(f"{core}mesh/{core}vertices/{core}vertex")
+        ]
+        for each in given.findall(f"{core}mesh/{core}triangles/{core}triangle"):
+            corners = [int(each.get(name)) for name in ("v1", "v2", "v3")]
+            assert min(corners) >= 0
+            made = tuple(points[n] for n in corners)
+            found.append(made[::-1] if np.linalg.det(here[:3, :3]) < 0 else made)
+        for part in given.findall(f"{core}components/{core}component"):
+            placed(part, here)
+
+    for item in root.findall(f"{core}build/{core}item"):
+        placed(item, np.eye(4))
+    return found
+
+
+PLAIN = {"obj": of_obj, "stl": of_stl, "off": of_off, "ply": of_ply, "glb": of_glb, "3mf": of_3mf}

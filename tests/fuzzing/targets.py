@@ -27,7 +27,7 @@ class Target:
     """Files that are read; small ones."""
     agrees: Callable[[bytes, Any], None] = lambda _data, _found: None
     """Raises `AssertionError` where what was read is not what is written, by another reading."""
-    written: Literal["json", "toml", "npz", "glb", "words", "bytes"] = "bytes"
+    written: Literal["json", "toml", "npz", "glb", "3mf", "words", "bytes"] = "bytes"
     """How files are mutated: as text of that kind, as members of an archive, or bytewise."""
 
     def inputs(self) -> Iterator[tuple[str, bytes]]:

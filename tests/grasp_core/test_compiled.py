@@ -187,3 +187,12 @@ def test_folders_that_others_remove_meanwhile_do_not_matter(monkeypatch, tmp_pat
     assert not is_kept(KERNEL)
     (copy.parent / "own.py.nbi").touch()
     assert is_kept(KERNEL)
+
+
+def test_folders_of_bytecode_are_not_searched_for_loops(tmp_path, monkeypatch):
+    copy = tmp_path / "graspproof" / "a_kernel-1.py"
+    monkeypatch.setattr("grasp_core.compiled.copy_of", lambda *_: copy)
+    for folder, kept in (("bytecode", False), ("a_kernel_1", True)):
+        (copy.parent / folder).mkdir(parents=True)
+        (copy.parent / folder / "a_kernel-1.loop.py311.nbi").touch()
+        assert is_kept(KERNEL) is kept

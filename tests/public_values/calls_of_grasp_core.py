@@ -179,7 +179,7 @@ CALLS = [
         "friction_sigma": NOT_NEGATIVE,
     }),
     Call("gc.load_polyhedron", lambda: {"path": mesh_file()}, {
-        "unit": WORD,
+        "unit": unless(WORD, "none"),
         "scale": POSITIVE,
         "faces": WORD,
         "center_of_mass": unless(array(CENTER), "none") | {"far away": [1.0, 0.0, 0.0]},

@@ -1,9 +1,11 @@
 """Mesh files of any size made to cost as much time as they can for each of their bytes."""
 
 import json
+import zipfile
 
 from tests.bad_input.mesh_texts import obj
 from tests.bad_input.of_binary_meshes import glb, tree
+from tests.bad_input.of_threemf import PLACE, archive, components, item, mesh, model, object_
 
 HEAD = (
     b"ply\nformat %s 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
@@ -74,6 +76,22 @@ def many_children_glb(size):
     return glb(made)
 
 
+def stored_3mf(xml):
+    """A 3MF file that is as long as its model, more or less."""
+    return archive((PLACE, xml), way=zipfile.ZIP_STORED)
+
+
+def filled_3mf(piece, size, **more):
+    """A 3MF file of a piece of XML again and again among its objects."""
+    return stored_3mf(model(object_(mesh()) + piece * (size // len(piece)), **more))
+
+
+def chain_3mf(size):
+    """Objects, each of which is a component of the next, twice; and none of them is built."""
+    inside = "".join(object_(components(i, i), i + 1) for i in range(1, size // 90))
+    return stored_3mf(model(object_(mesh()) + inside, item(size // 90)))
+
+
 OBJ = obj().encode()
 FILES = {
     "obj: vertices": lambda n: repeated(b"v 0 0 0\n", n, OBJ),
@@ -98,5 +116,19 @@ FILES = {
     "glb: a long string without an end": lambda n: glb(b'"' + b"\\" * n),
     "glb: parts among shared vertices": shared_vertices_glb,
     "glb: many children": many_children_glb,
+    "3mf: vertices": lambda n: stored_3mf(model(object_(mesh([(0, 0, 0)] * (n // 30), [])))),
+    "3mf: triangles": lambda n: stored_3mf(model(object_(mesh(faces=[(0, 2, 1)] * (n // 35))))),
+    "3mf: empty elements": lambda n: filled_3mf("<a xmlns=''/>", n),
+    "3mf: comments": lambda n: filled_3mf("<!---->", n),
+    "3mf: one tag": lambda n: stored_3mf(model(more="".join(f'a{i}="" ' for i in range(n // 9)))),
+    "3mf: many names": lambda n: filled_3mf("<metadata/>", n),
+    "3mf: one text": lambda n: filled_3mf(" ", n),
+    "3mf: components of components": chain_3mf,
+    "3mf: items": lambda n: stored_3mf(model(items=item() * (n // 70))),
+    "3mf: empty parts": lambda n: archive(
+        *((f"{i}", "") for i in range(n // 100)), way=zipfile.ZIP_STORED),
+    "3mf: words of slicers": lambda n: archive(
+        ("Metadata/a_model.config", '"volume_type"' + " " * n), (PLACE, ""),
+        way=zipfile.ZIP_STORED),
 }  # fmt: skip
 """Makers of files of about so many bytes, by format and what makes them slow."""

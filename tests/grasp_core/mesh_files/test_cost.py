@@ -10,6 +10,7 @@ from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files.reading import mesh_of_bytes
 from tests.bad_input.mesh_texts import off, ply
 from tests.bad_input.of_binary_meshes import changed
+from tests.bad_input.of_threemf import ARCHIVES
 from tests.grasp_core.mesh_files.hostile import FILES
 from tests.work import calls_of
 
@@ -57,6 +58,20 @@ def test_announced_billions_are_refused_before_they_are_allocated(case):
     tracemalloc.stop()
     assert caught.value.reason is MeshRefusal.UNREADABLE
     assert peak < 2**18
+
+
+@pytest.mark.parametrize(
+    "case", ["a zip bomb", "a model that announces less than it is", "laughter"]
+)
+def test_a_packed_model_takes_the_memory_that_it_may(case):
+    """A hundred megabytes of spaces, of which no more than a piece is ever there."""
+    data, _ = ARCHIVES[case]
+    tracemalloc.start()
+    with pytest.raises(gc.MeshError):
+        mesh_of_bytes("3mf", data, MOST)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < len(data) + 2**20
 
 
 def test_a_json_part_of_millions_of_values_is_refused_before_it_is_parsed():

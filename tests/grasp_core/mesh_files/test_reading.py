@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.mesh_files import glb as glb_files
+from grasp_core.mesh_files import threemf as threemf_files
 from grasp_core.mesh_files.limits import MeshLimits
 from grasp_core.mesh_files.polygons import TextPoints
 from grasp_core.mesh_files.reading import read_triangles
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES, off, ply, ply_binary, stl, stl_text
 from tests.bad_input.mesh_texts import obj as obj_text
 from tests.bad_input.of_binary_meshes import glb, tree
+from tests.bad_input.of_threemf import threemf
 from tests.fuzzing.mesh_files import same_triangles, triangles_of
 
 MOST = 1000
@@ -151,6 +153,7 @@ FILES = {
     "ply": ply(),
     "stl": stl_text().encode(),
 }
+ALL_FILES = {**FILES, "glb": glb(tree()), "3mf": threemf()}
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -170,9 +173,9 @@ def test_a_word_that_is_damaged_is_refused_or_read_as_it_is(kind, data):
     same_triangles(kind, text, found)
 
 
-@pytest.mark.parametrize("kind", [*FILES, "glb"])
+@pytest.mark.parametrize("kind", ALL_FILES)
 def test_a_file_cut_anywhere_is_never_read_as_another_whole(kind):
-    whole = FILES.get(kind) or glb(tree())
+    whole = ALL_FILES[kind]
     refused = 0
     for size in range(len(whole)):
         try:
@@ -288,12 +291,13 @@ def test_binary_ply_faces_may_differ_in_their_numbers_of_corners():
             triangles_of("ply", data[:size], MOST)
 
 
-@pytest.mark.parametrize("kind", [*FILES, "glb"])
+@pytest.mark.parametrize("kind", ALL_FILES)
 def test_bytes_and_triangles_are_bounded_by_their_limits(kind, tmp_path):
     path = tmp_path / f"part.{kind}"
-    data = FILES.get(kind) or glb(tree())
+    data = ALL_FILES[kind]
     path.write_bytes(data)
-    just = MeshLimits(max_mesh_bytes=len(data), max_triangles=4)
+    room = max(len(data), 1000)  # unpacked, a 3MF file is longer
+    just = MeshLimits(max_mesh_bytes=room, max_triangles=4)
     mesh = read_triangles(path, just)
     assert (len(mesh.triangles), mesh.data) == (4, data)
     assert np.isfinite(mesh.vertices).all()
@@ -307,10 +311,16 @@ def test_too_little_memory_is_a_refusal(tmp_path, monkeypatch):
     def full(*_):
         raise MemoryError
 
-    for kind, patched in (("obj", TextPoints), ("glb", glb_files)):
+    held = {
+        "obj": (TextPoints, "add"),
+        "glb": (glb_files, "_scene"),
+        "3mf": (threemf_files, "_parse"),
+    }
+    for kind, (patched, name) in held.items():
         path = tmp_path / f"part.{kind}"
-        path.write_bytes(FILES.get(kind) or glb(tree()))
-        monkeypatch.setattr(patched, "add" if kind == "obj" else "_scene", full)
-        with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*memory") as caught:
-            gc.load_polyhedron(path)
+        path.write_bytes(ALL_FILES[kind])
+        with monkeypatch.context() as short:
+            short.setattr(patched, name, full)
+            with pytest.raises(gc.MeshError, match=rf"part\.{kind}: .*memory") as caught:
+                gc.load_polyhedron(path)
         assert caught.value.reason is MeshRefusal.LIMIT

@@ -11,8 +11,15 @@ import grasp_core as gc
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from grasp_core.transferring.face_changes import face_changes, likeness
-from grasp_core.transferring.transfer import FRICTION_BAND, QUALITY_BAND, compared
+from grasp_core.transferring.transfer import (
+    FRICTION_BAND,
+    QUALITY_BAND,
+    compared,
+    fitting_lengths,
+    fitting_unit,
+)
 from scenes.example_objects import example_object
+from tests.bad_input.of_threemf import mesh, model, object_, threemf
 from tests.changed_parts import (
     is_on_surface,
     nearest_like,
@@ -32,6 +39,16 @@ def planned(name, limit=20):
 @pytest.fixture(scope="module")
 def box():
     return planned("box")
+
+
+@pytest.mark.parametrize("times", [1.0, 25.4, 0.3])
+def test_a_changed_file_that_states_its_unit_is_in_no_other(times, tmp_path):
+    """However much larger the part is than it was, and however well another unit fits."""
+    body, path = example_object("box"), tmp_path / "box.3mf"
+    points = times * body.vertices / 0.0254
+    path.write_bytes(threemf(model(object_(mesh(points, body.triangles)), more='unit="inch"')))
+    assert fitting_unit(path, body) == "in"
+    assert fitting_lengths(path, body) == ("in", pytest.approx(1.0 / times))
 
 
 def scaled(body, by):

@@ -18,6 +18,7 @@ from sim_validate.baselines.suite import grasp_cases, suite_from_toml
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
+from tests.bad_input.of_threemf import mesh, model, object_, threemf
 from tests.sim_validate.changing import changed
 from tests.sim_validate.plugin.project import copied, properties_in, run_pytest
 from tests.sim_validate.rigs import saved_plan
@@ -345,6 +346,15 @@ def test_comments_line_ends_and_the_order_of_vertices_are_no_change(project):
     ):
         part.write_text(text, newline="")
         assert source_of(saved, project / "grasps.json", []) == Source(file=part, unit="mm")
+
+
+def test_the_same_part_in_another_format_and_unit_is_no_change(project):
+    saved = grasps_from_json((project / "grasps.json").read_text())
+    box, part = example_object("box"), project / "part.3mf"
+    (project / "part.obj").unlink()
+    solid = object_(mesh(box.vertices / 0.0254, box.triangles))
+    part.write_bytes(threemf(model(solid, more='unit="inch"')))
+    assert source_of(saved, project / "grasps.json", []) == Source(file=part, unit="in")
 
 
 def test_a_part_elsewhere_is_named_in_the_file(project):
