@@ -17,8 +17,7 @@ try:
 except (ImportError, RuntimeError, AttributeError, OSError) as error:
     raise InputError(  # importing mujoco looks for graphics, which nothing here needs
         f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
-        "unset it; otherwise install one of the versions 3.17 to 4.x, and into an environment that "
-        "had another one with --force-reinstall"
+        "unset it; otherwise install MuJoCo again, a version from 3.17 to 4.x"
     ) from error
 
 
