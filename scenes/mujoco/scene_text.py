@@ -44,6 +44,7 @@ from scenes.mujoco.mjcf_text import (
     printable,
     six_of,
 )
+from scenes.mujoco.version_gaps import known_flags
 from scenes.settings import PhysicsSettings
 
 if TYPE_CHECKING:
@@ -214,7 +215,10 @@ def scene_text(scene: SceneContent) -> str:
     add_comment(root, scene.comment)
     add_element(root, "compiler", COMPILER)
     option = add_element(root, "option", physics.options())
-    add_element(option, "flag", physics.flags() | ({} if scene.pads else EXACT))
+    flags, lacking = known_flags(physics.flags() | ({} if scene.pads else EXACT))
+    add_element(option, "flag", flags)
+    for each in lacking:
+        add_comment(root, each)
     add_element(root, "statistic", {"extent": 3.0 * it.radius_m, "center": ORIGIN})
     light = {"pos": (0.0, 0.0, 8.0 * it.radius_m), "dir": (0.0, 0.0, -1.0), "type": "directional"}
     add_element(parts["worldbody"], "light", light)

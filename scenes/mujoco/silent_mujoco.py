@@ -17,7 +17,7 @@ try:
 except (ImportError, RuntimeError, AttributeError, OSError) as error:
     raise InputError(  # importing mujoco looks for graphics, which nothing here needs
         f"MuJoCo cannot be imported ({error}). If MUJOCO_GL names graphics that are missing, "
-        "unset it; otherwise reinstall the package"
+        "unset it; otherwise install MuJoCo again, a version from 3.17 to 4.x"
     ) from error
 
 

@@ -63,6 +63,8 @@ class Recorded:
     outcomes: Mapping[str, str] = field(default_factory=dict[str, str])
     others: str | None = None
     """How all trials that `outcomes` does not name ended; None if the file does not say."""
+    mujoco: str | None = None
+    """Version of MuJoCo in which they ended so; None if it is not known."""
 
     def outcome_of(self, wrench: str) -> str | None:
         """Look up how the trial of a wrench ended; None if the file does not say."""
@@ -114,7 +116,8 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
         raise InputError(
             f"{path}: no verdict on the grasp {grasp.id}; the file has verdicts on {some(verdicts)}"
         )
-    return of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
+    recorded = of_verdict(path, saved, verdicts[grasp.id], replace(wanted, grasp=grasp.id))
+    return replace(recorded, mujoco=found.gate.mujoco)
 
 
 def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Recorded:

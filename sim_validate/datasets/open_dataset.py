@@ -384,4 +384,5 @@ def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
         outcomes={
             each.name: each.hold.outcome.value for each in chosen.rows(TrialRow, grasp_id=name)
         },
+        mujoco=chosen.manifest.versions.get("mujoco"),
     )

@@ -27,6 +27,7 @@ from grasp_core.errors import InputError
 from scenes.mujoco.closure_scene import Layout
 from scenes.mujoco.mjcf_text import SceneText
 from scenes.mujoco.silent_mujoco import batch, mujoco, unlogged
+from scenes.mujoco.version_gaps import WRONG_FACTOR
 
 STATE = (
     "time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat",
@@ -40,9 +41,6 @@ FEWEST = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
 CHUNK = 5
 """Simulation steps per sample of a closure trial."""
-WRONG_FACTOR = "4.0.0"
-"""Version of MuJoCo whose Newton solver factors sparse Hessians wrongly, so that accelerations are
-wrong; 4.0.1 has it right."""
 CLOCK_SLACK_S = 1e-9
 """Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
 reset would change it by milliseconds."""
@@ -206,6 +204,8 @@ class Bench(Generic[AnyScene]):
         # what lies between the first and the last may get their friction, too: it touches nothing
         self.rubbing = slice(touching[0], touching[-1] + 1)
         self.batch: batch.Batch | None = None
+        self.frictions: Array | None = None
+        """Frictions of all shapes in each simulation, (trials, shapes, 3), once some are told."""
 
     def simulated(
         self, trials: Sequence[Told], start: Array | None = None,
@@ -314,9 +314,10 @@ class Bench(Generic[AnyScene]):
         count = len(trials)
         if self.batch is None or self.batch.nsim < count:
             self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
+            self.frictions = None
         self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        if self.batch.expanded("geom_friction") is not None:
-            self.batch.expand("geom_friction")[:] = self.model.geom_friction
+        if self.frictions is not None:
+            self.frictions[:] = self.model.geom_friction
         if start is not None:
             self.batch.state[:count] = start
         joints, speeds = self._field(self.batch, "qpos"), self._field(self.batch, "qvel")
@@ -349,7 +350,8 @@ class Bench(Generic[AnyScene]):
             "mocap": sims.state[:, moved],
         }
         if any(each.friction is not None for each in trials):
-            views["friction"] = sims.expand("geom_friction")[:, self.rubbing, 0]
+            self.frictions = sims.expand("geom_friction")
+            views["friction"] = self.frictions[:, self.rubbing, 0]
         told = list[tuple[Array, Array]]()
         for name, view in views.items():
             rows = [getattr(each, name) for each in trials]

@@ -17,6 +17,7 @@ from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
+from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Grasp
 from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_trial_clip
@@ -198,7 +199,9 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
     reporter.say(f"wrench {found.load.wrench.tolist()} (N, N m): by analysis {predicted}")
     reporter.say(f"simulated with friction {found.friction:.6g}: {friction}")
     ended = f"{hold.outcome.value}{f': {hold.reason}' if hold.reason else ''}"
-    reporter.say(f"outcome: {ended} (the file says {said or 'nothing'})")
+    here = versions()["mujoco"]
+    by = "" if recorded.mujoco in {None, here} else f", by MuJoCo {recorded.mujoco}; here: {here}"
+    reporter.say(f"outcome: {ended} (the file says {said or 'nothing'}{by})")
 
 
 def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter) -> Iterator[Path]:

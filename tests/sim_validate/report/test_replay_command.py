@@ -7,6 +7,7 @@ from functools import partial
 
 import pytest
 
+from grasp_core.provenance import versions
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -80,6 +81,17 @@ def test_a_trial_that_ends_otherwise_than_recorded_is_negative(folder, tmp_path,
     flags = ("--grasp", name, "--wrench", "+force_x")
     found = replay(tmp_path, *flags, "--grasps", folder / "grasps.json", code=Exit.NEGATIVE)
     assert (found["outcome"], found["recorded_outcome"]) == ("held", "slipped")
+
+
+def test_another_version_of_the_simulator_is_named(folder, tmp_path, capsys):
+    found, here = Verdicts.read(folder / "verdicts.json"), versions()["mujoco"]
+    words = ["replay", str(tmp_path), "--grasps", str(folder / "grasps.json")]
+    for version in (here, "3.1.0"):
+        written = replace(found, gate=replace(found.gate, mujoco=version))
+        (tmp_path / "verdicts.json").write_text(written.text())
+        assert main([*words, "--grasp", found[0].id]) == Exit.GOOD
+        told = f"(the file says slipped, by MuJoCo 3.1.0; here: {here})"
+        assert (told in capsys.readouterr().out) == (version != here)
 
 
 @pytest.mark.parametrize(
