@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic_core import CoreSchema, core_schema
 
 from grasp_core.errors import InputError
-from grasp_core.kinds import LARGEST_FRICTION, MOST_COUNT, UnfitError, shown
+from grasp_core.kinds import LARGEST_FRICTION, MOST_COUNT
+from grasp_core.messages import UnfitError, shown
 
 Array: TypeAlias = NDArray[np.float64]
 """Float array of any shape; the docstring of each value or argument gives its shape."""

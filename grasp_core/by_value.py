@@ -13,7 +13,7 @@ from typing import Any, cast
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from grasp_core.kinds import shown
+from grasp_core.messages import shown
 
 HASHED = (str, int, bool)
 """Classes of the fields that a hash is made from."""

@@ -16,7 +16,6 @@ from dataclasses import MISSING, Field, field, fields
 from functools import cache
 from inspect import Parameter, Signature
 from typing import (
-    TYPE_CHECKING,
     Any,
     ClassVar,
     TypeVar,
@@ -28,47 +27,32 @@ from typing import (
 
 from pydantic import ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic.dataclasses import dataclass
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import ArgsKwargs, CoreSchema, core_schema
 
 from grasp_core.by_value import ByValue, is_array, same
 from grasp_core.errors import InputError
-from grasp_core.kinds import FLAT, FieldError, bare, input_error, rules, strictly
+from grasp_core.kinds import FLAT, bare, input_error, rules, strictly
+from grasp_core.messages import FieldError
 
 Item = TypeVar("Item")
 
 
-class InOurWords(type):
-    """Class of the classes of values: it words what pydantic says of a constructor's arguments."""
+class Arguments:
+    """The signature of a constructor, which pydantic knows only once it was used."""
 
-    if not TYPE_CHECKING:
-
-        @property
-        def __signature__(cls) -> Signature:
-            """Return the arguments of the constructor, which pydantic knows once it is used."""
-            ways = {True: Parameter.KEYWORD_ONLY, False: Parameter.POSITIONAL_OR_KEYWORD}
-            listed = sorted(fields(cls), key=lambda each: bool(each.kw_only))
-            return Signature([
-                Parameter(each.name, ways[bool(each.kw_only)], annotation=each.type,
-                          default=Parameter.empty if (usual := default_of(each)) is MISSING
-                          else usual)
-                for each in listed if each.init
-            ])  # fmt: skip
-
-        @__signature__.setter
-        def __signature__(cls, _: object) -> None:
-            """Leave pydantic's own aside."""
-
-        def __call__(cls, *args, **kwargs):  # noqa: ANN002, ANN003, ANN204, D102
-            try:
-                return super().__call__(*args, **kwargs)
-            except ValidationError as error:
-                fault = input_error(cls, error)
-            if isinstance(fault, FieldError):
-                fault.owner = cls
-            raise fault
+    def __get__(self, _: object, kind: type) -> Signature:
+        """Return the arguments that set fields."""
+        ways = {True: Parameter.KEYWORD_ONLY, False: Parameter.POSITIONAL_OR_KEYWORD}
+        listed = sorted(fields(cast("Any", kind)), key=lambda each: bool(each.kw_only))
+        usual = {each.name: default_of(each) for each in listed}
+        return Signature([
+            Parameter(name, ways[bool(each.kw_only)], annotation=each.type,
+                      default=Parameter.empty if usual[name] is MISSING else usual[name])
+            for each in listed if each.init for name in [each.name]
+        ])  # fmt: skip
 
 
-class Declared(ByValue, metaclass=InOurWords):
+class Declared(ByValue):
     """Base of frozen dataclasses whose fields pydantic checks against their types."""
 
     __slots__ = ()
@@ -81,6 +65,8 @@ class Declared(ByValue, metaclass=InOurWords):
         validate_by_alias=False,  # names in Python, aliases in files
         serialize_by_alias=True,
     )
+
+    __signature__ = Arguments()
 
     def __post_init__(self) -> None:
         try:
@@ -108,19 +94,29 @@ class Declared(ByValue, metaclass=InOurWords):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Take no text for numbers, and take keys of flat parts from among the record's own."""
-        made = handler(source)
+        """Take no text for numbers, and keys of flat parts from among the record's own."""
+        made, flat = handler(source), flat_parts(cls)
         own: Any = handler.resolve_ref_schema(made)
         strictly(own["schema"])
-        flat = flat_parts(cls)
-        if not flat:
-            return made
-        own["serialization"] = core_schema.wrap_serializer_function_ser_schema(
-            lambda value, write: _flattened(write(value), flat)
-        )
-        return core_schema.with_info_before_validator_function(
-            lambda value, info: _nested(value, flat) if info.context else value, made
-        )
+        if "__signature__" in vars(cls):  # pydantic's, which has fields that are not given, too
+            delattr(cls, "__signature__")
+        if flat:
+            own["serialization"] = core_schema.wrap_serializer_function_ser_schema(
+                lambda value, write: _flattened(write(value), flat)
+            )
+
+        def checked(given: Any, check: Any, info: core_schema.ValidationInfo[Any]) -> Any:
+            if not isinstance(given, ArgsKwargs):  # a part: who takes the whole names its place
+                return check(_nested(given, flat) if flat and info.context else given)
+            try:
+                return check(given)
+            except ValidationError as error:
+                fault = input_error(cls, error)
+            if isinstance(fault, FieldError):
+                fault.owner = cls
+            raise fault
+
+        return core_schema.with_info_wrap_validator_function(checked, made)
 
 
 def _flattened(found: dict[str, Any], flat: Mapping[str, type]) -> dict[str, Any]:

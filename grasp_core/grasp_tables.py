@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, cast, overload
 
 from grasp_core.errors import InputError
-from grasp_core.kinds import shown
+from grasp_core.messages import shown
 
 SHOWN_IDS = 5
 """Largest number of ids that a message lists."""

@@ -20,6 +20,7 @@ from pydantic import AfterValidator, ConfigDict, GetCoreSchemaHandler, TypeAdapt
 from pydantic_core import CoreSchema, core_schema
 
 from grasp_core.errors import InputError
+from grasp_core.messages import FieldError, UnfitError, at, near, shown
 
 Value = TypeVar("Value")
 
@@ -33,31 +34,8 @@ MOST_COUNT = 10**9
 MOST_SEED = 2**64 - 1
 MOST_EDGES = 10_000
 """Most edges of a pyramid for a friction cone: it equals the cone to seven digits."""
-HUGE = 10**100
-"""Whole numbers above this are shown by their size: Python does not write the largest ones."""
-SHOWN = 60
-"""Largest number of characters of a refused value that a message shows."""
 FLAT = "flat"
 """Mark in the type of a field that is a record, whose keys stand among those of the outer one."""
-
-
-class UnfitError(ValueError):
-    """Error of a rule for a value; its text says what the value must be."""
-
-
-class FieldError(InputError):
-    """Error for an argument or a field of the wrong type or size; `name` is its name."""
-
-    owner: type | None = None
-    """Class of the field."""
-
-    def __init__(self, name: str, fault: str) -> None:
-        super().__init__(name, fault)
-        self.name, self.fault = name, fault
-
-    def __str__(self) -> str:
-        """Return the name of the field and what is wrong with it: 'must be .., got ..'."""
-        return f"{self.name} {self.fault}"
 
 
 def nonzero(value: tuple[float, ...]) -> tuple[float, ...]:
@@ -328,11 +306,6 @@ def input_error(
     return FieldError(place, fault)
 
 
-def at(where: str, name: str) -> str:
-    """Return where a field is that stands in a table or record."""
-    return f"{where}.{name}" if where and name else where or name
-
-
 def _located(kind: Any, loc: Iterable[int | str], where: str) -> tuple[str, Any, str]:
     """Return where a fault of pydantic is, the kind that is wanted there, and its last name."""
     name = where
@@ -418,31 +391,3 @@ def rules(kind: Any) -> tuple[Any, ...]:
     if get_origin(kind) is Annotated:
         return get_args(kind)[1:] + rules(get_args(kind)[0])
     return tuple(rule for part in get_args(kind) for rule in rules(part))
-
-
-def near(word: str, known: Iterable[str]) -> str:
-    """Ask whether known words are meant that are near a mistyped one; empty if none is near."""
-    import difflib  # only mistakes need it
-
-    found = [] if len(word) > SHOWN else difflib.get_close_matches(word, list(known))
-    return f"did you mean {' or '.join(found)}?" if found else ""
-
-
-def shown(value: Any) -> str:
-    """Write a value for a message: short and on one line; a long value is shown by its kind."""
-    if isinstance(value, int) and abs(value) > HUGE:
-        return f"a whole number of {value.bit_length()} bits"
-    listed = cast("Iterable[Any]", value) if type(value) in {tuple, list} else None
-    plain = listed is not None and all(
-        isinstance(each, float | str | None) or (isinstance(each, int) and abs(each) <= HUGE)
-        for each in listed
-    )
-    if plain or isinstance(value, Real | str | type(None)):
-        said = repr(value)
-        if len(said) <= SHOWN:
-            return said
-        if isinstance(value, str | Real):
-            return f"{said[:SHOWN]}..."
-    size = getattr(value, "shape", None)
-    kind = type(value).__name__
-    return f"an array of shape {size}" if isinstance(size, tuple) else f"a value of type {kind}"

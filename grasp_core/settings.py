@@ -16,7 +16,8 @@ from typing import Any, Self, TypeVar, cast, get_args
 
 from grasp_core.declared import Declared, default_of, types
 from grasp_core.errors import InputError
-from grasp_core.kinds import FieldError, at, inside, shown
+from grasp_core.kinds import inside
+from grasp_core.messages import FieldError, at, shown
 
 Given = TypeVar("Given", bound="Settings")
 LONGEST_LINE = 200

@@ -20,7 +20,8 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Shown
 from grasp_core.files.records import UNRECORDED
 from grasp_core.frames import poses_along
-from grasp_core.kinds import FieldError, NotNegative, Null, Number, Signed, shown, value_of
+from grasp_core.kinds import NotNegative, Null, Number, Signed, value_of
+from grasp_core.messages import FieldError, shown
 from grasp_core.names import Family
 
 RegionKind: TypeAlias = Literal["cone", "disc", "point", "certified"]

@@ -16,7 +16,8 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.kinds import near, shown, value_of
+from grasp_core.kinds import value_of
+from grasp_core.messages import near, shown
 from grasp_core.objects.booleans import Solid, extrusion, hull
 from grasp_core.objects.polyhedron import Polyhedron
 

@@ -14,7 +14,6 @@ from annotated_types import Interval
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
 from grasp_core.kinds import (
-    FieldError,
     MaxCones,
     NotNegative,
     Quantity,
@@ -24,6 +23,7 @@ from grasp_core.kinds import (
     Seed,
     Share,
 )
+from grasp_core.messages import FieldError
 from grasp_core.settings import Settings
 from scenes.settings import SAMPLE_S, HeldSettings
 

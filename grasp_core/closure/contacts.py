@@ -25,7 +25,8 @@ from grasp_core.arrays import (
 )
 from grasp_core.errors import InputError
 from grasp_core.frames import plane_tangents
-from grasp_core.kinds import LARGEST, LARGEST_FRICTION, instance, several, shown
+from grasp_core.kinds import LARGEST, LARGEST_FRICTION, instance, several
+from grasp_core.messages import shown
 from grasp_core.values import FINGERS, Contact, Grasp
 
 FEWEST = 2

@@ -40,7 +40,8 @@ from grasp_core.closure.contacts import (
 from grasp_core.closure.proofs import ContactCones
 from grasp_core.declared import Declared, declared, trusted
 from grasp_core.errors import InputError
-from grasp_core.kinds import Quantity, one_of, shown, value_of
+from grasp_core.kinds import Quantity, one_of, value_of
+from grasp_core.messages import shown
 from grasp_core.solvers.conic import ConicProgram, minimize
 from grasp_core.solvers.ties import on_grid
 from grasp_core.values import Contact, Grasp

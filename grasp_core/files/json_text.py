@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, cast
 
-from grasp_core import kinds
+from grasp_core import messages
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import check_kind, with_article
 
@@ -83,7 +83,7 @@ def shown(value: object) -> str:
         return "an object" if isinstance(value, dict) else "a list"
     if value is None or isinstance(value, bool):
         return json.dumps(value)
-    return kinds.shown(value)
+    return messages.shown(value)
 
 
 def text_of(document: Mapping[str, object]) -> str:

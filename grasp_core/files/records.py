@@ -23,7 +23,8 @@ from grasp_core.declared import Declared, default_of, flat_parts, types
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import TOO_DEEP, object_of, shown, text_of
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import adapter, at, input_error, near
+from grasp_core.kinds import adapter, input_error
+from grasp_core.messages import at, near
 
 UNRECORDED: Any = Field(exclude=True)
 """Mark in the type of a field that no file holds."""

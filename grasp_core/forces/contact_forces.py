@@ -47,7 +47,8 @@ from grasp_core.closure.proofs import ContactCones
 from grasp_core.closure.wrench_sets import contact_program
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns, inscribed_share
 from grasp_core.errors import InputError, NoForcesError, SolverError
-from grasp_core.kinds import LARGEST, SMALLEST, number, one_of, several, shown
+from grasp_core.kinds import LARGEST, SMALLEST, number, one_of, several
+from grasp_core.messages import shown
 from grasp_core.solvers import conic, qp
 from grasp_core.solvers.conic import ConicProgram
 from grasp_core.solvers.qp import PROXQP, check_solver, least_distance

@@ -55,7 +55,8 @@ from grasp_core.errors import InputError
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import from_record
 from grasp_core.files.text_files import read_text
-from grasp_core.kinds import TorqueLimit, UnfitError, shown, value_of
+from grasp_core.kinds import TorqueLimit, value_of
+from grasp_core.messages import UnfitError, shown
 from grasp_core.names import HANDS
 
 LARGEST_SIZE = 2.0  # largest length of a hand [m]: a larger one is in other units

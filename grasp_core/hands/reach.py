@@ -29,16 +29,8 @@ from grasp_core.frames import POSE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.pose_search import Asked, contact_choices, find_pose, opened
-from grasp_core.kinds import (
-    Friction,
-    HandClearance,
-    Number,
-    Seed,
-    Starts,
-    instance,
-    shown,
-    value_of,
-)
+from grasp_core.kinds import Friction, HandClearance, Number, Seed, Starts, instance, value_of
+from grasp_core.messages import shown
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS, Contact, Grasp

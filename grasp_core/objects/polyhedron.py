@@ -20,9 +20,10 @@ from grasp_core.arrays import Array, Point, Polygon, Shape, Triangles, rounded
 from grasp_core.by_value import counted, summary
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, MeshError, MeshRefusal, about
-from grasp_core.kinds import LARGEST, Quantity, instance, one_of, path_of, shown, value_of
+from grasp_core.kinds import LARGEST, Quantity, instance, one_of, path_of, value_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
+from grasp_core.messages import shown
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
 from grasp_core.objects.surface import Face, Surface

@@ -28,7 +28,7 @@ from grasp_core.arrays import Array
 from grasp_core.errors import InputError
 from grasp_core.hands.collisions import beyond_hull
 from grasp_core.hands.hand import SAME, Coupling, Fingertip, LinkShape
-from grasp_core.kinds import shown
+from grasp_core.messages import shown
 from scenes.hand_files.model import HandModel, JointRule, mesh_points
 from scenes.hand_files.model_text import listed, note
 

@@ -4,11 +4,10 @@ from dataclasses import field
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import Positional, arg, subcommand
+from tyro.conf import Positional, arg
 
 from grasp_core.declared import declared
 from grasp_core.kinds import Seed
-from grasp_core.settings import Settings
 from grasp_core.transferring.settings import IfChanged
 from sim_validate.kit.command_flags import PLAIN, FirstOnly, GraspsFile, Jobs, Spoken
 from sim_validate.kit.workers import available_cores
@@ -22,7 +21,7 @@ MeshFile = Annotated[Path | None, arg(help=(
 
 @declared
 class Record(Spoken):
-    """Simulate grasps and write a baseline: a file that records how stable each grasp is."""
+    """Flags of the command `baseline record`."""
 
     grasps: Positional[GraspsFile]
     out: Annotated[Path, arg(aliases=("-o",))]
@@ -42,7 +41,7 @@ class Record(Spoken):
 
 @declared
 class Check(Spoken):
-    """Simulate the grasps of a baseline again, and report how each result has changed."""
+    """Flags of the command `baseline check`."""
 
     baseline: Positional[Path]
     """Path of the baseline to check."""
@@ -57,14 +56,3 @@ class Check(Spoken):
     object: MeshFile = None
     changed_part: IfChanged = field(default_factory=IfChanged)
     jobs: Jobs = field(default_factory=available_cores)
-
-
-@declared
-class Baseline(Settings):
-    """Record simulation results of grasps, and notice later when their stability changes."""
-
-    action: Annotated[
-        Annotated[Record, subcommand("record", prefix_name=False)]
-        | Annotated[Check, subcommand("check", prefix_name=False)],
-        PLAIN,
-    ]

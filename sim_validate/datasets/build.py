@@ -43,7 +43,7 @@ from grasp_core.errors import GraspError, InputError
 from grasp_core.files.file_kinds import UNIT
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import FieldError, shown
+from grasp_core.messages import FieldError, shown
 from grasp_core.processes import Processes
 from grasp_core.provenance import arithmetic
 from scenes.drawing.pages import filled

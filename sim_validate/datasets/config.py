@@ -17,8 +17,9 @@ from annotated_types import Interval
 
 from grasp_core.declared import declared
 from grasp_core.errors import InputError, about
-from grasp_core.kinds import MOST_COUNT, Count, Friction, RandomWrenches, shown
+from grasp_core.kinds import MOST_COUNT, Count, Friction, RandomWrenches
 from grasp_core.mesh_files.limits import FaceKind, Lengths
+from grasp_core.messages import shown
 from grasp_core.names import METHODS, ConeKind, Method
 from grasp_core.settings import Settings, as_table
 from sim_validate.settings import ExecutionSettings, LimitSearch

@@ -4,7 +4,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, subcommand
+from tyro.conf import Positional
 
 from grasp_core.declared import declared
 from grasp_core.kinds import Count, Seed, Share
@@ -31,7 +31,7 @@ class Work(Settings):
 
 @declared
 class Build(Spoken):
-    """Plan and simulate grasps of many objects and write tables; run it again to resume."""
+    """Flags of the command `dataset build`."""
 
     objects: Positional[tuple[str, ...]]
     """Mesh files, folders of mesh files, or names of built-in objects; or one TOML file with all
@@ -45,7 +45,7 @@ class Build(Spoken):
 
 @declared
 class Import(Spoken):
-    """Judge grasps made by another tool, simulate them, and write them as a dataset."""
+    """Flags of the command `dataset import`."""
 
     contacts: Positional[Path]
     """A contacts file of four contacts for each grasp (see docs/datasets.md)."""
@@ -61,7 +61,7 @@ class Import(Spoken):
 
 @declared
 class Verify(Spoken):
-    """Check files and rows of a dataset, prove force closure again, and redo a sample."""
+    """Flags of the command `dataset verify`."""
 
     dataset: Positional[Path]
     """Folder of the dataset."""
@@ -73,7 +73,7 @@ class Verify(Spoken):
 
 @declared
 class Export(Spoken):
-    """Write the grasps of a dataset that are in force closure for another program."""
+    """Flags of the command `dataset export`."""
 
     dataset: Positional[Path]
     """Folder of the dataset."""
@@ -83,16 +83,3 @@ class Export(Spoken):
     """Format: Isaac grasp files, one for each object at each friction."""
     split: SplitName | None = None
     """Export only the objects of this split; if not given, all objects."""
-
-
-@declared
-class Dataset(Settings):
-    """Build a dataset of grasps of many objects; check or export datasets."""
-
-    action: Annotated[
-        Annotated[Build, subcommand("build", prefix_name=False)]
-        | Annotated[Import, subcommand("import", prefix_name=False)]
-        | Annotated[Verify, subcommand("verify", prefix_name=False)]
-        | Annotated[Export, subcommand("export", prefix_name=False)],
-        PLAIN,
-    ]

@@ -25,15 +25,16 @@ from typing import Annotated, Any
 from annotated_types import Interval
 from pydantic import computed_field
 
-from grasp_core.declared import Declared, FieldError, declared
+from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
 from grasp_core.files.file_kinds import MANIFEST
 from grasp_core.files.json_text import object_of
 from grasp_core.files.records import Record, RecordFile, from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
-from grasp_core.kinds import Number, one_of, path_of, shown
+from grasp_core.kinds import Number, one_of, path_of
 from grasp_core.mesh_files.limits import MeshChoices
 from grasp_core.mesh_files.reading import MeshFile, read_triangles
+from grasp_core.messages import FieldError, shown
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface

@@ -17,7 +17,8 @@ from grasp_core.errors import InputError
 from grasp_core.figures import Compared, Shown, cell, figure, less, more
 from grasp_core.files.file_kinds import EXECUTIONS
 from grasp_core.files.records import UNRECORDED
-from grasp_core.kinds import FLAT, FieldError, Number, OrInfinity, Quantity, path_of
+from grasp_core.kinds import FLAT, Number, OrInfinity, Quantity, path_of
+from grasp_core.messages import FieldError
 from grasp_core.solvers.ties import first_best
 from scenes.settings import PhysicsSettings
 from sim_validate.kit.files import AboutGrasps

@@ -45,7 +45,8 @@ from grasp_core.hands.hand import PALM, Hand
 from grasp_core.hands.hand_arrays import places, tip_jacobians
 from grasp_core.hands.hand_motors import chains, hand_motors
 from grasp_core.hands.reach import HandReach, Stance, stance_of, uncoupled
-from grasp_core.kinds import Friction, Quantity, UnfitError, instance, number, path_of, value_of
+from grasp_core.kinds import Friction, Quantity, instance, number, path_of, value_of
+from grasp_core.messages import UnfitError
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron, is_convex
 from grasp_core.values import Contact

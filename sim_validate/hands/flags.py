@@ -32,7 +32,7 @@ Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
 
 @declared
 class Hand(Spoken):
-    """Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips."""
+    """Flags of the command `hand`."""
 
     hand: Positional[HandName]
     fingertips: Fingertips = ""
@@ -40,7 +40,7 @@ class Hand(Spoken):
 
 @declared
 class Reach(Spoken):
-    """Look for poses in which a hand stands in grasps: palm pose and joints, checked exactly."""
+    """Flags of the command `reach`."""
 
     grasps: Positional[GraspsFile]
     hand: HandName = "allegro"

@@ -61,7 +61,7 @@ ProtocolName = Literal[
     "molmospaces",
 ]
 """Names of the published tests, which `sim_validate/protocols` holds."""
-PLAIN = arg(name="")
+PLAIN = arg(name="", help="")
 """Mark of a group whose flags have no prefix; groups inside it keep theirs."""
 
 
@@ -160,7 +160,7 @@ RUN_LIMIT = 100
 
 @declared
 class Run(Spoken):
-    """Plan grasps, simulate them and negative controls (contacts that must fail); write all."""
+    """Flags of the command `run`."""
 
     object: Positional[ObjectName]
     planning: Annotated[Planning, PLAIN] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
@@ -177,7 +177,7 @@ class Run(Spoken):
 
 @declared
 class Plan(Spoken):
-    """Find force-closure grasps of an object, each with a checked certificate of force closure."""
+    """Flags of the command `plan`."""
 
     object: Positional[ObjectName]
     planning: Annotated[Planning, PLAIN] = field(default_factory=Planning)
@@ -200,7 +200,7 @@ class Plan(Spoken):
 
 @declared
 class Validate(Spoken):
-    """Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must fail."""
+    """Flags of the command `validate`."""
 
     grasps: Positional[GraspsFile]
     friction: AtFriction = None
@@ -218,7 +218,7 @@ class Validate(Spoken):
 
 @declared
 class Execute(Spoken):
-    """Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze."""
+    """Flags of the command `execute`."""
 
     grasps: Positional[GraspsFile]
     grasp: GraspId = None
@@ -236,12 +236,7 @@ class Execute(Spoken):
 
 @declared
 class Scene(Spoken):
-    """Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.
-
-    Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, and
-    there is no gravity. With a mass or a density, objects have their true mass and are held under
-    gravity, as in the command `execute`.
-    """
+    """Flags of the command `scene`."""
 
     grasps: Positional[GraspsFile]
     grasp: GraspId = None
@@ -254,7 +249,7 @@ class Scene(Spoken):
 
 @declared
 class Export(Spoken):
-    """Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes."""
+    """Flags of the command `export`."""
 
     grasps: Positional[GraspsFile]
     to: GraspFormat
@@ -273,7 +268,7 @@ class Export(Spoken):
 
 @declared
 class View(Spoken):
-    """Look at a grasp: in MuJoCo's viewer if there is a display, or in a file."""
+    """Flags of the command `view`."""
 
     grasps: Positional[Path]
     """The grasps.json with the grasp to show, or the folder of a run."""
@@ -297,7 +292,7 @@ class View(Spoken):
 
 @declared
 class Report(Spoken):
-    """Write the results of a run as pages that open in a browser, without any network."""
+    """Flags of the command `report`."""
 
     folder: Positional[Path]
     """Folder of a run, with its grasps.json; or a folder of such folders."""
@@ -314,7 +309,7 @@ class Report(Spoken):
 
 @declared
 class Regions(Spoken):
-    """Prove regions in which each finger may stand anywhere, whatever the others do."""
+    """Flags of the command `regions`."""
 
     grasps: Positional[GraspsFile]
     grasp: GraspId = None
@@ -330,7 +325,7 @@ class Regions(Spoken):
 
 @declared
 class Replay(Spoken):
-    """Simulate one recorded trial again, and write its motion, sample by sample, and a clip."""
+    """Flags of the command `replay`."""
 
     source: Positional[Path]
     """Where the trial is recorded: a verdicts.json, the folder of a run, or a dataset."""
@@ -352,7 +347,7 @@ class Replay(Spoken):
 
 @declared
 class Analyze(Spoken):
-    """Judge contacts of any origin: force closure with a certificate, quality, wrench limits."""
+    """Flags of the command `analyze`."""
 
     contacts: Positional[Path]
     """A contacts file (see docs/files.md), or a grasps.json."""
@@ -380,7 +375,7 @@ class Analyze(Spoken):
 
 @declared
 class Transfer(Spoken):
-    """Carry grasps over to a part that has changed since they were planned, and judge them anew."""
+    """Flags of the command `transfer`."""
 
     grasps: Positional[GraspsFile]
     part: Annotated[Positional[str], arg(help=(
@@ -401,7 +396,7 @@ class Transfer(Spoken):
 
 @declared
 class Inspect(Spoken):
-    """Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by."""
+    """Flags of the command `inspect`."""
 
     object: Positional[ObjectName]
     picture: Annotated[Annotated[Path, ending(*PICTURES)] | None, arg(help=(
@@ -412,12 +407,12 @@ class Inspect(Spoken):
 
 @declared
 class Objects(Spoken):
-    """List the names of the built-in objects."""
+    """Flags of the command `objects`."""
 
 
 @declared
 class Doctor(Spoken):
-    """Check this installation: versions, solvers and simulator."""
+    """Flags of the command `doctor`."""
 
     compile: bool = False
     """Compile all inner loops first, on two cores if there are two, as for an image."""

@@ -2,8 +2,7 @@
 
 A list is written with commas, as in `--families pencil,regulus`, and a vector with spaces.
 
-A TOML file of settings becomes flags of an equivalent command line. Examples of command lines stand
-here, too, as `--help` shows them.
+A TOML file of settings becomes flags of an equivalent command line.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +14,8 @@ from tyro.conf import OmitArgPrefixes, UseAppendAction
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
 from grasp_core.errors import InputError
-from grasp_core.kinds import Vector, near
+from grasp_core.kinds import Vector
+from grasp_core.messages import near
 from grasp_core.settings import types
 from sim_validate.kit.command_flags import PLAIN
 from sim_validate.kit.exit_codes import FlagsError
@@ -100,26 +100,13 @@ def _vector(info: Any) -> PrimitiveConstructorSpec[Any] | None:
     )
 
 
-COMMAND_WORDS = {"dataset": 2, "baseline": 2}
-"""Number of words in those command names that have more than one."""
-
-
-def with_config(arguments: list[str], commands: Mapping[str, type]) -> list[str]:
-    """Put the settings of `--config FILE.toml` before the flags, which then override them."""
-    words = [
-        part
-        for word in arguments
-        for part in (word.split("=", 1) if word.startswith("--config=") else [word])
-    ]
-    if "--config" not in words:
-        return arguments
-    at = words.index("--config")
-    if at + 1 >= len(words):
-        raise FlagsError("--config needs the path of a TOML file after it")
-    rest = words[:at] + words[at + 2 :]
-    flags = _read(Path(words[at + 1]), commands.get(rest[0]) if rest else None)
-    first = next((place for place, word in enumerate(rest) if word.startswith("-")), len(rest))
-    return [*rest[:first], *flags, *rest[first:]]
+def with_config(words: list[str], path: Path | None, command: Any) -> list[str]:
+    """Put the settings of a TOML file before the flags, which then override them."""
+    if path is None:
+        return words
+    flags = _read(path, command)
+    first = next((place for place, word in enumerate(words) if word.startswith("-")), len(words))
+    return [*words[:first], *flags, *words[first:]]
 
 
 def flags_from(settings: Mapping[str, Any], command: Any) -> list[str]:
@@ -173,65 +160,3 @@ def _as_flags(flag: Flag, value: Any) -> list[str]:
 
 def _items(value: Any) -> Sequence[Any]:
     return cast("Sequence[Any]", value) if isinstance(value, list | tuple) else [value]
-
-
-EXAMPLES = """\
-run wedge
-run part.stl --unit mm --friction 0.3 --limit 20 --limits ramp --out results
-run wedge --limit 10 --execute --mass-kg 0.3
-plan wedge --limit 10 --out plan
-plan wedge --limit 10 --best --gap 0.05 --time-limit-s 120 --out plan
-plan wedge --limit 10 --best --measure weight --out plan
-plan part.stl --unit mm --finger-radius-m 0.006 --approach-m 0.05 --out plan
-validate plan/grasps.json --out plan
-validate plan/grasps.json --protocol dexgraspbench --protocol dexonomy --out plan
-validate plan/grasps.json --weight-n 3 --weight-down 0 0 -1 --limits ramp --repeats 20
-execute plan/grasps.json --mass-kg 0.3 --out plan
-execute plan/grasps.json --density-kg-m3 2700 --trials lift,shake --shake-g 2
-scene plan/grasps.json --out scenes
-scene plan/grasps.json --grasp c-0-1-2-7
-scene plan/grasps.json --mass-kg 0.3 --out held
-export plan/grasps.json --to gltf -o grasps.glb
-export plan/grasps.json --to moveit --limit 5 -o grasps.yaml
-regions plan/grasps.json --out plan
-regions plan/grasps.json --reserve 0.1 --recenter --limit 5 --out smaller
-replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay
-replay graspproof-out/wedge --grasp c-0-1-2-7 --wrench weakest --out replay
-analyze contacts.json --friction 0.5 --wrench 0 0 -3 0 0 0
-analyze plan/grasps.json --json
-transfer plan/grasps.json part-v2.stl --unit mm --out carried
-transfer plan/grasps.json part-v2.stl --unit mm --distance-m 0.005 --angle-deg 2
-reach plan/grasps.json --hand allegro --out reached
-reach plan/grasps.json --hand my_hand.xml --fingertips ff,mf,rf,th --table 0 0 -1
-reach plan/grasps.json --hand leap --simulate --protocol dexgraspbench --out reached
-hand allegro
-hand my_hand.xml --fingertips ff,mf,rf,th
-inspect part.stl --unit mm
-inspect part.stl --unit mm --picture part.png
-inspect mug.obj --scale 0.00026824
-objects
-doctor
-doctor --compile
-view DIR/grasps.json --grasp c-0-1-2-7
-view DIR/grasps.json --picture grasp.png --page grasp.html --clip grasp.webp
-report graspproof-out/wedge
-report graspproof-out --out all-objects
-dataset build meshes/ wedge --frictions 0.3,0.5 --limit 20 --out ds
-dataset build ds/config.toml --out again
-dataset import contacts.json mug.obj --out judged
-dataset verify ds
-dataset export ds --to isaac --out isaac
-baseline record grasps.json -o wedge.baseline.json
-baseline check wedge.baseline.json --strict
-""".splitlines()
-"""Examples of all commands, without the program's name."""
-HELP = {"-h", "--help"}
-
-
-def examples_for(arguments: list[str]) -> str:
-    """Return the examples of a command if the arguments ask for its help, else an empty text."""
-    if not HELP & set(arguments):
-        return ""
-    words = arguments[: COMMAND_WORDS.get(arguments[0], 1)]
-    shown = [f"  graspproof {line}\n" for line in EXAMPLES if line.split()[: len(words)] == words]
-    return "\nexamples:\n" + "".join(shown) if shown else ""

@@ -5,7 +5,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.arrays import Shape, frozen, is_array, to_digits
-from grasp_core.kinds import UnfitError
+from grasp_core.messages import UnfitError
 from scenes.example_objects import example_object
 from tests.tampering.changes import forged
 

@@ -12,7 +12,8 @@ from annotated_types import Interval
 
 from grasp_core.declared import declared
 from grasp_core.errors import InputError
-from grasp_core.kinds import Direction, FieldError, Vector, ending
+from grasp_core.kinds import Direction, Vector, ending
+from grasp_core.messages import FieldError
 from grasp_core.settings import CHOSEN, Settings, for_users
 
 

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 import grasp_core as gc
 import scenes
-from grasp_core.kinds import FieldError
+from grasp_core.messages import FieldError
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 WEIRD = [

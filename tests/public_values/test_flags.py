@@ -1,12 +1,13 @@
 """Flags of commands are the settings of the classes that functions take, each with its bounds."""
 
 import math
+from pkgutil import resolve_name
 from typing import get_args, get_origin
 
 from grasp_core.errors import InputError
 from grasp_core.kinds import value_of
+from sim_validate.kit.commands import COMMANDS
 from sim_validate.kit.flag_values import flags_of, parts_of
-from sim_validate.main import COMMANDS
 
 
 def refuses(kind, value):
@@ -30,7 +31,7 @@ def test_every_number_of_a_command_has_bounds():
     numbers = {
         (flag.owner, flag.field): flag.kind
         for command in COMMANDS.values()
-        for flag in flags_of(command)
+        for flag in flags_of(resolve_name(f"sim_validate.{command.flags}"))
         if {int, float} & set(map(id_of, parts_of(flag.kind)))
     }
     assert len(numbers) >= 90

@@ -24,8 +24,8 @@ from sim_validate.datasets.config import HandName
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.kit import workers
 from sim_validate.kit.command_flags import CLIPS, PAGES, PICTURES, ProtocolName
+from sim_validate.kit.commands import EXAMPLES, GROUPS
 from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.flag_values import COMMAND_WORDS, EXAMPLES
 from sim_validate.main import main
 from sim_validate.protocols.published import PROTOCOLS
 from tests.grasp_core.curved import bumpy_ellipsoid
@@ -33,7 +33,7 @@ from tests.patience import HANGING_S
 
 pytestmark = pytest.mark.usefixtures("here")
 ROOT = Path(__file__).parent.parent.parent
-WORDS = {" ".join(line.split()[: COMMAND_WORDS.get(line.split()[0], 1)]) for line in EXAMPLES}
+WORDS = {" ".join(line.split()[: 2 if line.split()[0] in GROUPS else 1]) for line in EXAMPLES}
 
 
 def test_run_writes_grasps_verdicts_and_scenes_tells_and_removes_those_of_before(here, capsys):
