@@ -37,7 +37,9 @@ def answer(capsys):
 def asked(monkeypatch):
     """The commands that were read from command lines, of which none is run."""
     found = []
-    monkeypatch.setattr("sim_validate.main._dispatch", lambda each: found.append(each) or Exit.GOOD)
+    monkeypatch.setattr(
+        "sim_validate.main._dispatch", lambda _, each: found.append(each) or Exit.GOOD
+    )
     return found
 
 
