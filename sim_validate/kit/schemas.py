@@ -4,12 +4,13 @@ A schema says what each key means, its unit, and what values it may have. It all
 writes; rules between several fields, which the reader of a file checks, are not in it.
 """
 
+import json
 import math
 import re
 from collections.abc import Mapping
 from functools import cache
 from pkgutil import resolve_name
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
@@ -48,6 +49,8 @@ class FileKind(NamedTuple):
 
     called: str
     declared: str
+    written_by_users: bool = False
+    """Whether settings that the program chooses have no place in it."""
 
 
 KINDS: Mapping[str, FileKind] = {
@@ -68,9 +71,9 @@ KINDS: Mapping[str, FileKind] = {
     "wrenches": FileKind(WRENCH_FILE, "sim_validate.engine.setup:WrenchFile"),
     "contacts": FileKind(CONTACTS_FILE, "grasp_core.records.grasps_json:ContactsFile"),
     "dataset": FileKind("configuration of a dataset, TOML",
-                        "sim_validate.datasets.config:DatasetConfig"),
-    "setup": FileKind("setup of the simulation, TOML", "sim_validate.engine.setup:Setup"),
-    "suite": FileKind("NAME.grasps.toml of tests", "sim_validate.baselines.suite:Suite"),
+                        "sim_validate.datasets.config:DatasetConfig", True),
+    "setup": FileKind("setup of the simulation, TOML", "sim_validate.engine.setup:Setup", True),
+    "suite": FileKind("NAME.grasps.toml of tests", "sim_validate.baselines.suite:Suite", True),
 }  # fmt: skip
 """Every kind of files by its short name. Classes are named as text, since most are slow to load."""
 
@@ -94,15 +97,26 @@ def named(text: str) -> str:
 @cache
 def schema_of(name: str) -> Mapping[str, Any]:
     """Return the JSON Schema of the kind of files with a short name."""
-    called, place = KINDS[name]
+    called, place, by_users = KINDS[name]
     kind: type = resolve_name(place)
-    made = adapter(kind).json_schema(mode="serialization", by_alias=True, schema_generator=_OfFiles)
+    generator = _OfUsers if by_users else _OfFiles
+    made = adapter(kind).json_schema(
+        mode="serialization", by_alias=True, schema_generator=generator
+    )
     head = {"$schema": DRAFT, "$id": address(name), "title": f"graspproof {called}"}
     return head | {key: value for key, value in made.items() if key not in head}
 
 
+def schema_text(name: str) -> str:
+    """Return the text of the JSON Schema of a kind of files."""
+    return json.dumps(schema_of(name), indent=1, allow_nan=False) + "\n"
+
+
 class _OfFiles(GenerateJsonSchema):
     """Makes schemas of declared classes, with the keys that files have."""
+
+    LEFT_OUT: ClassVar[str | None] = None
+    """Mark in the types of fields that are left out."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         """Leave titles out, which would be the names again."""
@@ -138,10 +152,10 @@ class _OfFiles(GenerateJsonSchema):
             if each.flat is not None:
                 part = self._part(each.flat)
                 keys |= part["properties"]
-                if each.key in required:
+                if "$ref" in own:  # else all of its keys may be absent
                     required += part.get("required", ())
                 required = [key for key in required if key != each.key]
-            elif CHOSEN not in rules(each.kind):
+            elif self.LEFT_OUT not in rules(each.kind):
                 keys[each.key] = own | _about(kind, each.name, each.key)
         return made | {"properties": keys} | ({"required": required} if required else {})
 
@@ -151,6 +165,12 @@ class _OfFiles(GenerateJsonSchema):
         while "$ref" in made:
             made = self.get_schema_from_definitions(made["$ref"]) or {}
         return made
+
+
+class _OfUsers(_OfFiles):
+    """Leaves out what users cannot set."""
+
+    LEFT_OUT = CHOSEN
 
 
 def _about(kind: type, name: str, key: str) -> dict[str, str]:

@@ -22,6 +22,7 @@ from pathlib import Path
 from tests.golden.cases import CASES, GIVEN
 from tests.golden.comparing import differences, kept_of, unlike, unlike_kept
 from tests.golden.fields import fields_of
+from tests.schemas import faults_of_file
 
 ROOT = Path(__file__).parent.parent.parent
 KEPT = Path(__file__).with_name("kept.json")
@@ -80,7 +81,14 @@ def _fields(tree, folder, case):
     for name, text in GIVEN.items():
         (folder / name).write_text(text)
     ended = [_run(tree, folder, *command) for command in case.commands]
-    return fields_of(folder, GIVEN) | {"exit codes": ended}
+    strange = _strange(folder) if tree == ROOT else []
+    return fields_of(folder, GIVEN) | {"exit codes": ended} | dict.fromkeys(strange, ["unfit"])
+
+
+def _strange(folder):
+    """Say how files differ from the schemas of their kinds, each of which counts as a difference."""
+    paths = (path for ending in ("json", "toml") for path in sorted(folder.rglob(f"*.{ending}")))
+    return [f"{path.name} {said}" for path in paths for said in faults_of_file(path) or ()]
 
 
 def _run(tree, folder, arguments, file):
