@@ -81,14 +81,16 @@ def _fields(tree, folder, case):
     for name, text in GIVEN.items():
         (folder / name).write_text(text)
     ended = [_run(tree, folder, *command) for command in case.commands]
-    strange = _strange(folder) if tree == ROOT else []
-    return fields_of(folder, GIVEN) | {"exit codes": ended} | dict.fromkeys(strange, ["unfit"])
+    if tree == ROOT:
+        check_schemas(folder)
+    return fields_of(folder, GIVEN) | {"exit codes": ended}
 
 
-def _strange(folder):
-    """Say how files differ from the schemas of their kinds, each of which counts as a difference."""
+def check_schemas(folder):
+    """Stop where a file of a folder does not fit the schema of its kind."""
     paths = (path for ending in ("json", "toml") for path in sorted(folder.rglob(f"*.{ending}")))
-    return [f"{path.name} {said}" for path in paths for said in faults_of_file(path) or ()]
+    if faults := [f"{path}: {said}" for path in paths for said in faults_of_file(path) or ()]:
+        raise ValueError("\n".join(faults))
 
 
 def _run(tree, folder, arguments, file):

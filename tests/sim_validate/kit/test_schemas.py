@@ -11,13 +11,13 @@ import scenes
 from grasp_core.errors import InputError
 from grasp_core.figures import meanings
 from grasp_core.files import file_kinds
+from grasp_core.records.grasps_json import ContactSet
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 from sim_validate.kit.command import show_schema
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.flags import Schema
 from sim_validate.kit.schemas import DRAFT, KINDS, address, named, schema_of
 from sim_validate.main import main
-from sim_validate.planning.analyze import Analysis
 from tests.damaged import damaged
 from tests.fuzzing.data_files import TARGETS
 from tests.schemas import faults_of, faults_of_file
@@ -112,7 +112,7 @@ def test_keys_have_the_meanings_and_units_of_their_fields():
     assert analyses["properties"]["schema"]["const"] == 1
     assert "schema" in analyses["required"]
     own = analyses["$defs"]["Analysis"]["properties"]
-    center = meanings(Analysis)["center"]
+    center = meanings(ContactSet)["center"]
     assert (own["center_m"]["unit"], own["center_m"]["description"]) == ("m", center)
     assert own["critical_friction"]["anyOf"][1] == {"type": "null"}
     given = schema_of("wrenches")["$defs"]["GivenWrench"]["properties"]
