@@ -18,6 +18,8 @@ from sphinx.writers.html5 import HTML5Translator
 sys.path.insert(0, str(Path(__file__).parent))
 import api_reference
 
+from sim_validate.kit.schemas import KINDS, schema_text
+
 project = "graspproof"
 version = release = version_of("graspproof")
 extensions = ["myst_nb"]
@@ -51,9 +53,19 @@ html_show_sourcelink = False
 
 
 def setup(app: Sphinx) -> None:
-    """Have formulas written as MathML, by docutils, and the page of all functions made."""
+    """Have formulas written as MathML, the page of all functions made, and the schemas of files."""
     app.add_html_math_renderer("mathml", (written_inline, None), (written_as_block, None))
     app.connect("builder-inited", lambda app: api_reference.write(app.srcdir / "api" / "api.md"))
+    app.connect("build-finished", write_schemas)
+
+
+def write_schemas(app: Sphinx, fault: Exception | None) -> None:
+    """Write the schemas of all kinds of files, of which a release has copies at their addresses."""
+    if fault is None:
+        folder = Path(app.outdir, "schemas")
+        folder.mkdir(exist_ok=True)
+        for name in KINDS:
+            (folder / f"{name}.json").write_text(schema_text(name), encoding="utf-8")
 
 
 def written_inline(writer: HTML5Translator, node: nodes.math) -> None:

@@ -26,6 +26,8 @@ NONE = "-"
 UNITS = {
     "m": "m", "m3": "m3", "rad": "rad", "deg": "deg", "s": "s", "n": "N", "nm": "N m", "kg": "kg",
     "m_per_s": "m/s", "n_per_m": "N/m", "kg_m2": "kg m^2", "n_nm": "N, N m", "n_s": "N s",
+    "n_m": "N m", "kg_m3": "kg/m^3", "n_s_per_m": "N s/m", "n_m_per_rad": "N m/rad", "mm": "mm",
+    "m_per_s2": "m/s^2", "hz": "Hz",
 }  # fmt: skip
 """Units by the ends of names; the longest end counts."""
 IN_BRACKETS = re.compile(r" \[[^]]*\]")

@@ -78,6 +78,10 @@ class Null:
             self._taken, inner, serialization=written
         )
 
+    def __get_pydantic_json_schema__(self, made: Any, handler: Any) -> dict[str, Any]:
+        """Return the JSON schema of a number or null."""
+        return {"anyOf": [handler(made), {"type": "null"}]}
+
     def _taken(self, value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
         if value is None and info.context:
             return self.value

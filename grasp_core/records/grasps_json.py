@@ -24,9 +24,10 @@ from grasp_core.errors import InputError, about
 from grasp_core.figures import Shown
 from grasp_core.files.file_kinds import CONTACTS_FILE, GRASPS
 from grasp_core.files.json_text import json_of, object_of, shown, text_of
-from grasp_core.files.records import from_record, record_of
+from grasp_core.files.records import RecordFile, from_record
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import (
+    FLAT,
     LARGEST,
     LARGEST_FRICTION,
     SMALLEST,
@@ -99,13 +100,24 @@ class RecordedObject(Declared):
         return body
 
 
+@declared
+class GraspsFile(RecordFile):
+    """Grasps of an object, with its mesh and what is known of all sets of its faces."""
+
+    FILE = GRASPS
+    SCHEMA = SCHEMA
+
+    object: RecordedObject
+    plan: Annotated[Plan, FLAT]
+
+
 def plan_to_json(body: Polyhedron, plan: Plan) -> str:
     """Write a plan as the text of a `grasps.json`; equal plans give equal text."""
     find_critical_frictions(plan.grasps)
-    said = record_of(plan)
+    said = GraspsFile(RecordedObject.of(body), plan).document()
     said["versions"] = said["versions"] or versions()
     said["grasps"] = said.pop("grasps")  # last in the file, a line each
-    return text_of({"schema": SCHEMA, "object": record_of(RecordedObject.of(body)), **said})
+    return text_of(said)
 
 
 def grasps_from_json(text: str) -> Plan:

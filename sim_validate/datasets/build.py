@@ -57,6 +57,7 @@ from sim_validate.datasets.config import (
     SplitName,
     config_to_toml,
     quoted,
+    settings_text,
 )
 from sim_validate.datasets.open_dataset import (
     CONFIG,
@@ -412,7 +413,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
                 f"{path}: this file is not part of the dataset to write; give an empty or new "
                 "folder as --out"
             )
-    if stated.is_file() and read_text(stated) != config_to_toml(config):
+    if stated.is_file() and not read_text(stated).endswith(settings_text(config)):
         raise InputError(
             f"{folder}: the folder holds a dataset made with other settings (see its {CONFIG}); "
             "give another --out, or the same settings to resume that dataset"
@@ -524,7 +525,7 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
         "card.md.jinja",
         Path(__file__).parent,
         config=config,
-        settings=config_to_toml(config),
+        settings=settings_text(config),
         manifest=manifest,
         rows=rows,
         tables=tables,

@@ -215,7 +215,7 @@ class DatasetConfig(PlannedContent):
         """SHA-256 of the text with all settings."""
         import hashlib  # slow, and no flag needs it
 
-        return hashlib.sha256(config_to_toml(self).encode()).hexdigest()
+        return hashlib.sha256(settings_text(self).encode()).hexdigest()
 
 
 def config_from_toml(path: Path) -> DatasetConfig:
@@ -236,6 +236,13 @@ def _is_date(text: str) -> bool:
 
 
 def config_to_toml(config: DatasetConfig) -> str:
+    """Write a configuration as a file, whose first line tells editors where its schema is."""
+    from sim_validate.kit.schemas import address  # slow, and no flag needs it
+
+    return f"#:schema {address('dataset')}\n{settings_text(config)}"
+
+
+def settings_text(config: DatasetConfig) -> str:
     """Write every setting in the order of the class; equal configurations give equal texts."""
     given = as_table(config)
     tables = {name: given.pop(name) for name in (EXECUTION, LEARNING) if name in given}

@@ -22,6 +22,7 @@ from pathlib import Path
 from tests.golden.cases import CASES, GIVEN
 from tests.golden.comparing import differences, kept_of, unlike, unlike_kept
 from tests.golden.fields import fields_of
+from tests.schemas import faults_of_file
 
 ROOT = Path(__file__).parent.parent.parent
 KEPT = Path(__file__).with_name("kept.json")
@@ -80,7 +81,16 @@ def _fields(tree, folder, case):
     for name, text in GIVEN.items():
         (folder / name).write_text(text)
     ended = [_run(tree, folder, *command) for command in case.commands]
+    if tree == ROOT:
+        check_schemas(folder)
     return fields_of(folder, GIVEN) | {"exit codes": ended}
+
+
+def check_schemas(folder):
+    """Stop where a file of a folder does not fit the schema of its kind."""
+    paths = (path for ending in ("json", "toml") for path in sorted(folder.rglob(f"*.{ending}")))
+    if faults := [f"{path}: {said}" for path in paths for said in faults_of_file(path) or ()]:
+        raise ValueError("\n".join(faults))
 
 
 def _run(tree, folder, arguments, file):

@@ -1,0 +1,15 @@
+"""The flags of the command `schema`."""
+
+from tyro.conf import Positional
+
+from grasp_core.declared import declared
+from sim_validate.kit.command_flags import Spoken
+
+
+@declared
+class Schema(Spoken):
+    """Print the JSON Schema of a kind of files, or list the kinds of files."""
+
+    kind: Positional[str | None] = None
+    """A kind of files, such as `verdicts`, `verdicts.json` or `setup`; if not given, all kinds are
+    listed."""
