@@ -113,6 +113,10 @@ COMMANDS: Mapping[str, Command] = {
         "kit.command_flags:Objects", "planning.objects:list_objects",
         "List the names of the built-in objects.",
     ),
+    "schema": Command(
+        "kit.flags:Schema", "kit.command:show_schema",
+        "Print the JSON Schema of a kind of files, or list the kinds of files.",
+    ),
     "doctor": Command(
         "kit.command_flags:Doctor", "closure.command:check_installation",
         "Check this installation: versions, solvers and simulator.",
@@ -177,6 +181,8 @@ inspect part.stl --unit mm
 inspect part.stl --unit mm --picture part.png
 inspect mug.obj --scale 0.00026824
 objects
+schema
+schema verdicts
 doctor
 doctor --compile
 view DIR/grasps.json --grasp c-0-1-2-7

@@ -18,8 +18,9 @@ import zipfile
 from collections.abc import Collection, Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import field
+from datetime import date, time
 from pathlib import Path, PurePosixPath
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,7 @@ from grasp_core.files.text_files import (
 )
 from grasp_core.grasp_tables import ById, Named, frame_of
 from grasp_core.kinds import Friction
+from grasp_core.messages import at
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from sim_validate.kit.locks import entries, locked
@@ -166,7 +168,20 @@ def tables_of_toml(text: str) -> dict[str, Any]:
         ) from error
     except ValueError as error:  # numbers of thousands of digits and days that do not exist, too
         raise InputError(f"the text is not TOML: {str(error)[:MOST_SAID]}") from error
+    _check_no_dates(found)
     return found
+
+
+def _check_no_dates(found: Any, where: str = "") -> None:
+    """Refuse days and times of TOML, which no setting is."""
+    if isinstance(found, date | time):
+        raise InputError(f"{where}: expected a number or text, got {found}; put it in quotes")
+    if isinstance(found, dict):
+        for name, each in cast("dict[str, Any]", found).items():
+            _check_no_dates(each, at(where, name))
+    elif isinstance(found, list):
+        for place, each in enumerate(cast("list[Any]", found)):
+            _check_no_dates(each, f"{where}[{place}]")
 
 
 MOST_BYTES = 256 * 2**20

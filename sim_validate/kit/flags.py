@@ -8,7 +8,7 @@ from sim_validate.kit.command_flags import Spoken
 
 @declared
 class Schema(Spoken):
-    """Print the JSON Schema of a kind of files, or list the kinds of files."""
+    """Flags of the command `schema`."""
 
     kind: Positional[str | None] = None
     """A kind of files, such as `verdicts`, `verdicts.json` or `setup`; if not given, all kinds are

@@ -34,7 +34,8 @@ from grasp_core.files.file_kinds import (
     WRENCH_FILE,
 )
 from grasp_core.files.records import entries
-from grasp_core.kinds import adapter, near, rules, shown
+from grasp_core.kinds import adapter, rules
+from grasp_core.messages import near, shown
 from grasp_core.settings import CHOSEN
 
 HOME = "https://example.org/graspproof"
