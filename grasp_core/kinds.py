@@ -143,10 +143,11 @@ def strictly(schema: Any) -> None:
     if isinstance(schema, list):
         for each in cast("list[Any]", schema):
             strictly(each)
-    if not isinstance(schema, dict):
+    if not isinstance(schema, dict) or "type" not in schema or schema["type"] == "dataclass":
         return
     part = cast("dict[str, Any]", schema)
-    kind, before = part.get("type"), BEFORE.get(cast("Any", part.get("type")))
+    kind: str = part["type"]
+    before = BEFORE.get(kind)
     for each in list(part.values()):
         strictly(each)
     if kind in STRICT:
