@@ -211,8 +211,11 @@ class GivenContact(Declared):
     """A contact in a file; its normal need not be exactly of length one."""
 
     position_m: Coordinates
+    """Point on the surface, in the object's frame."""
     normal: Coordinates
+    """Vector of length one into the object, or out of it with `--outward`."""
     friction: FrictionOrZero | None = None
+    """Coulomb coefficient; if not given, that of the file, or of `--friction`."""
 
 
 GivenContacts = Annotated[tuple[GivenContact, ...], Len(FEWEST_CONTACTS, MOST_CONTACTS)]
@@ -223,7 +226,9 @@ class GivenGrasp(Declared):
     """A grasp in a file."""
 
     contacts: GivenContacts
+    """The contacts of the grasp."""
     id: Annotated[str, Len(1, LONGEST_ID)] | None = None
+    """Name of the grasp; if not given, its place in the list, from 0."""
 
 
 @declared
@@ -231,10 +236,16 @@ class ContactsFile(Declared):
     """A contacts file: the contacts of one grasp, or several grasps."""
 
     contacts: GivenContacts | None = None
+    """The contacts of the only grasp, in place of `grasps`."""
     grasps: Annotated[tuple[GivenGrasp, ...], Len(1, MOST_GRASPS)] | None = None
+    """Several grasps, in place of `contacts`."""
     friction: FrictionOrZero | None = None
+    """Coulomb coefficient of contacts without their own."""
     center_m: Coordinates | None = None
+    """Point about which torques are taken; if not given, the mean contact of each grasp."""
     torque_scale_m: Length | None = None
+    """Length that makes a torque comparable with a force; if not given, the largest distance of a
+    contact from the point about which torques are taken."""
 
     def _check_together(self) -> None:
         if (self.contacts is None) == (self.grasps is None):

@@ -43,23 +43,34 @@ class Suite(Settings):
     """Grasps that must stay as stable as they were; a setting of None is the baseline's."""
 
     grasps: Path
-    baseline: Path
+    """Path of a grasps.json; paths start at the folder of the file that names them."""
+    baseline: Path = Path("NAME.baseline.json")
+    """Path of the baseline; if not given, that with the name of the file."""
     object: Path | None = None
     """The mesh file that the grasps were planned from; None to search beside them for the object's
     name."""
     strict: bool = False
+    """Whether an improvement fails the test, too."""
     setup: Path | None = None
+    """Path of a TOML file of settings of the simulation."""
     wrenches: Path | None = None
+    """Path of a wrench file."""
     limits: LimitSearch | None = None
     """How the largest multiple of each wrench is found in simulation."""
     random_wrenches: RandomWrenches | None = None
+    """Number of random wrenches that each grasp must hold as well."""
     repeats: Repeats | None = None
     """Number of repeats with noise."""
     noise: Noise | None = None
+    """Random errors of the repeats."""
     seed: Seed | None = None
+    """Seed of random wrenches, noise and negative controls."""
     survives: bool = False
+    """Whether each grasp must keep the object in every trial of its execution."""
     execution: ExecutionSettings | None = None
+    """How grasps are executed."""
     changed_part: IfChanged = CARRY
+    """What to do if the part has another shape than the grasps were planned for."""
     path: Annotated[Path, CHOSEN] = Path(ENDING)
     """The file itself."""
 

@@ -197,8 +197,11 @@ class GivenWrench(Declared):
     """A wrench of a file."""
 
     name: str
+    """Up to 100 letters, digits, '_', '+', '-' and spaces."""
     force_n: Vector
+    """Force in the object's frame."""
     torque_n_m: Vector = (0.0, 0.0, 0.0)
+    """Torque about the centre of mass, in the object's frame."""
 
 
 @declared
@@ -206,6 +209,7 @@ class WrenchFile(Declared):
     """The wrenches of a file, all with different names."""
 
     wrenches: Annotated[tuple[GivenWrench, ...], Len(1, MOST_WRENCHES)]
+    """Wrenches that each grasp must hold in full."""
 
     def _check_together(self) -> None:
         names: set[str] = set()

@@ -87,10 +87,10 @@ def address(name: str) -> str:
 def named(text: str) -> str:
     """Return the short name of the kind of files that a text names, with or without its ending."""
     names = {each.called: name for name, each in KINDS.items()} | {name: name for name in KINDS}
-    word = text.lower().removesuffix(".json")
+    word = text.lower().removesuffix(".json").removesuffix(".toml")
     found = names.get(word) or names.get(f"{word}.json")
     if found is None:
-        hint = near(word, names) or f"choose from {', '.join(KINDS)}"
+        hint = near(word, KINDS) or f"choose from {', '.join(KINDS)}"
         raise InputError(f"no kind of files is named {shown(text)}; {hint}")
     return found
 

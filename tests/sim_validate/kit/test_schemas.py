@@ -12,6 +12,7 @@ from grasp_core.errors import InputError
 from grasp_core.figures import meanings
 from grasp_core.files import file_kinds
 from grasp_core.records.grasps_json import ContactSet
+from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 from sim_validate.kit.command import show_schema
 from sim_validate.kit.console import Reporter
@@ -119,6 +120,22 @@ def test_keys_have_the_meanings_and_units_of_their_fields():
     assert given["torque_n_m"]["unit"] == "N m"
 
 
+@pytest.mark.parametrize("name", ["contacts", "wrenches", "dataset", "suite"])
+def test_every_key_of_a_file_that_people_write_has_a_meaning(name):
+    parts = objects_of(schema_of(name))
+    own = [part for part in parts if part is parts[0] or "Given" in part["title"]]
+    assert [key for part in own for key, each in part["properties"].items()
+            if "description" not in each] == []  # fmt: skip
+
+
+def test_what_the_reader_of_a_file_adds_need_not_be_in_it(tmp_path):
+    given = {"grasps": "grasps.json", "repeats": 20}
+    assert faults_of("suite", given) == []
+    suite = suite_from_tables(given, tmp_path / "wedge.grasps.toml")
+    assert suite.baseline == tmp_path / "wedge.baseline.json"
+    assert faults_of("suite", {"repeats": 20})
+
+
 def test_settings_that_only_the_program_chooses_stand_in_results_alone():
     chosen = {"drive", "indentation"}
     assert not chosen & schema_of("setup")["$defs"]["FingerSettings"]["properties"].keys()
@@ -139,6 +156,7 @@ def test_keys_of_flat_parts_stand_among_the_others():
     [
         ("verdicts", "verdicts"), ("verdicts.json", "verdicts"), ("contacts file", "contacts"),
         ("Baseline", "baseline"), ("document of analyses", "analyses"), ("setup", "setup"),
+        ("setup.toml", "setup"),
     ],
 )  # fmt: skip
 def test_kinds_are_found_by_their_names(text, name, capsys):
@@ -148,7 +166,7 @@ def test_kinds_are_found_by_their_names(text, name, capsys):
 
 
 @pytest.mark.parametrize(
-    ("text", "hint"), [("verdict.json", "verdicts"), ("x", "choose from grasps, best")]
+    ("text", "hint"), [("verdict.json", r"mean verdicts\?"), ("x", "choose from grasps, best")]
 )
 def test_an_unknown_kind_is_refused_with_names_like_it(text, hint):
     with pytest.raises(InputError, match=hint):
