@@ -400,6 +400,10 @@ def _refuse_sources_inside(units: Sequence[WorkUnit], config: DatasetConfig, fol
             )
 
 
+SCHEMA_LINE = re.compile(r"\A#:schema .*\n")
+"""Pattern of the first line of a configuration, which decides nothing."""
+
+
 def _refuse_others(folder: Path, config: DatasetConfig) -> None:
     """Refuse a folder with other files, and remove half-written files of a killed build."""
     stated = folder / CONFIG
@@ -413,7 +417,7 @@ def _refuse_others(folder: Path, config: DatasetConfig) -> None:
                 f"{path}: this file is not part of the dataset to write; give an empty or new "
                 "folder as --out"
             )
-    if stated.is_file() and not read_text(stated).endswith(settings_text(config)):
+    if stated.is_file() and SCHEMA_LINE.sub("", read_text(stated)) != settings_text(config):
         raise InputError(
             f"{folder}: the folder holds a dataset made with other settings (see its {CONFIG}); "
             "give another --out, or the same settings to resume that dataset"

@@ -14,7 +14,7 @@ from scenes.example_objects import example_object
 from sim_validate.datasets import build as build_module
 from sim_validate.datasets import parquet
 from sim_validate.datasets.build import build
-from sim_validate.datasets.config import DatasetConfig, config_from_toml
+from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
 from sim_validate.datasets.verify import verify
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
@@ -164,6 +164,14 @@ def test_an_unfaithful_simulator_ends_a_build_before_it_begins(tmp_path, monkeyp
 def test_a_dataset_of_other_settings_is_left_alone(copy):
     with pytest.raises(gc.InputError, match="made with other settings"):
         build(dataclasses.replace(CONFIG, limit=3), copy, Here(), silent)
+
+
+def test_a_setting_more_at_the_beginning_is_another_setting(tmp_path):
+    text = config_to_toml(dataclasses.replace(CONFIG, unit="mm"))
+    (tmp_path / "config.toml").write_text(text)
+    with pytest.raises(gc.InputError, match="made with other settings"):
+        build(CONFIG, tmp_path, Here(), silent)
+    assert (tmp_path / "config.toml").read_text() == text
 
 
 @pytest.mark.parametrize("name", ["meshes/part.obj", "thesis.tex", "manifest.json"])
