@@ -12,18 +12,10 @@ copied and read-only. `is_sound` checks a value again that may come from anywher
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, field, fields
+from dataclasses import MISSING, Field, field, fields, is_dataclass
 from functools import cache
 from inspect import Parameter, Signature
-from typing import (
-    Any,
-    ClassVar,
-    TypeVar,
-    cast,
-    dataclass_transform,
-    get_type_hints,
-    overload,
-)
+from typing import Any, ClassVar, TypeVar, cast, dataclass_transform, get_type_hints, overload
 
 from pydantic import ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic.dataclasses import dataclass
@@ -31,7 +23,7 @@ from pydantic_core import ArgsKwargs, CoreSchema, core_schema
 
 from grasp_core.by_value import ByValue, is_array, same
 from grasp_core.errors import InputError
-from grasp_core.kinds import FLAT, bare, input_error, rules, strictly
+from grasp_core.kinds import FLAT, adapter, bare, input_error, rules, strictly
 from grasp_core.messages import FieldError
 
 Item = TypeVar("Item")
@@ -41,9 +33,11 @@ class Arguments:
     """The signature of a constructor, which pydantic knows only once it was used."""
 
     def __get__(self, _: object, kind: type) -> Signature:
-        """Return the arguments that set fields."""
+        """Return the arguments that set fields; none for a base without fields."""
+        if not is_dataclass(kind):
+            return Signature()
         ways = {True: Parameter.KEYWORD_ONLY, False: Parameter.POSITIONAL_OR_KEYWORD}
-        listed = sorted(fields(cast("Any", kind)), key=lambda each: bool(each.kw_only))
+        listed = sorted(fields(kind), key=lambda each: bool(each.kw_only))
         usual = {each.name: default_of(each) for each in listed}
         return Signature([
             Parameter(name, ways[bool(each.kw_only)], annotation=each.type,
@@ -82,8 +76,8 @@ class Declared(ByValue):
         """Return whether every field is as the constructor would keep it, whoever set it."""
         try:
             given = {name: getattr(self, name) for name in types(type(self))}
-            kept = type(self)(**given)
-        except (InputError, AttributeError):
+            kept = adapter(type(self)).validate_python(given)  # whatever a subclass constructs
+        except (ValidationError, InputError, AttributeError):
             return False
         same = all(_is_kept(getattr(kept, name), value) for name, value in given.items())
         return same and self._is_consistent()
@@ -206,7 +200,7 @@ def altered(value: Item, /, **given: Any) -> Item:
 def _is_kept(kept: Any, value: Any) -> bool:
     """Return whether a value is what the constructor keeps of it, and not only equal to that."""
     if isinstance(kept, Declared):
-        return kept is value and kept.is_sound()
+        return kept is value and Declared.is_sound(kept)  # whatever a subclass says
     if is_array(kept):
         return type(value) is type(kept) and value.dtype == kept.dtype and same(kept, value)
     if isinstance(kept, tuple):

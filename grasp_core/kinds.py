@@ -85,10 +85,11 @@ class Null:
     def _taken(self, value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
         if value is None and info.context:
             return self.value
-        if info.context and isinstance(value, float) and not math.isfinite(value):
+        if not isinstance(value, float) or math.isfinite(value):
+            return value
+        if info.context:
             raise UnfitError(f"must be a finite number, or null for {self.value}, got {value}")
-        odd = isinstance(value, float) and not math.isfinite(value)
-        if odd and (value != value) != (self.value != self.value):  # noqa: PLR0124 - NaN
+        if math.isnan(value) != math.isnan(self.value):
             raise UnfitError(f"must be a number, got {value}")
         return value
 
@@ -186,6 +187,12 @@ def _no_truth(value: Any) -> Any:
     return value
 
 
+def _named(value: Any) -> Any:
+    if isinstance(value, str | Path) and (value == "" or "\0" in str(value)):
+        raise UnfitError(f"must be a path, got {shown(str(value))}")
+    return value
+
+
 def _listed(least: int, most: int | None, value: Any) -> Any:
     """Return the numbers of an array as lists; too few or too many items are refused unseen."""
     entries = getattr(getattr(value, "dtype", None), "kind", None)
@@ -201,8 +208,11 @@ def _listed(least: int, most: int | None, value: Any) -> Any:
 
 
 STRICT = ("float", "int", "bool", "str")
-BEFORE: Mapping[str, Callable[[Any], Any]] = {"float": _real, "int": _whole, "literal": _no_truth}
-"""What is done with a value before pydantic takes it, by the type of the schema."""
+BEFORE: Mapping[str, Callable[[Any], Any]] = {
+    "float": _real, "int": _whole, "literal": _no_truth, "lax-or-strict": _named,
+}  # fmt: skip
+"""What is done with a value before pydantic takes it, by the type of the schema; paths have the
+last one."""
 
 
 class _Strictly:
@@ -244,9 +254,7 @@ def number(value: Any, name: str, where: str = "", **ends: Any) -> float:
 
 def path_of(value: Any, name: str) -> Path:
     """Check that a value names a file or folder."""
-    if not isinstance(value, str | Path) or value == "" or "\0" in str(value):
-        raise FieldError(name, f"must be a path, got {shown(value)}")
-    return Path(value)
+    return value_of(Path, value, name)
 
 
 def one_of(value: Any, choices: Iterable[str], name: str) -> None:

@@ -62,8 +62,8 @@ WRONG = [
     ("size_m", None), ("count", 0), ("count", 10), ("count", 1.5), ("count", True),
     ("point_m", (0.0, 0.0)), ("point_m", (0.0, math.nan, 0.0)), ("point_m", "abc"),
     ("down", ((0.0, 0.0, 0.0),)), ("down", ((0.0, 0.0, 2e9),)), ("down", 3), ("time_s", 0.0),
-    ("time_s", math.nan), ("kind", "one"), ("kind", 2), ("quick", 1),
-    ("path", "a.txt"), ("path", ""), ("inner", None), ("inner", "share"),
+    ("time_s", math.nan), ("kind", True), ("kind", "one"), ("kind", 2), ("quick", 1),
+    ("path", "a.txt"), ("path", ""), ("path", "a\0.svg"), ("inner", None), ("inner", "share"),
 ]  # fmt: skip
 
 
