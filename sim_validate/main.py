@@ -4,6 +4,7 @@ This module imports nothing that is slow to load, so that help and usage errors 
 """
 
 import gc
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -201,6 +202,7 @@ def _complain(message: str, code: Exit) -> int:
 def run_and_exit() -> None:
     """Run the `graspproof` command as a program, and exit with its exit code."""
     gc.set_threshold(COLLECTED_AFTER)
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # it would look through all packages
     steady_streams()
     code = main()
     end_streams()

@@ -13,7 +13,7 @@ from sim_validate.closure.command import prepared, simulate_grasps
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.command import check_executing, execute_grasps, execution_of_run
-from sim_validate.kit import command_flags
+from sim_validate.kit import simulation_flags
 from sim_validate.kit.command_flags import Report
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit, reason_of
@@ -46,7 +46,7 @@ REPORTED = 200
 """Largest number of grasps that `run` draws, in about a minute; `report` draws all."""
 
 
-def run_object(command: command_flags.Run, reporter: Reporter) -> int:
+def run_object(command: simulation_flags.Run, reporter: Reporter) -> int:
     """Plan grasps of an object, simulate them, and write and show all results."""
     planning = command.planning
     check_executing(command)
@@ -65,7 +65,7 @@ def run_object(command: command_flags.Run, reporter: Reporter) -> int:
 def _run_in(
     folder: Path,
     body: Polyhedron,
-    command: command_flags.Run,
+    command: simulation_flags.Run,
     trials: tuple[Setup, Agenda],
     reporter: Reporter,
 ) -> int:
@@ -116,7 +116,7 @@ def _run_in(
     return max(code, early)
 
 
-def _report(command: command_flags.Run, folder: Path, reporter: Reporter) -> None:
+def _report(command: simulation_flags.Run, folder: Path, reporter: Reporter) -> None:
     """Write the results of a run as pages if asked to; a failure only gives a warning."""
     if command.no_report:
         return

@@ -25,6 +25,7 @@ NOT_TO_PLAN_AGAIN = (
     "grasp_core.optimizing", "sim_validate.engine", "sim_validate.report",
 )  # fmt: skip
 """What planning does not need where its loops are kept already."""
+OTHER_FLAGS = ("sim_validate.kit.simulation_flags", "sim_validate.datasets.flags")
 
 
 def imported(code, among, **environment):
@@ -54,6 +55,7 @@ def test_using_a_name_imports_no_more_than_it_needs():
     ("commands", "heavy", "said"),
     [
         ((["--help"], ["plan", "--help"], ["plan", "wedge", "--friction", "0"]), HEAVY, "inspect"),
+        ((["plan", "--help"], ["plan", "wedge", "--limit", "1"]), OTHER_FLAGS, "certificate"),
         ((["objects"], ["inspect", "box"]), (*NOT_TO_PLAN, "numba"), "volume"),
     ],
 )

@@ -1,5 +1,6 @@
 """Settings of how a mesh is taken: lengths, faces, and limits on what is read."""
 
+from dataclasses import field
 from typing import Annotated, Literal, TypeAlias
 
 from annotated_types import Interval
@@ -63,7 +64,7 @@ class MeshChoices(MeshLimits):
     faces: FaceKind = "auto"
     """Faces to plan on: exact planar faces, or nearly flat patches of a curved or scanned surface,
     which may have holes; auto takes patches where there are more than 200 planar faces."""
-    patches: PatchLimits = PatchLimits()
+    patches: PatchLimits = field(default_factory=PatchLimits)
     flatness_m: Annotated[float, Interval(ge=0.0, le=20.0)] | None = None
     """Distance within which corners count as in one plane [m]. If not given, it is a millionth of
     the extent, or what the rounding of the file's coordinates explains."""

@@ -35,12 +35,12 @@ from sim_validate.engine.setup import (
     wrenches_from_file,
 )
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit import command_flags
-from sim_validate.kit.command_flags import Testing
+from sim_validate.kit import command_flags, simulation_flags
 from sim_validate.kit.compiling import EVERYTHING, compile_loops
 from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import alone_in, remove_results, write_arrays
+from sim_validate.kit.simulation_flags import Testing
 from sim_validate.kit.workers import available_cores
 from sim_validate.planning.asked_objects import asked_grasps
 from sim_validate.settings import ChosenTrials, Noise
@@ -50,7 +50,7 @@ Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, RecordFile]]
 
 
 def validate_file(
-    command: command_flags.Validate, reporter: Reporter, judge: Judge | None = None
+    command: simulation_flags.Validate, reporter: Reporter, judge: Judge | None = None
 ) -> int:
     """Simulate the grasps of a file, or let another test judge them, and report which hold."""
     chosen = asked_grasps(

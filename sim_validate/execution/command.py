@@ -36,11 +36,11 @@ from sim_validate.execution.verdict import (
     multiple_in_words,
     totals_in_words,
 )
-from sim_validate.kit import command_flags
-from sim_validate.kit.command_flags import Run
+from sim_validate.kit import simulation_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import AboutObject, alone_in, remove_results
+from sim_validate.kit.simulation_flags import Run
 from sim_validate.planning.asked_objects import asked_finger, asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
@@ -57,7 +57,7 @@ SLIPS_MEAN = (
 )
 
 
-def execute_file(command: command_flags.Execute, reporter: Reporter) -> int:
+def execute_file(command: simulation_flags.Execute, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
     chosen = asked_grasps(
         command.grasps, reporter, grasp=command.grasp, friction=command.friction,
@@ -195,7 +195,7 @@ def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None
 TextOf = Callable[[Grasp], str]
 
 
-def write_scenes(command: command_flags.Scene, reporter: Reporter) -> int:
+def write_scenes(command: simulation_flags.Scene, reporter: Reporter) -> int:
     """Write a MuJoCo scene for each grasp of a file, or print a single one."""
     _check(command)
     saved = load_grasps(command.grasps)
@@ -238,7 +238,7 @@ def _written(grasp: Grasp, text_of: TextOf, folder: Path | None, reporter: Repor
     return path
 
 
-def _check(command: command_flags.Scene) -> None:
+def _check(command: simulation_flags.Scene) -> None:
     """Refuse flags that the scene asked for does not use, before any file is read."""
     if command.holding.weighed:
         if command.scaled != ScaledScene():
@@ -254,13 +254,15 @@ def _check(command: command_flags.Scene) -> None:
         )
 
 
-def _scaled(command: command_flags.Scene, saved: Plan, friction: float) -> TextOf:
+def _scaled(command: simulation_flags.Scene, saved: Plan, friction: float) -> TextOf:
     setup = extended(Setup, command.scaled)
     setup = replace(setup, fingers=with_planned_radius(setup.fingers, saved.finger))
     return lambda grasp: setup.scene(saved.body, grasp, friction).xml
 
 
-def _held(command: command_flags.Scene, saved: Plan, friction: float, reporter: Reporter) -> TextOf:
+def _held(
+    command: simulation_flags.Scene, saved: Plan, friction: float, reporter: Reporter
+) -> TextOf:
     own = holding(command.holding, saved.body, saved.finger)
     settings = extended(ExecutionSettings, own)
 
@@ -277,7 +279,7 @@ def _held(command: command_flags.Scene, saved: Plan, friction: float, reporter: 
     return text_of
 
 
-def export_grasps(command: command_flags.Export, reporter: Reporter) -> int:
+def export_grasps(command: simulation_flags.Export, reporter: Reporter) -> int:
     """Write the grasps of a file as one file of another program's format."""
     endings = exports.ENDINGS[command.to]
     if command.out.suffix.lower() not in endings:

@@ -20,7 +20,7 @@ class Command(NamedTuple):
 
 COMMANDS: Mapping[str, Command] = {
     "run": Command(
-        "kit.command_flags:Run", "run:run_object",
+        "kit.simulation_flags:Run", "run:run_object",
         "Plan grasps, simulate them and negative controls (contacts that must fail); write all.",
     ),
     "plan": Command(
@@ -29,23 +29,23 @@ COMMANDS: Mapping[str, Command] = {
         "closure.",
     ),
     "validate": Command(
-        "kit.command_flags:Validate", "protocols.command:judge_file",
+        "kit.simulation_flags:Validate", "protocols.command:judge_file",
         "Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must "
         "fail.",
     ),
     "execute": Command(
-        "kit.command_flags:Execute", "execution.command:execute_file",
+        "kit.simulation_flags:Execute", "execution.command:execute_file",
         "Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze.",
     ),
     "scene": Command(
-        "kit.command_flags:Scene", "execution.command:write_scenes",
+        "kit.simulation_flags:Scene", "execution.command:write_scenes",
         "Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.\n\n"
         "Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, "
         "and there is no gravity. With a mass or a density, objects have their true mass and are "
         "held under gravity, as in the command `execute`.",
     ),
     "export": Command(
-        "kit.command_flags:Export", "execution.command:export_grasps",
+        "kit.simulation_flags:Export", "execution.command:export_grasps",
         "Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes.",
     ),
     "view": Command(
@@ -57,7 +57,7 @@ COMMANDS: Mapping[str, Command] = {
         "Write the results of a run as pages that open in a browser, without any network.",
     ),
     "regions": Command(
-        "kit.command_flags:Regions", "planning.regions:certify_file",
+        "kit.simulation_flags:Regions", "planning.regions:certify_file",
         "Prove regions in which each finger may stand anywhere, whatever the others do.",
     ),
     "replay": Command(

@@ -37,7 +37,6 @@ from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import alone_in, remove_results
 from sim_validate.kit.workers import each, interrupts_end
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
-from sim_validate.settings import Certifying
 
 if TYPE_CHECKING:
     from grasp_core.optimizing.best_grasp import BestGrasp
@@ -150,6 +149,7 @@ def with_regions(
     if not (planning.regions and found.grasps):
         return found
     from sim_validate.planning.regions import certified, wider
+    from sim_validate.settings import Certifying
 
     asked = Certifying(edge_clearance_m=planning.edge_clearance_m)
     proved = certified(

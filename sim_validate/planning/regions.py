@@ -33,7 +33,7 @@ from grasp_core.regions.certify_regions import certify_regions
 from grasp_core.regions.proof import CertifiedRegions, TwistCover
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, ContactRegion, Grasp, four
-from sim_validate.kit import command_flags
+from sim_validate.kit import simulation_flags
 from sim_validate.kit.console import Reporter
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.kit.files import (
@@ -276,7 +276,7 @@ def _region(name: str, given: NDArray[Any], normal: Array, scale: float) -> Cont
         ) from error
 
 
-def certify_file(command: command_flags.Regions, reporter: Reporter) -> int:
+def certify_file(command: simulation_flags.Regions, reporter: Reporter) -> int:
     """Certify independent contact regions for a file's grasps, and write them with their proofs."""
     saved = asked_grasps(
         command.grasps, reporter, grasp=command.grasp, friction=command.friction,

@@ -22,8 +22,8 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.hands.flags import Reach
-from sim_validate.kit.command_flags import Execute
 from sim_validate.kit.flag_values import flags_from
+from sim_validate.kit.simulation_flags import Execute
 from sim_validate.report.run_folder import BAD, GOOD, QUIET, Findings, said_of_execution
 from sim_validate.settings import ExecutionSettings
 

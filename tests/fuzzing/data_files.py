@@ -26,9 +26,9 @@ from sim_validate.datasets.work_units import given_from_json
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.hands.reaches import Reaches
-from sim_validate.kit.command_flags import Run
 from sim_validate.kit.files import tables_of_toml
 from sim_validate.kit.flag_values import flags_from
+from sim_validate.kit.simulation_flags import Run
 from sim_validate.planning.regions import Regions
 from tests.fuzzing.targets import Target
 from tests.scenes.drawing.standing import reaches_text
