@@ -12,19 +12,19 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("grasp_core", "scenes", "sim_validate")
 TOTALS = {
-    "lines of packages": 60_529,
+    "lines of packages": 60_562,
     "modules of packages": 263,
-    "lines of tests": 41_062,
-    "lines of docs": 3_997,
+    "lines of tests": 41_086,
+    "lines of docs": 3_998,
 }
 """Most that there may be. Who merges lowers a number to what the command prints. A number rises
 only with a line below that says why."""
 RISES = (
-    "lines of packages, 59,544 to 60,529, modules, 248 to 263: 3MF, schemas of"
+    "lines of packages, 59,544 to 60,562, modules, 248 to 263: 3MF, schemas of"
     " files, locks and time limits for every system, bytecode where Python must not write it,"
     " MuJoCo 3.17, and declarations by pydantic, which split six modules into ten",
-    "lines of tests, 39,856 to 41,062: a test for each of these",
-    "lines of docs, 3,954 to 3,997: systems, versions of MuJoCo, 3MF and schemas",
+    "lines of tests, 39,856 to 41,086: a test for each of these",
+    "lines of docs, 3,954 to 3,998: systems, versions of MuJoCo, 3MF and schemas",
     "lines of packages, 57,054 to 57,106: linear programs whose rows nearly coincide",
     "lines of packages, 57,116 to 57,123: names of modules that say more are longer",
     "lines of packages, 57,123 to 57,146, modules, 239 to 240: proofs of absence have a module",

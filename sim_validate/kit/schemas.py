@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
+from tyro.conf import Positional
 
 from grasp_core.errors import InputError
 from grasp_core.figures import meanings, unit_of
@@ -37,6 +38,9 @@ from grasp_core.files.records import entries
 from grasp_core.kinds import adapter, rules
 from grasp_core.messages import near, shown
 from grasp_core.settings import CHOSEN
+from sim_validate.kit.command_flags import Spoken
+from sim_validate.kit.commands import COMMANDS
+from sim_validate.kit.flag_values import flags_of
 
 HOME = "https://example.org/graspproof"
 """Address of the repository, which .github/workflows/release.yml puts here."""
@@ -75,6 +79,11 @@ KINDS: Mapping[str, FileKind] = {
                         "sim_validate.datasets.config:DatasetConfig", True),
     "setup": FileKind("setup of the simulation, TOML", "sim_validate.engine.setup:Setup", True),
     "suite": FileKind("NAME.grasps.toml of tests", "sim_validate.baselines.suite:Suite", True),
+} | {
+    f"{command.replace(' ', '-')}-flags": FileKind(
+        f"TOML file for `{command} --config`", f"sim_validate.{each.flags}", True
+    )
+    for command, each in COMMANDS.items()
 }  # fmt: skip
 """Every kind of files by its short name. Classes are named as text, since most are slow to load."""
 
@@ -99,11 +108,14 @@ def named(text: str) -> str:
 def schema_of(name: str) -> Mapping[str, Any]:
     """Return the JSON Schema of the kind of files with a short name."""
     called, place, by_users = KINDS[name]
-    kind: type = resolve_name(place)
-    generator = _OfUsers if by_users else _OfFiles
-    made = adapter(kind).json_schema(
-        mode="serialization", by_alias=True, schema_generator=generator
-    )
+    kind = resolve_name(place)
+    if issubclass(kind, Spoken):
+        made = _of_flags(kind)
+    else:
+        generator = _OfUsers if by_users else _OfFiles
+        made = adapter(kind).json_schema(
+            mode="serialization", by_alias=True, schema_generator=generator
+        )
     head = {"$schema": DRAFT, "$id": address(name), "title": f"graspproof {called}"}
     return head | {key: value for key, value in made.items() if key not in head}
 
@@ -111,6 +123,27 @@ def schema_of(name: str) -> Mapping[str, Any]:
 def schema_text(name: str) -> str:
     """Return the text of the JSON Schema of a kind of files."""
     return json.dumps(schema_of(name), indent=1, allow_nan=False) + "\n"
+
+
+def _of_flags(command: type[Spoken]) -> JsonSchemaValue:
+    """Return the schema of the flags of a command; those of a group are in a table of their own."""
+    made: dict[str, Any] = _table() | {"description": command.__doc__}
+    for flag in flags_of(command):
+        marks, table = rules(flag.kind), made
+        if Positional in marks:
+            continue
+        *groups, key = flag.name.split(".")
+        for group in groups:
+            table = table["properties"].setdefault(group, _table())
+        helps = (getattr(mark, "help", None) for mark in marks)
+        said = {"description": next(filter(None, helps), "")} | _about(flag.owner, flag.field, key)
+        own = adapter(flag.kind).json_schema(schema_generator=_OfFiles)
+        table["properties"][key] = own | said
+    return made
+
+
+def _table() -> dict[str, Any]:
+    return {"type": "object", "additionalProperties": False, "properties": {}}
 
 
 class _OfFiles(GenerateJsonSchema):

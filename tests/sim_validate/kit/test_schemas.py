@@ -19,6 +19,7 @@ from sim_validate.kit.console import Reporter
 from sim_validate.kit.flags import Schema
 from sim_validate.kit.schemas import DRAFT, KINDS, address, named, schema_of
 from sim_validate.main import main
+from tests.bad_input.mesh_texts import obj
 from tests.damaged import damaged
 from tests.fuzzing.data_files import TARGETS
 from tests.schemas import faults_of, faults_of_file
@@ -189,3 +190,26 @@ def test_a_configuration_names_its_schema_which_changes_no_hash(tmp_path):
     assert faults_of_file(path) == []
     path.write_text(path.read_text().replace("example.org", "example.com"))
     assert config_from_toml(path).sha256 == config.sha256
+
+
+def test_files_of_flags_are_known_by_their_commands(tmp_path):
+    path = tmp_path / "flags.toml"
+    path.write_text('friction = 0.4\nfamilies = ["pencil"]\ncenter_of_mass_m = [0, 0, 0]\n'
+                    '[patches]\nmost = 9\n')  # fmt: skip
+    given = tomllib.loads(path.read_text())
+    part = tmp_path / "part.obj"
+    part.write_text(obj())
+    assert main(["inspect", str(part), "-q", "--config", str(path)]) == 2  # flags of `plan`
+    assert main(["plan", str(part), "--limit", "1", "-q", "--config", str(path)]) in (0, 5)
+    assert faults_of("plan-flags", given) == []
+    for wrong in ({"friction": "x"}, {"frictio": 0.4}, {"patches": {"most": 1}}, {"object": "box"}):
+        assert faults_of("plan-flags", given | wrong), wrong
+
+
+def test_every_flag_has_a_meaning():
+    silent = [
+        (name, key) for name in KINDS if name.endswith("-flags")
+        for key, each in schema_of(name)["properties"].items()
+        if not each.get("description") and "properties" not in each
+    ]  # fmt: skip
+    assert silent == []
