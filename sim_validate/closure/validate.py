@@ -76,8 +76,8 @@ from sim_validate.engine.limits_and_friction import (
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulate import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge, rotated
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 from sim_validate.settings import Noise
 
 
