@@ -167,8 +167,8 @@ last two are on elsewhere: they save time in large scenes, cost a seventh of it 
 change no bit of a motion."""
 
 
-GraspFormat: TypeAlias = Literal["moveit", "gltf"]
-ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
+GraspFormat: TypeAlias = Literal["gltf"]
+ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"gltf": (".glb",)}
 """Endings of the files that grasps are exported to, by format."""
 Surface = Literal["object", "pads"]
 Drive: TypeAlias = Literal["servo", "rigid"]

@@ -128,13 +128,12 @@ class Export(Spoken):
     """Flags of the command `export`."""
 
     grasps: Positional[GraspsFile]
-    to: GraspFormat
-    """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
-    see docs/files.md."""
     out: Annotated[Path, arg(aliases=("-o",), help=(
         "File to write, which ends in "
         f"{', '.join(f'{ends[0]} for {name}' for name, ends in ENDINGS.items())}."
     ))]  # fmt: skip
+    to: GraspFormat = "gltf"
+    """Format to write: a binary glTF scene (see docs/files.md)."""
     grasp: GraspId = None
     limit: FirstOnly = None
     fingertip_radius_m: Quantity | None = None

@@ -46,7 +46,7 @@ COMMANDS: Mapping[str, Command] = {
     ),
     "export": Command(
         "commands.simulation_flags:Export", "execution.command:export_grasps",
-        "Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes.",
+        "Write grasps as a scene for viewers and editors of 3D scenes.",
     ),
     "view": Command(
         "commands.flags:View", "report.command:view_grasp",
@@ -93,10 +93,6 @@ COMMANDS: Mapping[str, Command] = {
         "datasets.flags:Verify", "datasets.command:verify_dataset",
         "Check files and rows of a dataset, prove force closure again, and redo a sample.",
     ),
-    "dataset export": Command(
-        "datasets.flags:Export", "datasets.command:export_dataset",
-        "Write the grasps of a dataset that are in force closure for another program.",
-    ),
     "baseline record": Command(
         "baselines.flags:Record", "baselines.command:record_baseline",
         "Simulate grasps and write a baseline: a file that records how stable each grasp is.",
@@ -123,7 +119,7 @@ COMMANDS: Mapping[str, Command] = {
     ),
 }  # fmt: skip
 GROUPS: Mapping[str, str] = {
-    "dataset": "Build a dataset of grasps of many objects; check or export datasets.",
+    "dataset": "Build a dataset of grasps of many objects; check datasets.",
     "baseline": (
         "Record simulation results of grasps, and notice later when their stability changes."
     ),
@@ -162,8 +158,7 @@ execute plan/grasps.json --density-kg-m3 2700 --trials lift,shake --shake-g 2
 scene plan/grasps.json --out scenes
 scene plan/grasps.json --grasp c-0-1-2-7
 scene plan/grasps.json --mass-kg 0.3 --out held
-export plan/grasps.json --to gltf -o grasps.glb
-export plan/grasps.json --to moveit --limit 5 -o grasps.yaml
+export plan/grasps.json -o grasps.glb
 regions plan/grasps.json --out plan
 regions plan/grasps.json --reserve 0.1 --recenter --limit 5 --out smaller
 replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay
@@ -193,7 +188,6 @@ dataset build meshes/ wedge --frictions 0.3,0.5 --limit 20 --out ds
 dataset build ds/config.toml --out again
 dataset import contacts.json mug.obj --out judged
 dataset verify ds
-dataset export ds --to isaac --out isaac
 baseline record grasps.json -o wedge.baseline.json
 baseline check wedge.baseline.json --strict
 """.splitlines()

@@ -1,7 +1,7 @@
-"""Runs the commands that build, import, verify and export datasets."""
+"""Runs the commands that build, import and verify datasets."""
 
 from contextlib import AbstractContextManager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.by_value import counted
@@ -22,7 +22,6 @@ from sim_validate.datasets.config import (
     PlannedContent,
     config_from_toml,
 )
-from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import CONFIG, splits_in_words
 from sim_validate.datasets.verify import verify
 
@@ -100,20 +99,6 @@ def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
     )
     reporter.document({"dataset": str(command.dataset), "faults": faults})
     return Exit.NEGATIVE if faults else Exit.GOOD
-
-
-def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
-    """Write the grasps of a dataset in force closure for another program."""
-    with reporter.progress("exporting") as steps:
-        done = export(command.dataset, command.out, command.split, steps.update)
-    counts = ", ".join(f"{count} {name}" for name, count in done.rows.items())
-    reporter.say(f"{command.out}: {done.files} files, {counts}")
-    if not done.rows["grasps"]:
-        where = f"the split {command.split} of the dataset" if command.split else "the dataset"
-        reporter.warn(f"{command.dataset}: {where} has no grasps")
-    asked = {"dataset": str(command.dataset), "to": command.to, "split": command.split}
-    reporter.document({**asked, "out": str(command.out), **asdict(done)})
-    return Exit.GOOD
 
 
 def _warn(config: DatasetConfig, reporter: Reporter) -> None:

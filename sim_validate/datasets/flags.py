@@ -10,7 +10,7 @@ from grasp_core.declared import declared
 from grasp_core.kinds import Count, Seed, Share
 from grasp_core.settings import Settings
 from sim_validate.commands.flags import PLAIN, Positive, Spoken
-from sim_validate.datasets.config import Content, Learning, PlannedContent, SplitName
+from sim_validate.datasets.config import Content, Learning, PlannedContent
 from sim_validate.processes.workers import available_cores
 
 
@@ -69,17 +69,3 @@ class Verify(Spoken):
     """Share of all objects and frictions that is computed again, at least one; 0 for none."""
     seed: Seed = 0
     """Seed of the random choice of the sample that is computed again."""
-
-
-@declared
-class Export(Spoken):
-    """Flags of the command `dataset export`."""
-
-    dataset: Positional[Path]
-    """Folder of the dataset."""
-    out: Path
-    """Folder to write to; it must be empty or not exist."""
-    to: Literal["isaac"] = "isaac"
-    """Format: Isaac grasp files, one for each object at each friction."""
-    split: SplitName | None = None
-    """Export only the objects of this split; if not given, all objects."""
