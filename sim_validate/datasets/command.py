@@ -13,8 +13,10 @@ from grasp_core.settings import extended
 from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
 from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets import flags as dataset_flags
-from sim_validate.datasets.build import CARD, Engine, build
+from sim_validate.datasets.build import build
+from sim_validate.datasets.card import CARD
 from sim_validate.datasets.clusters import dask_workers, ray_workers
+from sim_validate.datasets.computing import Engine
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,
@@ -28,21 +30,26 @@ from sim_validate.datasets.verify import verify
 
 def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
+    config = _configuration(command)
+    return _build(config, command.out, command.work, reporter)
+
+
+def _configuration(command: dataset_flags.Build) -> DatasetConfig:
+    """Read the settings of a dataset from flags, or from the file that is given in their place."""
     first = Path(command.objects[0]) if command.objects else Path()
-    if first.suffix == ".toml":
-        unsaid = (PlannedContent(), Learning())
-        if len(command.objects) > 1 or (command.content, command.learning) != unsaid:
-            raise InputError(
-                f"{first} holds all settings of the dataset: give no other objects and no flags "
-                "but --out beside it"
-            )
-        config = config_from_toml(first)
-        config = replace(config, objects=_listed(config.objects))
-    else:
+    if first.suffix != ".toml":
         learning = None if command.learning == Learning() else command.learning
         objects = _listed(command.objects)
-        config = extended(DatasetConfig, command.content, objects=objects, learning=learning)
-    return _build(config, command.out, command.work, reporter)
+        return extended(DatasetConfig, command.content, objects=objects, learning=learning)
+    if len(command.objects) > 1 or (command.content, command.learning) != (
+        PlannedContent(), Learning(),
+    ):  # fmt: skip
+        raise InputError(
+            f"{first} holds all settings of the dataset: give no other objects and no flags but "
+            "--out beside it"
+        )
+    config = config_from_toml(first)
+    return replace(config, objects=_listed(config.objects))
 
 
 def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:

@@ -32,12 +32,7 @@ from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.kinds import instance, one_of, value_of
-from grasp_core.objects.on_faces import (
-    check_body,
-    check_on_faces,
-    edge_distance,
-    face_under,
-)
+from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip

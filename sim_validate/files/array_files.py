@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 
 from grasp_core.errors import InputError, about
 from grasp_core.files.json_text import shown
-from grasp_core.files.text_files import (
-    read_bytes,
-    write_parts,
-)
+from grasp_core.files.text_files import read_bytes, write_parts
 
 MOST_BYTES = 256 * 2**20
 """Largest total size of the arrays in a file."""

@@ -7,11 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.files.text_files import (
-    SHOWN,
-    UNFINISHED,
-    remove_unfinished,
-)
+from grasp_core.files.text_files import SHOWN, UNFINISHED, remove_unfinished
 from sim_validate.files.locks import locked
 from sim_validate.files.results_folder import PARTS
 

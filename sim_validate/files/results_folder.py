@@ -13,10 +13,7 @@ from pathlib import Path
 
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import BESIDE, GRASPS, REGIONS, VERDICTS
-from grasp_core.files.text_files import (
-    UNFINISHED,
-    write_text,
-)
+from grasp_core.files.text_files import UNFINISHED, write_text
 from sim_validate.files.locks import entries
 
 REPORT, INDEX, GRASP_PAGES = "report", "index.html", "grasps"

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from grasp_core.errors import InputError, about
-from grasp_core.files.text_files import (
-    read_text,
-)
+from grasp_core.files.text_files import read_text
 from grasp_core.messages import at
 
 MOST_LETTERS = 2**20

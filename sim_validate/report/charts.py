@@ -34,15 +34,7 @@ from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
 from scenes.drawing.painting import View
-from scenes.drawing.panels import (
-    ROW,
-    SMALL,
-    Entry,
-    Panel,
-    Scale,
-    marker,
-    thinned,
-)
+from scenes.drawing.panels import ROW, SMALL, Entry, Panel, Scale, marker, thinned
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import (
     BAD,

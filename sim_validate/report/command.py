@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.files.file_kinds import GRASPS
+from grasp_core.files.file_kinds import GRASPS, MANIFEST
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
@@ -29,7 +29,7 @@ from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_
 from sim_validate.commands import flags
 from sim_validate.commands.console import Reporter
 from sim_validate.commands.exit_codes import Exit
-from sim_validate.datasets.open_dataset import MANIFEST, recorded_in_dataset
+from sim_validate.datasets.open_dataset import recorded_in_dataset
 from sim_validate.engine.setup import with_planned_radius
 from sim_validate.files.output_folders import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id

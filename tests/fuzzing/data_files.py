@@ -21,10 +21,10 @@ from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.commands.config_file import flags_from
 from sim_validate.commands.simulation_flags import Run
-from sim_validate.datasets.build import UnitRecord
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
-from sim_validate.datasets.open_dataset import Listed, Manifest, left_out_from
-from sim_validate.datasets.work_units import given_from_json
+from sim_validate.datasets.given_grasps import given_from_json
+from sim_validate.datasets.manifest import Listed, Manifest, left_out_from
+from sim_validate.datasets.resuming import UnitRecord
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_json
 from sim_validate.execution.verdict import ExecutedGrasp, Executions
 from sim_validate.files.toml_files import tables_of_toml

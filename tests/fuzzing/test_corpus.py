@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import grasp_core as gc
-from sim_validate.datasets.work_units import GivenGrasp, given_from_json, given_text
+from sim_validate.datasets.given_grasps import GivenGrasp, given_from_json, given_text
 from tests.damaged import places, value_at
 from tests.fuzzing.targets import targets
 

@@ -11,10 +11,7 @@ from sim_validate.baselines.baseline import Baseline, ExecutedFigures, How
 from sim_validate.baselines.check import Checked, demanded
 from sim_validate.baselines.compare import Status, compare
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.execution.verdict import (
-    ExecutedGrasp,
-    ExecutionControl,
-)
+from sim_validate.execution.verdict import ExecutedGrasp, ExecutionControl
 from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 from tests.sim_validate.execution.executed import execution, trial

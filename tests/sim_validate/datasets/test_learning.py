@@ -17,8 +17,9 @@ from sim_validate.closure.validate import validate
 from sim_validate.datasets import learning as varied_figures
 from sim_validate.datasets.config import Learning
 from sim_validate.datasets.learning import RATIOS, execution_cells, region_exit, variants
+from sim_validate.datasets.making_rows import Making
 from sim_validate.datasets.verify import verify
-from sim_validate.datasets.work_units import Making, units_of
+from sim_validate.datasets.work_units import units_of
 from sim_validate.engine.setup import Agenda
 from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of
 from tests.sim_validate.datasets.forging import first, forged

@@ -11,14 +11,9 @@ from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import parquet
 from sim_validate.datasets.columns import TABLES, GraspRow
 from sim_validate.datasets.config import KEYS, DatasetConfig
-from sim_validate.datasets.parquet import (
-    Column,
-    agrees,
-    each_batch,
-    parquet_bytes,
-    read_table,
-)
-from sim_validate.datasets.work_units import body_of, made_of, split_of, units_of
+from sim_validate.datasets.making_rows import made_of, split_of
+from sim_validate.datasets.parquet import Column, agrees, each_batch, parquet_bytes, read_table
+from sim_validate.datasets.work_units import body_of, units_of
 from sim_validate.engine.traces import HoldVerdict
 
 pytest.importorskip("pyarrow")

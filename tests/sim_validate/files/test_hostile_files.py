@@ -14,9 +14,9 @@ from grasp_core.files.file_kinds import BESIDE, GRASPS
 from grasp_core.files.json_text import object_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.commands.exit_codes import Exit
+from sim_validate.datasets.manifest import path_inside, require_inside
 from sim_validate.files import array_files
 from sim_validate.files.array_files import arrays_of
-from sim_validate.files.named_paths import path_inside, require_inside
 from sim_validate.files.toml_files import MOST_LETTERS, read_tables, tables_of_toml
 from sim_validate.main import main
 
