@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grasp_core.errors import InputError
-from grasp_core.files.file_kinds import MANIFEST
+from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
 from grasp_core.files.text_files import read_text, write_text
 from sim_validate.datasets.card import CARD
 from sim_validate.datasets.computing import Engine, compute_all
 from sim_validate.datasets.config import DatasetConfig, config_to_toml, settings_text
-from sim_validate.datasets.manifest import QUARANTINE, Manifest, path_inside, read_manifest
+from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
 from sim_validate.datasets.open_dataset import CONFIG
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.resuming import Staging

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from grasp_core.by_value import counted
 from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import QUARANTINE
 from grasp_core.files.records import record_of
 from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.processes import local_processes
@@ -76,7 +77,7 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     )
     reporter.say(splits_in_words(manifest))
     if manifest.quarantined:
-        reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
+        reporter.warn(f"{out / QUARANTINE} says why objects were left out")
     reporter.document(
         {"out": str(out), "manifest": {"schema": manifest.SCHEMA, **record_of(manifest)}}
     )

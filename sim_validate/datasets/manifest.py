@@ -17,7 +17,7 @@ from pydantic import computed_field
 
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, about
-from grasp_core.files.file_kinds import MANIFEST
+from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
 from grasp_core.files.json_text import object_of, shown
 from grasp_core.files.records import RecordFile, from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
@@ -27,7 +27,6 @@ from sim_validate.datasets.columns import dataset_tables, groups_asked
 from sim_validate.datasets.config import Name, SplitName
 from sim_validate.datasets.parquet import Tables
 
-QUARANTINE = "quarantine.jsonl"
 Size = Annotated[int, Interval(ge=0)]
 
 

@@ -31,7 +31,7 @@ from grasp_core.errors import GraspError, InputError, UndecidedError
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import any_direction
 from grasp_core.execution.squeeze_certificate import Survival
-from grasp_core.files.file_kinds import MANIFEST
+from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
 from grasp_core.files.text_files import read_text
 from grasp_core.frames import POSE
 from grasp_core.hands.collisions import clearances, tip_distances
@@ -45,7 +45,7 @@ from sim_validate.datasets.config import KEYS, NAMES, REFERENCES, SPLITS, Name
 from sim_validate.datasets.given_grasps import read_given
 from sim_validate.datasets.learning import RATIOS, contact_cells, hand_named, ratio_of, trial_cells
 from sim_validate.datasets.making_rows import PLANNED, made_of
-from sim_validate.datasets.manifest import QUARANTINE, read_left_out
+from sim_validate.datasets.manifest import read_left_out
 from sim_validate.datasets.open_dataset import CONFIG, Dataset, select
 from sim_validate.datasets.parquet import Cells, agrees, pyarrow
 from sim_validate.datasets.work_units import WorkUnit, provenance

@@ -12,6 +12,7 @@ from itertools import groupby, product
 from pathlib import Path
 from typing import TypeAlias
 
+from grasp_core.files.file_kinds import QUARANTINE
 from grasp_core.files.text_files import write_text
 from grasp_core.provenance import arithmetic
 from sim_validate.datasets.card import CARD, card_text
@@ -19,7 +20,6 @@ from sim_validate.datasets.columns import dataset_tables
 from sim_validate.datasets.config import SPLITS, DatasetConfig
 from sim_validate.datasets.given_grasps import given_text
 from sim_validate.datasets.manifest import (
-    QUARANTINE,
     LeftOut,
     Listed,
     Manifest,

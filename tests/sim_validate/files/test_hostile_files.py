@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.file_kinds import BESIDE, GRASPS
+from grasp_core.files.file_kinds import BESIDE, GIVEN, GRASPS, VERDICTS, WRITTEN
 from grasp_core.files.json_text import object_of
 from grasp_core.files.text_files import read_bytes, read_text
 from sim_validate.commands.exit_codes import Exit
@@ -191,15 +191,9 @@ def test_links_that_lead_out_are_not_followed(tmp_path):
 
 
 KINDS = {
-    "verdicts.json": {"schema": 2, "verdicts": []},
-    "regions.json": {"schema": 3, "edge_clearance_m": 0, "reserve": 0, "grasps": []},
-    "executions.json": {"schema": 1, "executions": []},
-    "reaches.json": {"schema": 2, "hand": {}, "reaches": []},
-    "judgements.json": {"schema": 2, "protocols": {}, "judgements": []},
-    "baseline": {"schema": 1, "grasps_file": "a"},
-    "manifest.json": {"schema": 1, "units_sha256": "", "files": []},
-    "wrench file": {"wrenches": []},
-}  # fmt: skip
+    **{kind: {"schema": 1, key: []} for kind, key in WRITTEN.items()},
+    **{kind: {key: []} for key, kind in GIVEN.items()},
+}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -207,7 +201,7 @@ def test_another_file_of_ours_is_called_by_its_name(tmp_path, capsys, kind):
     path = tmp_path / "x.json"
     path.write_text(json.dumps(KINDS[kind]))
     article = "an" if kind.startswith("e") else "a"
-    for command, wanted in (("view", GRASPS), ("validate", GRASPS), ("replay", "verdicts.json")):
+    for command, wanted in (("view", GRASPS), ("validate", GRASPS), ("replay", VERDICTS)):
         if kind == wanted:
             continue
         assert main([command, str(path)]) == Exit.INPUT
