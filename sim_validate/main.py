@@ -26,7 +26,7 @@ from sim_validate.commands.exit_codes import (
     reason_of,
     steady_streams,
 )
-from sim_validate.commands.table import COMMANDS, GROUPS, config_of, examples_for
+from sim_validate.commands.table import COMMANDS, GROUPS, examples_for
 from sim_validate.processes.interrupts import interrupts_noted
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _parsed(arguments: list[str]) -> tuple[str, "Spoken"]:
     if "" in arguments:
         said = "an argument is empty, perhaps from a variable that is not set"
         raise FlagsError(f"{said}; leave the argument out, or give it a value")
-    path, words = config_of(arguments)
+    path, words = _config_of(arguments)
     name = _command_of(words)
     if name not in COMMANDS:
         _list_commands(name, words)
@@ -102,6 +102,21 @@ def _parsed(arguments: list[str]) -> tuple[str, "Spoken"]:
         raise FlagsError(f"{flag} {error.fault}") from error
     except InputError as error:  # settings that do not fit each other
         raise FlagsError(str(error)) from error
+
+
+def _config_of(arguments: list[str]) -> tuple[Path | None, list[str]]:
+    """Return the path after `--config`, if it is given, and the other words."""
+    words = [
+        part
+        for word in arguments
+        for part in (word.split("=", 1) if word.startswith("--config=") else [word])
+    ]
+    if "--config" not in words:
+        return None, arguments
+    at = words.index("--config")
+    if at + 1 >= len(words):
+        raise FlagsError("--config needs the path of a TOML file after it")
+    return Path(words[at + 1]), words[:at] + words[at + 2 :]
 
 
 def _check_working_folder() -> None:

@@ -133,7 +133,7 @@ class Export(Spoken):
         f"{', '.join(f'{ends[0]} for {name}' for name, ends in ENDINGS.items())}."
     ))]  # fmt: skip
     to: GraspFormat = "gltf"
-    """Format to write: a binary glTF scene (see docs/files.md)."""
+    """Format to write: gltf, a binary glTF scene (see docs/files.md)."""
     grasp: GraspId = None
     limit: FirstOnly = None
     fingertip_radius_m: Quantity | None = None

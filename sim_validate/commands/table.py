@@ -4,10 +4,7 @@ Modules are named as text, so that neither help nor any command waits for what o
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import NamedTuple
-
-from sim_validate.commands.exit_codes import FlagsError
 
 
 class Command(NamedTuple):
@@ -125,23 +122,6 @@ GROUPS: Mapping[str, str] = {
     ),
 }
 """What commands have in common whose names begin with one word."""
-
-
-def config_of(arguments: list[str]) -> tuple[Path | None, list[str]]:
-    """Return the path after `--config`, if it is given, and the other words."""
-    words = [
-        part
-        for word in arguments
-        for part in (word.split("=", 1) if word.startswith("--config=") else [word])
-    ]
-    if "--config" not in words:
-        return None, arguments
-    at = words.index("--config")
-    if at + 1 >= len(words):
-        raise FlagsError("--config needs the path of a TOML file after it")
-    return Path(words[at + 1]), words[:at] + words[at + 2 :]
-
-
 EXAMPLES = """\
 run wedge
 run part.stl --unit mm --friction 0.3 --limit 20 --limits ramp --out results

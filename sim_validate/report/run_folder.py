@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
 GOOD, BAD, QUIET = "good", "bad", "quiet"
-FAILED, LOST = "failed", "lost"
-"""Word that begins how many trials were not survived, and the one word for it."""
 File = TypeVar("File", bound=RecordFile)
 Item = TypeVar("Item", bound=Named)
 
@@ -142,7 +140,7 @@ def said_of(verdict: Verdict | None) -> tuple[str, str]:
     return outcome, GOOD if verdict.held else BAD
 
 
-def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
+def said_of_execution(found: ExecutedGrasp | None, *, brief: bool = False) -> tuple[str, str]:
     """Say in words how the execution of a grasp ended, with the tone: good, bad or neither."""
     if found is None:
         return "not executed", QUIET
@@ -153,7 +151,8 @@ def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
     if not found.execution.trials:
         return "no trial is possible", BAD
     if lost := found.execution.lost:
-        return f"{FAILED} {len(lost)} of {len(found.execution.trials)} trials", BAD
+        trials = found.execution.trials
+        return "lost" if brief else f"failed {len(lost)} of {len(trials)} trials", BAD
     return "survived", GOOD
 
 
@@ -167,10 +166,10 @@ def said_of_both(
     closure, tone = said_of(verdict)
     if executions is None:
         return closure, tone
-    ended, other = said_of_execution(found)
+    ended, other = said_of_execution(found, brief=True)
     tones = {tone, other}
     worst = next(each for each in (BAD, GOOD, QUIET) if each in tones)
-    return f"closure: {closure}; execution: {LOST if ended.startswith(FAILED) else ended}", worst
+    return f"closure: {closure}; execution: {ended}", worst
 
 
 def folder_of(path: Path) -> Path:

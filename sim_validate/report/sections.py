@@ -59,18 +59,22 @@ def why_not_held(found: Findings) -> str:
 
 def said_of_reach(found: Findings) -> tuple[str, str]:
     """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
-    reached, reaches = found.reached, found.run.reaches
+    reaches = found.run.reaches
     if reaches is None:
         return "", QUIET
-    name = reaches.hand.name
+    said, tone = _reach_in_words(found.reached)
+    return f"{reaches.hand.name}: {said}", tone
+
+
+def _reach_in_words(reached: "ReachedGrasp | None") -> tuple[str, str]:
     if reached is None:
-        return f"{name}: not asked", QUIET
+        return "not asked", QUIET
     reach, held, executed = reached.reach, reached.simulated, reached.executed
     if not reach.reached:
-        return f"{name}: not reached, {REASONS[reach.reason]}", QUIET
+        return f"not reached, {REASONS[reach.reason]}", QUIET
     within = reach.within_regions or ()
     inside = f"{sum(within)} of {len(within)} contacts "
-    said = [f"{name}: reached, {'' if all(within) else inside}within regions"]
+    said = [f"reached, {'' if all(within) else inside}within regions"]
     if held is not None:
         strength = f"held: {number(held.weakest_n)} N with its motors"
         said.append(strength if held.held else "not held in simulation")
@@ -108,10 +112,10 @@ def reach_section(found: Findings) -> Record | None:
     reached, reaches = found.reached, found.run.reaches
     if reaches is None or reached is None:
         return None
-    said, tone = said_of_reach(found)
+    said, tone = _reach_in_words(reached)
     return {
         "hand": reaches.hand.name,
-        "said": said.partition(": ")[2],
+        "said": said,
         "tone": tone,
         "facts": list(_reach_facts(reaches, reached)),
         "explanation": reached.reach.explanation,

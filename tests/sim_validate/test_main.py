@@ -121,7 +121,7 @@ def test_a_scale_multiplies_what_a_mesh_file_says(here, answer, capsys):
         (["wedge"], Exit.USAGE, "the commands are run, plan, validate"),
         (["dataset", "biuld"], Exit.USAGE, "no command 'dataset biuld'; did you mean build"),
         (["baseline", "check-it"], Exit.USAGE, "did you mean check"),
-        (["dataset", "wedge"], Exit.USAGE, "the commands are build, import, verify, export"),
+        (["dataset", "wedge"], Exit.USAGE, "the commands are build, import, verify"),
         (["plan"], Exit.USAGE, "Required options"),
         (["plan", "wedge", "--config"], Exit.USAGE, "--config"),
         (["plan", "box", "--ceiling", "10"], Exit.INPUT, "--ceiling needs --optimize"),
