@@ -20,14 +20,14 @@ from grasp_core.values import Grasp
 from scenes.drawing import sheets
 from scenes.drawing.painting import approaches
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.settings import ENDINGS, GraspFormat
+from scenes.settings import EXPORT_ENDINGS, GraspFormat
 
 ROD_LENGTH = 0.5
 """Length of the rods where no free lines were planned, in object radii."""
-SPACING = 2.5
+GRID_SPACING = 2.5
 """Distance between neighbouring grasps of a grid, in object radii and rod lengths: two of each keep
 them apart, and the rest is for the fingertips."""
-SECTIONS = 24
+ROD_SIDES = 24
 ROUGHNESS = 0.6
 
 
@@ -55,7 +55,7 @@ def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedG
     if plan.finger is not None:
         radius, length = radius or plan.finger.radius_m, plan.finger.approach_m
     columns = math.ceil(math.sqrt(len(plan)))
-    step = SPACING * (plan.body.radius + length)
+    step = GRID_SPACING * (plan.body.radius + length)
     return tuple(
         PlacedGrasp(
             grasp=grasp,
@@ -116,13 +116,13 @@ def _shapes(trimesh: Any, scene: Any, placed: PlacedGrasp, finger: int) -> tuple
     radius, length = placed.tip_radius, placed.rod_length
     tip, bar = f"tip_{finger}_{radius!r}", f"rod_{finger}_{radius!r}_{length!r}"
     if tip not in scene.geometry:
-        ball = trimesh.creation.uv_sphere(radius=radius, count=[SECTIONS // 2, SECTIONS])
+        ball = trimesh.creation.uv_sphere(radius=radius, count=[ROD_SIDES // 2, ROD_SIDES])
         ball.apply_translation([0.0, 0.0, -radius])  # it touches the origin of the contact's frame
-        scene.geometry[tip] = _painted(trimesh, ball, sheets.FINGERS[finger])
+        scene.geometry[tip] = _painted(trimesh, ball, sheets.FINGER_COLOURS[finger])
     if bar not in scene.geometry:
         segment = [[0.0, 0.0, -length], [0.0, 0.0, 0.0]]
-        made = trimesh.creation.cylinder(radius=radius, segment=segment, sections=SECTIONS)
-        scene.geometry[bar] = _painted(trimesh, made, sheets.FINGERS[finger])
+        made = trimesh.creation.cylinder(radius=radius, segment=segment, sections=ROD_SIDES)
+        scene.geometry[bar] = _painted(trimesh, made, sheets.FINGER_COLOURS[finger])
     return tip, bar
 
 
@@ -161,8 +161,8 @@ def export_grasps(
     instance(plan, Plan, "plan", "gc.plan makes plans")
     path = path_of(path, "path")
     one_of(to, get_args(GraspFormat), "to")
-    if path.suffix.lower() not in ENDINGS[to]:
-        wanted = " or ".join(ENDINGS[to])
+    if path.suffix.lower() not in EXPORT_ENDINGS[to]:
+        wanted = " or ".join(EXPORT_ENDINGS[to])
         raise InputError(f"path must end in {wanted} for the format {to}, got {path.name[-40:]!r}")
     if fingertip_radius_m is not None:
         number(fingertip_radius_m, "fingertip_radius_m", ge=SMALLEST, le=plan.body.radius,

@@ -52,7 +52,7 @@ Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, RecordFile]]
 
 
 def validate_file(
-    command: simulation_flags.Validate, reporter: Reporter, judge: Judge | None = None
+    command: simulation_flags.ValidateFlags, reporter: Reporter, judge: Judge | None = None
 ) -> int:
     """Simulate the grasps of a file, or let another test judge them, and report which hold."""
     chosen = asked_grasps(
@@ -169,7 +169,7 @@ LOOPS = {
 }
 
 
-def check_installation(command: flags.Doctor, reporter: Reporter) -> int:
+def check_installation(command: flags.DoctorFlags, reporter: Reporter) -> int:
     """Plan and simulate a tetrahedron whose answers are known, and report all checks."""
     if command.compile:
         reporter.say("compiling all inner loops, which takes two minutes of one core")

@@ -12,7 +12,7 @@ from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
 from grasp_core.kinds import Vector
 from grasp_core.settings import types
-from sim_validate.commands.flags import PLAIN
+from sim_validate.commands.flags import BARE
 
 REGISTRY: Any = ConstructorRegistry()
 """How values of types that the parser of flags does not know are read."""
@@ -40,7 +40,7 @@ def flags_of(command: Any, prefix: str = "", *, short: bool = False) -> Iterator
         if not groups:
             yield Flag(prefix + name, command, name, kind)  # type: ignore[arg-type]
         all_short = short or OmitArgPrefixes in marks
-        inner = prefix if all_short or PLAIN in marks else f"{prefix}{name}."
+        inner = prefix if all_short or BARE in marks else f"{prefix}{name}."
         for group in groups:
             yield from flags_of(group, inner, short=all_short)
 

@@ -17,56 +17,56 @@ class Command(NamedTuple):
 
 COMMANDS: Mapping[str, Command] = {
     "run": Command(
-        "commands.simulation_flags:Run", "run:run_object",
+        "commands.simulation_flags:RunFlags", "run:run_object",
         "Plan grasps, simulate them and negative controls (contacts that must fail); write all.",
     ),
     "plan": Command(
-        "commands.flags:Plan", "planning.plan:plan_file",
+        "commands.flags:PlanFlags", "planning.plan:plan_file",
         "Find force-closure grasps of an object, each with a checked certificate of force "
         "closure.",
     ),
     "validate": Command(
-        "commands.simulation_flags:Validate", "protocols.command:judge_file",
+        "commands.simulation_flags:ValidateFlags", "protocols.command:judge_file",
         "Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must "
         "fail.",
     ),
     "execute": Command(
-        "commands.simulation_flags:Execute", "execution.command:execute_file",
+        "commands.simulation_flags:ExecuteFlags", "execution.command:execute_file",
         "Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze.",
     ),
     "scene": Command(
-        "commands.simulation_flags:Scene", "execution.command:write_scenes",
+        "commands.simulation_flags:SceneFlags", "execution.command:write_scenes",
         "Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.\n\n"
         "Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, "
         "and there is no gravity. With a mass or a density, objects have their true mass and are "
         "held under gravity, as in the command `execute`.",
     ),
     "export": Command(
-        "commands.simulation_flags:Export", "execution.command:export_grasps",
+        "commands.simulation_flags:ExportFlags", "execution.command:export_grasps",
         "Write grasps as a scene for viewers and editors of 3D scenes.",
     ),
     "view": Command(
-        "commands.flags:View", "report.command:view_grasp",
+        "commands.flags:ViewFlags", "report.command:view_grasp",
         "Look at a grasp: in MuJoCo's viewer if there is a display, or in a file.",
     ),
     "report": Command(
-        "commands.flags:Report", "report.command:report_folder",
+        "commands.flags:ReportFlags", "report.command:report_folder",
         "Write the results of a run as pages that open in a browser, without any network.",
     ),
     "regions": Command(
-        "commands.simulation_flags:Regions", "planning.regions:certify_file",
+        "commands.simulation_flags:RegionFlags", "planning.regions:certify_file",
         "Prove regions in which each finger may stand anywhere, whatever the others do.",
     ),
     "replay": Command(
-        "commands.flags:Replay", "report.command:replay_trial",
+        "commands.flags:ReplayFlags", "report.command:replay_trial",
         "Simulate one recorded trial again, and write its motion, sample by sample, and a clip.",
     ),
     "analyze": Command(
-        "commands.flags:Analyze", "planning.analyze:analyze_file",
+        "commands.flags:AnalyzeFlags", "planning.analyze:analyze_file",
         "Judge contacts of any origin: force closure with a certificate, quality, wrench limits.",
     ),
     "transfer": Command(
-        "commands.flags:Transfer", "planning.transfer:transfer_file",
+        "commands.flags:TransferFlags", "planning.transfer:transfer_file",
         "Carry grasps over to a part that has changed since they were planned, and judge them "
         "anew.",
     ),
@@ -79,39 +79,39 @@ COMMANDS: Mapping[str, Command] = {
         "Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips.",
     ),
     "dataset build": Command(
-        "datasets.flags:Build", "datasets.command:build_dataset",
+        "datasets.flags:BuildFlags", "datasets.command:build_dataset",
         "Plan and simulate grasps of many objects and write tables; run it again to resume.",
     ),
     "dataset import": Command(
-        "datasets.flags:Import", "datasets.command:import_dataset",
+        "datasets.flags:ImportFlags", "datasets.command:import_dataset",
         "Judge grasps made by another tool, simulate them, and write them as a dataset.",
     ),
     "dataset verify": Command(
-        "datasets.flags:Verify", "datasets.command:verify_dataset",
+        "datasets.flags:VerifyFlags", "datasets.command:verify_dataset",
         "Check files and rows of a dataset, prove force closure again, and redo a sample.",
     ),
     "baseline record": Command(
-        "baselines.flags:Record", "baselines.command:record_baseline",
+        "baselines.flags:RecordFlags", "baselines.command:record_baseline",
         "Simulate grasps and write a baseline: a file that records how stable each grasp is.",
     ),
     "baseline check": Command(
-        "baselines.flags:Check", "baselines.command:check_baseline",
+        "baselines.flags:CheckFlags", "baselines.command:check_baseline",
         "Simulate the grasps of a baseline again, and report how each result has changed.",
     ),
     "inspect": Command(
-        "commands.flags:Inspect", "planning.objects:inspect_object",
+        "commands.flags:InspectFlags", "planning.objects:inspect_object",
         "Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by.",
     ),
     "objects": Command(
-        "commands.flags:Objects", "planning.objects:list_objects",
+        "commands.flags:ObjectsFlags", "planning.objects:list_objects",
         "List the names of the built-in objects.",
     ),
     "schema": Command(
-        "schemas.flags:Schema", "schemas.command:show_schema",
+        "schemas.flags:SchemaFlags", "schemas.command:show_schema",
         "Print the JSON Schema of a kind of files, or list the kinds of files.",
     ),
     "doctor": Command(
-        "commands.flags:Doctor", "closure.command:check_installation",
+        "commands.flags:DoctorFlags", "closure.command:check_installation",
         "Check this installation: versions, solvers and simulator.",
     ),
 }  # fmt: skip

@@ -16,13 +16,13 @@ from sim_validate.datasets.open_dataset import CONFIG
 from sim_validate.datasets.parquet import pyarrow
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkUnit, units_of, units_sha256
-from sim_validate.datasets.writing import CONTACTS, DATA, EXTRAS, close, write_rows
+from sim_validate.datasets.writing import DATA, EXTRAS, GIVEN_CONTACTS, close, write_rows
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Setup
 from sim_validate.files.locks import entries
 from sim_validate.files.output_folders import alone_in
 
-OWN = ("staging", DATA, *EXTRAS, CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
+OWN_FILES = ("staging", DATA, *EXTRAS, GIVEN_CONTACTS, CONFIG, QUARANTINE, CARD, MANIFEST)
 """Names of all files and folders that the folder of a dataset may hold."""
 
 
@@ -75,8 +75,8 @@ SCHEMA_LINE = re.compile(r"\A#:schema .*\n")
 def _refuse_others(folder: Path, config: DatasetConfig) -> None:
     """Refuse a folder with other files, and remove half-written files of a killed build."""
     stated = folder / CONFIG
-    own = OWN if stated.is_file() else ()
-    half_written = tuple(f".{name}." for name in OWN)
+    own = OWN_FILES if stated.is_file() else ()
+    half_written = tuple(f".{name}." for name in OWN_FILES)
     for path in entries(folder):
         if path.name.startswith(half_written):
             path.unlink()

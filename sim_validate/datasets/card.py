@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scenes.drawing.pages import filled
-from sim_validate.datasets.columns import ROWS
+from sim_validate.datasets.columns import ROW_CLASSES
 from sim_validate.datasets.config import (
     KEYS,
     REFERENCES,
@@ -23,9 +23,9 @@ from sim_validate.datasets.config import (
 from sim_validate.datasets.manifest import Manifest
 
 CARD = "README.md"
-SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
+HUB_SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
 """Powers of ten, from a thousand, as the Hugging Face Hub names sizes of datasets."""
-MARKS = frozenset("\\`*_[]<>|~&#!$@")
+MARKDOWN_MARKS = frozenset("\\`*_[]<>|~&#!$@")
 """Characters that can begin Markdown or HTML within a line."""
 SPDX = re.compile(r"[A-Za-z0-9.+-]+")
 """Pattern of a licence's name in SPDX; in small letters it is that of the Hugging Face Hub, but for
@@ -69,8 +69,8 @@ def card_text(config: DatasetConfig, manifest: Manifest) -> str:
 
 def _size(rows: int) -> str:
     """Return the name that the Hugging Face Hub has for datasets of about as many rows."""
-    place = min(max(len(str(rows)) - 3, 0), len(SIZES) - 1)
-    return f"{SIZES[place - 1]}<n<{SIZES[place]}" if place else f"n<{SIZES[0]}"
+    place = min(max(len(str(rows)) - 3, 0), len(HUB_SIZES) - 1)
+    return f"{HUB_SIZES[place - 1]}<n<{HUB_SIZES[place]}" if place else f"n<{HUB_SIZES[0]}"
 
 
 def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
@@ -82,7 +82,7 @@ def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
         }
         yield {
             "name": name,
-            "row": inspect.getdoc(ROWS[name]),
+            "row": inspect.getdoc(ROW_CLASSES[name]),
             "splits": splits,
             "sorted_by": " and ".join(f"`{key}`" for key in KEYS[name]),
             "columns": columns,
@@ -99,4 +99,4 @@ def _as_address(text: str) -> str:
 def _as_markdown(text: str) -> str:
     """Write a user's text on one line, with all Markdown and HTML escaped."""
     line = "".join(letter if letter.isprintable() else " " for letter in text).strip()
-    return "".join(f"\\{letter}" if letter in MARKS else letter for letter in line)
+    return "".join(f"\\{letter}" if letter in MARKDOWN_MARKS else letter for letter in line)

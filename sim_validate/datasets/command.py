@@ -29,13 +29,13 @@ from sim_validate.datasets.open_dataset import CONFIG, splits_in_words
 from sim_validate.datasets.verify import verify
 
 
-def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
+def build_dataset(command: dataset_flags.BuildFlags, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
     config = _configuration(command)
     return _build(config, command.out, command.work, reporter)
 
 
-def _configuration(command: dataset_flags.Build) -> DatasetConfig:
+def _configuration(command: dataset_flags.BuildFlags) -> DatasetConfig:
     """Read the settings of a dataset from flags, or from the file that is given in their place."""
     first = Path(command.objects[0]) if command.objects else Path()
     if first.suffix != ".toml":
@@ -53,7 +53,7 @@ def _configuration(command: dataset_flags.Build) -> DatasetConfig:
     return replace(config, objects=_listed(config.objects))
 
 
-def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
+def import_dataset(command: dataset_flags.ImportFlags, reporter: Reporter) -> int:
     """Judge the grasps of another tool, and write the results as a dataset."""
     config = extended(
         DatasetConfig, command.content, objects=(command.object,), contacts=str(command.contacts),
@@ -62,7 +62,9 @@ def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
     return _build(config, command.out, command.work, reporter)
 
 
-def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter: Reporter) -> int:
+def _build(
+    config: DatasetConfig, out: Path, work: dataset_flags.Working, reporter: Reporter
+) -> int:
     _warn(config, reporter)
     with reporter.progress("building") as steps, _engine(work) as engine:
         built = build(config, out, engine, steps.update, work.timeout_s)
@@ -84,7 +86,7 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     return Exit.PARTIAL if manifest.quarantined else Exit.GOOD
 
 
-def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
+def _engine(work: dataset_flags.Working) -> AbstractContextManager[Engine]:
     if work.engine != "local":
         start = ray_workers if work.engine == "ray" else dask_workers
         return start(work.jobs, work.address)
@@ -96,7 +98,7 @@ def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
     return local_processes(work.jobs)
 
 
-def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
+def verify_dataset(command: dataset_flags.VerifyFlags, reporter: Reporter) -> int:
     """Check a dataset and list its faults."""
     faults = verify(command.dataset, command.share, command.seed)
     for fault in faults[:TABLE_ROWS]:

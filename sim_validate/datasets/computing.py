@@ -32,13 +32,13 @@ from sim_validate.processes.interrupts import check_interrupted
 
 Engine: TypeAlias = Processes | Cluster
 """What computes units of work: processes of this machine, or a Ray or Dask cluster."""
-AHEAD = 3
+UNITS_AHEAD = 3
 """Number of units submitted per worker process, so that no worker waits for the next unit."""
-LOOK_S = 1.0
+INTERRUPT_LOOK_S = 1.0
 """Time between two checks for an interrupt [s]."""
 
 
-Work: TypeAlias = Callable[[WorkUnit, Staging], None]
+DoUnit: TypeAlias = Callable[[WorkUnit, Staging], None]
 
 
 def do_unit(unit: WorkUnit, staging: Staging) -> None:
@@ -58,7 +58,7 @@ def do_unit(unit: WorkUnit, staging: Staging) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class UnitJob:
     """A unit of work, with all that a worker process needs to compute it."""
 
     unit: WorkUnit
@@ -67,10 +67,10 @@ class Task:
     """Versions of packages, and the hash of the code, that the worker process must have, too."""
     timeout_s: float | None = None
     """Time that the unit may take [s]; None where the process that runs the build computes it."""
-    work: Work = do_unit
+    work: DoUnit = do_unit
 
 
-def do_task(task: Task) -> None:
+def do_task(task: UnitJob) -> None:
     """Compute a unit in a worker process, and keep its rows."""
     own = provenance()
     for name, wanted in task.provenance.items():
@@ -109,16 +109,16 @@ def compute_all(
     engine: Engine,
     report: Callable[[int, int], None],
     timeout_s: float | None = None,
-    work: Work = do_unit,
+    work: DoUnit = do_unit,
 ) -> None:
     """Have all units computed; each one is kept or quarantined in the end.
 
     Takes `report` (finished, total).
     """
-    own, finished, again = dict(provenance()), 0, list[Task]()
-    tasks = [Task(unit, staging, own, timeout_s, work) for unit in units]
+    own, finished, again = dict(provenance()), 0, list[UnitJob]()
+    tasks = [UnitJob(unit, staging, own, timeout_s, work) for unit in units]
     report(finished, len(units))
-    for task, good in _ended(tasks, engine, AHEAD * engine.workers):
+    for task, good in _ended(tasks, engine, UNITS_AHEAD * engine.workers):
         again += [] if good else [task]
         finished += good
         report(finished, len(units))
@@ -133,20 +133,20 @@ def compute_all(
         report(finished, len(units))
 
 
-def _ended(tasks: Sequence[Task], engine: Engine, ahead: int) -> Iterator[tuple[Task, bool]]:
+def _ended(tasks: Sequence[UnitJob], engine: Engine, ahead: int) -> Iterator[tuple[UnitJob, bool]]:
     """Yield each task when it has ended, with whether it is done or its worker process has died."""
-    waiting, under_way = deque(tasks), dict[Future[None], Task]()
+    waiting, under_way = deque(tasks), dict[Future[None], UnitJob]()
     while waiting or under_way:
         while waiting and len(under_way) < ahead:
             task = waiting.popleft()
             under_way[engine.submit(do_task, task)] = task
-        for future in wait(under_way, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
+        for future in wait(under_way, timeout=INTERRUPT_LOOK_S, return_when=FIRST_COMPLETED).done:
             task = under_way.pop(future)
             yield task, _succeeded(future, task, engine)
         check_interrupted()
 
 
-def _succeeded(future: "Future[None]", task: Task, engine: Engine) -> bool:
+def _succeeded(future: "Future[None]", task: UnitJob, engine: Engine) -> bool:
     error = future.exception()
     if error is None:
         if task.staging.of(task.unit).is_dir():

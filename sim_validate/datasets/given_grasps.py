@@ -19,7 +19,7 @@ has its own."""
 
 
 @declared
-class GivenGrasp(Declared):
+class GraspToJudge(Declared):
     """Four contacts made by another tool, in the object's frame."""
 
     id: str
@@ -32,14 +32,14 @@ class GivenGrasp(Declared):
     """Unit vectors into the object, (4, 3)."""
 
 
-def read_given(path: Path, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
+def read_given(path: Path, *, outward: bool = False) -> tuple[GraspToJudge, ...]:
     """Read contacts made by other tools."""
     text = read_text(path)
     with about(path):
         return given_from_json(text, outward=outward)
 
 
-def given_text(given: Sequence[GivenGrasp]) -> str:
+def given_text(given: Sequence[GraspToJudge]) -> str:
     """Write given grasps as a contacts file, with normals into the object."""
     grasps = [
         {
@@ -54,7 +54,7 @@ def given_text(given: Sequence[GivenGrasp]) -> str:
     return json.dumps({"grasps": grasps}, indent=1) + "\n"
 
 
-def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ...]:
+def given_from_json(text: str, *, outward: bool = False) -> tuple[GraspToJudge, ...]:
     """Parse contacts to judge from the text of a contacts file."""
     sets = contact_sets_from_json(text, Overrides(NO_FRICTION, outward=outward))
     stated = json_of(text)
@@ -70,6 +70,6 @@ def given_from_json(text: str, *, outward: bool = False) -> tuple[GivenGrasp, ..
                 f"grasps[{row}] ({each.id}): expected 4 contacts, got {len(each.positions)}"
             )
     return tuple(
-        GivenGrasp(f"given-{i:06}", each.id, each.positions, each.normals)
+        GraspToJudge(f"given-{i:06}", each.id, each.positions, each.normals)
         for i, each in enumerate(sets)
     )

@@ -18,25 +18,25 @@ from sim_validate.closure.validate import tested
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import learning
 from sim_validate.datasets.columns import (
-    GIVEN,
+    FROM_TOOL,
     VARIED,
+    DatasetRows,
     ExecutionRow,
     GraspRow,
     ObjectRow,
-    Rows,
     TrialRow,
     VerdictCells,
 )
 from sim_validate.datasets.config import SPLITS, SplitName, id_beginning
-from sim_validate.datasets.given_grasps import GivenGrasp
+from sim_validate.datasets.given_grasps import GraspToJudge
 from sim_validate.datasets.open_dataset import mesh_path, mesh_text
-from sim_validate.datasets.parquet import Cells
+from sim_validate.datasets.parquet import RowCells
 from sim_validate.datasets.work_units import WorkUnit
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.processes.own_faults import OWN_FAULTS
 
-PLANNED = "planned"
+PLANNED_KIND = "planned"
 """Kind of the grasps that were planned for their friction."""
 
 
@@ -75,7 +75,7 @@ class _Tried:
     executed: learning.Executed = None
 
     @property
-    def cells(self) -> Cells:
+    def cells(self) -> RowCells:
         """What proof and trials say in a row."""
         verdict, proved = self.verdict, self.proved
         if isinstance(verdict, Verdict) and isinstance(proved, Grasp):
@@ -132,10 +132,10 @@ class Making:
         )  # fmt: skip
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> DatasetRows:
         """The rows of all tables."""
         own = _object_row(self.body, self.unit)
-        return Rows((own,), tuple(self.grasps), tuple(self.trials), tuple(self.executions))
+        return DatasetRows((own,), tuple(self.grasps), tuple(self.trials), tuple(self.executions))
 
     def plan(self) -> None:
         """Plan the best grasps of each family separately, and simulate them."""
@@ -146,9 +146,9 @@ class Making:
                 limit=config.limit, seed=config.seed,
             )  # fmt: skip
             for grasp in planned.grasps:
-                cells: Cells = {
+                cells: RowCells = {
                     "grasp_id": self._name(grasp.id), "name": grasp.id,
-                    "label": "grasp", "kind": PLANNED, "family": grasp.family,
+                    "label": "grasp", "kind": PLANNED_KIND, "family": grasp.family,
                     "faces": grasp.faces, "region_radius_m": grasp.radius,
                 }  # fmt: skip
                 try:
@@ -159,26 +159,27 @@ class Making:
     def judge(self) -> None:
         """Judge the given grasps; a grasp that cannot be simulated gets a row with the reason."""
         for given in self.unit.given:
-            cells: Cells = {
-                "grasp_id": self._name(given.id), "name": given.name, "label": GIVEN, "kind": GIVEN,
+            cells: RowCells = {
+                "grasp_id": self._name(given.id), "name": given.name,
+                "label": FROM_TOOL, "kind": FROM_TOOL,
             }  # fmt: skip
             try:
                 self._judge(given, cells)
             except OWN_FAULTS as error:
                 self._note(tuple(map(Contact, given.points, given.normals)), error, cells)
 
-    def _note(self, contacts: Sequence[Contact], error: Exception, cells: Cells) -> None:
+    def _note(self, contacts: Sequence[Contact], error: Exception, cells: RowCells) -> None:
         """Add the row of contacts that cannot be simulated, with the reason."""
         self.grasps.append(GraspRow(**self._about(contacts), **cells, note=str(error)))
 
-    def _judge(self, given: GivenGrasp, cells: Cells) -> None:
+    def _judge(self, given: GraspToJudge, cells: RowCells) -> None:
         """Try a given grasp; one that is not in force closure is a negative control."""
         at = seat(self.body, given.points, given.normals)
         proved = grasp_of(at, self.unit.friction, given.id)
         if isinstance(proved, Grasp):
             self._try(proved, at.body, **cells, moved_m=at.moved_m, faces=self._faces(proved))
         else:
-            control = Control(GIVEN, self.unit.friction, proved)
+            control = Control(FROM_TOOL, self.unit.friction, proved)
             verdict = try_control(at.body, control, self.agenda, Setup())
             tried = _Tried(at.body, at.contacts, proved, verdict)
             self._add(tried, **cells, moved_m=at.moved_m)
@@ -226,7 +227,7 @@ class Making:
             executed = str(error)
         return _Tried(at.body, at.contacts, proved, verdict, executed)
 
-    def _about(self, contacts: Sequence[Contact]) -> Cells:
+    def _about(self, contacts: Sequence[Contact]) -> RowCells:
         """Return the cells that are known of any contacts."""
         return {
             "object_id": self.body.content_sha256,

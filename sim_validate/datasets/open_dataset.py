@@ -28,8 +28,15 @@ from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
 from sim_validate.closure.replaying import Recorded, Wanted
-from sim_validate.datasets.columns import ROWS, GraspRow, ObjectRow, Rows, TrialRow
-from sim_validate.datasets.config import KEYS, SHORT, SPLITS, DatasetConfig, Name, config_from_toml
+from sim_validate.datasets.columns import ROW_CLASSES, DatasetRows, GraspRow, ObjectRow, TrialRow
+from sim_validate.datasets.config import (
+    ID_DIGITS,
+    KEYS,
+    SPLITS,
+    DatasetConfig,
+    Name,
+    config_from_toml,
+)
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
 from sim_validate.datasets.parquet import Columns, Tables, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
@@ -69,7 +76,7 @@ class Dataset:
 
     def rows(self, kind: type[Record], **cells: str | bool) -> Iterator[Record]:
         """Yield rows of a class, or those with some cells, without holding all in memory."""
-        name: Name = next(name for name, each in ROWS.items() if each is kind)
+        name: Name = next(name for name, each in ROW_CLASSES.items() if each is kind)
         for each in self.manifest.of_table(name, self.split):
             found = 0
             for batch in each_batch(path_inside(self.folder, each.path), name, self.tables):
@@ -83,20 +90,20 @@ class Dataset:
                     "see `graspproof dataset verify`"
                 )
 
-    def by_object(self) -> Iterator[Rows]:
+    def by_object(self) -> Iterator[DatasetRows]:
         """Yield the rows of each object in turn."""
         streams = map(self._begun, self.tables)
         for _, same in groupby(merge(*streams, key=itemgetter(0)), key=itemgetter(0)):
             rows: dict[Name, list[Any]] = {}
             for _, name, row in same:
                 rows.setdefault(name, []).append(row)
-            yield Rows(**{name: tuple(each) for name, each in rows.items()})
+            yield DatasetRows(**{name: tuple(each) for name, each in rows.items()})
 
     def _begun(self, name: Name) -> Iterator[tuple[str, Name, Any]]:
         """Yield rows with the part of their first key that all rows of an object share."""
         key = KEYS[name][0]
-        for row in self.rows(ROWS[name]):
-            yield str(getattr(row, key))[:SHORT], name, row
+        for row in self.rows(ROW_CLASSES[name]):
+            yield str(getattr(row, key))[:ID_DIGITS], name, row
 
     def surface(self, object_id: str) -> MeshFile:
         """Read the triangles of an object [m]."""
@@ -114,9 +121,11 @@ class Dataset:
         mesh, known = self.surface(object_id), None
         said = mesh.data.partition(b"\n")[0].decode("utf-8", "replace")
         with about(mesh_path(self.folder, object_id)):
-            if said.startswith(SURFACE):
+            if said.startswith(SURFACE_LINE):
                 with about("first line"):
-                    known = from_record(Surface, object_of(said.removeprefix(SURFACE), "surface"))
+                    known = from_record(
+                        Surface, object_of(said.removeprefix(SURFACE_LINE), "surface")
+                    )
             return polyhedron_from_mesh(
                 mesh.vertices, mesh.triangles, MeshChoices(faces=self.config.faces), name=name,
                 source_sha256=hashlib.sha256(mesh.data).hexdigest(), known=known,
@@ -166,7 +175,7 @@ def load_dataset(folder: str | Path, split: str | None = None) -> dict[Name, Col
 
 
 FOLDER = "meshes"
-SURFACE = "# surface "
+SURFACE_LINE = "# surface "
 """Beginning of the first line, a comment that says what is known of the triangles."""
 
 
@@ -175,7 +184,7 @@ def mesh_text(body: Polyhedron) -> str:
 
     Its first line is a comment with what is known of its surface, as in a `grasps.json`.
     """
-    said = SURFACE + json.dumps(record_of(body.surface), sort_keys=True)
+    said = SURFACE_LINE + json.dumps(record_of(body.surface), sort_keys=True)
     points = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in body.vertices.tolist()]
     triangles = [f"f {i} {j} {k}\n" for i, j, k in (body.triangles + 1).tolist()]
     return "".join([said, "\n", *points, *triangles])

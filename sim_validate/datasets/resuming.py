@@ -26,7 +26,7 @@ from sim_validate.datasets.work_units import WorkUnit
 from sim_validate.files.output_folders import whole_folder
 
 HASH = re.compile(r"[0-9a-f]{64}")
-OTHERS = "others"
+OTHER_FILES = "others"
 """Subfolder for those files of a unit that are not tables."""
 
 
@@ -75,7 +75,7 @@ class Staging:
             _file(name): parquet_bytes(name, made.rows.cells(name, columns), kinds)
             for name, columns in kinds.items()
         }
-        others = {f"{OTHERS}/{path}": text.encode() for path, text in made.files.items()}
+        others = {f"{OTHER_FILES}/{path}": text.encode() for path, text in made.files.items()}
         (row,) = made.rows.objects
         self._put(unit, {**tables, **others}, object_id=row.object_id, split=row.split)
 

@@ -22,13 +22,13 @@ from grasp_core.provenance import versions
 from grasp_core.settings import as_table
 from scenes.example_objects import example_object
 from sim_validate.datasets.config import CREDITS, DatasetConfig
-from sim_validate.datasets.given_grasps import GivenGrasp, read_given
+from sim_validate.datasets.given_grasps import GraspToJudge, read_given
 from sim_validate.planning.asked_objects import is_mesh_file
 
-PART = 25
+GIVEN_PER_UNIT = 25
 """Largest number of given grasps in one unit, which take half a minute."""
-PACKAGES = ("grasp_core", "scenes", "sim_validate")
-APART = ("objects", "frictions", "contacts", "outward", *CREDITS)
+OWN_PACKAGES = ("grasp_core", "scenes", "sim_validate")
+UNDECISIVE = ("objects", "frictions", "contacts", "outward", *CREDITS)
 """Settings that differ between units, or that decide no row."""
 
 
@@ -48,7 +48,7 @@ class WorkUnit:
     """Hash of the mesh file's bytes, or of the built-in object's mesh."""
     friction: float
     config: DatasetConfig
-    given: tuple[GivenGrasp, ...] = ()
+    given: tuple[GraspToJudge, ...] = ()
     """Grasps to judge; empty if grasps are to be planned."""
 
     @property
@@ -63,7 +63,7 @@ class WorkUnit:
     def id(self) -> str:
         """Name of the unit: 32 hexadecimal digits, the same wherever the mesh file lies."""
         table = as_table(self.config)
-        settings = {name: value for name, value in table.items() if name not in APART}
+        settings = {name: value for name, value in table.items() if name not in UNDECISIVE}
         given = json.dumps([record_of(grasp) for grasp in self.given])
         digest = hashlib.sha256(given.encode()).hexdigest()
         own = sorted(provenance().items())
@@ -83,7 +83,7 @@ def provenance() -> Mapping[str, str]:
     Apart from these, results depend only on how the processor rounds.
     """
     digest = hashlib.sha256()
-    for package in PACKAGES:
+    for package in OWN_PACKAGES:
         root = Path(str(files(package)))
         for path in sorted(root.rglob("*.py")):
             digest.update(f"{package}/{path.relative_to(root).as_posix()}\n".encode())
@@ -96,10 +96,10 @@ def units_of(config: DatasetConfig) -> list[WorkUnit]:
     """Split a configuration into units of work, each one object at one friction, sorted by name."""
     hashes = {name: _source_sha256(name) for name in config.objects}
     paths = {name: Path(name).resolve() if is_mesh_file(name) else None for name in hashes}
-    parts: list[tuple[GivenGrasp, ...]] = [()]
+    parts: list[tuple[GraspToJudge, ...]] = [()]
     if config.contacts:
         given = read_given(Path(config.contacts), outward=config.outward)
-        parts = [given[i : i + PART] for i in range(0, len(given), PART)]
+        parts = [given[i : i + GIVEN_PER_UNIT] for i in range(0, len(given), GIVEN_PER_UNIT)]
     units = [
         WorkUnit(
             name, paths[name], hashes[name], friction,

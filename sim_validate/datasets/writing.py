@@ -29,13 +29,13 @@ from sim_validate.datasets.manifest import (
 )
 from sim_validate.datasets.open_dataset import CONFIG
 from sim_validate.datasets.parquet import joined, write_files
-from sim_validate.datasets.resuming import OTHERS, Staging, UnitRecord
+from sim_validate.datasets.resuming import OTHER_FILES, Staging, UnitRecord
 from sim_validate.datasets.work_units import WorkUnit, provenance, units_sha256
 
 DATA = "data"
 TWIN = "the same object as"
 """First words of the reason why an object with the same mesh as another has no rows."""
-CONTACTS = "contacts.json"
+GIVEN_CONTACTS = "contacts.json"
 """Name of the file with the given contacts, if there are any; its normals point into the object."""
 EXTRAS = ("meshes", "scenes")
 """Folders of the files that units make besides their rows."""
@@ -54,7 +54,7 @@ def write_rows(
     good, quarantined = _sorted_out(units, staging)
     tables = _write_tables(config, good, staging, folder)
     for unit, _ in good:
-        shutil.copytree(staging.of(unit) / OTHERS, folder, dirs_exist_ok=True)
+        shutil.copytree(staging.of(unit) / OTHER_FILES, folder, dirs_exist_ok=True)
     others = [
         folder / CONFIG,
         write_text(folder / QUARANTINE, left_out_text(quarantined)),
@@ -76,7 +76,7 @@ def write_rows(
 def _write_given(folder: Path, units: Sequence[WorkUnit]) -> list[Path]:
     given = {each.id: each for unit in units for each in unit.given}
     in_order = [given[name] for name in sorted(given)]
-    return [write_text(folder / CONTACTS, given_text(in_order))] if given else []
+    return [write_text(folder / GIVEN_CONTACTS, given_text(in_order))] if given else []
 
 
 def close(folder: Path, config: DatasetConfig, manifest: Manifest) -> None:

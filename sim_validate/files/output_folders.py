@@ -9,7 +9,7 @@ from pathlib import Path
 from grasp_core.errors import InputError
 from grasp_core.files.text_files import SHOWN, UNFINISHED, remove_unfinished
 from sim_validate.files.locks import locked
-from sim_validate.files.results_folder import PARTS
+from sim_validate.files.results_folder import RESULT_FOLDERS
 
 MADE = "made"
 """Name of a folder that is being filled, inside its temporary folder."""
@@ -64,7 +64,7 @@ def alone_in(folder: Path | None) -> Generator[None]:
         with locked(folder) as alone:
             if alone is False:
                 raise _taken(folder)
-            for part in PARTS:
+            for part in RESULT_FOLDERS:
                 remove_unfinished(folder / part)
             yield
     finally:

@@ -27,17 +27,24 @@ OF_EACH_GRASP: dict[str, tuple[str, str, bytes]] = {
 }
 """Folder, ending and distinctive bytes of those files of which each grasp has one, by the file of
 results that they belong to."""
-PICTURES, CLIPS = "pictures", "clips"
-MARK = ".graspproof-report"
+PICTURE_FOLDER, CLIP_FOLDER = "pictures", "clips"
+REPORT_MARK = ".graspproof-report"
 MARKED = "The pages here were written by graspproof, which may replace them.\n"
-ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
+PLANNED_ID = re.compile(r"[bcprf](-\d+){4}[\w-]*", re.ASCII)
 """Pattern of a grasp's id, as plans name grasps; people give other ids to contacts of their own."""
 OF_REPORT = (
-    INDEX, *STATIC, "object-*.js", f"{GRASP_PAGES}/*.html", f"{PICTURES}/*.svg", f"{CLIPS}/*.webp",
+    INDEX, *STATIC, "object-*.js", f"{GRASP_PAGES}/*.html", f"{PICTURE_FOLDER}/*.svg",
+    f"{CLIP_FOLDER}/*.webp",
 )  # fmt: skip
 """Patterns of the files of a report, the first page first."""
-PAGES = ("", GRASP_PAGES, PICTURES, CLIPS)
-PARTS = ("scenes", "traces", "proofs", *PAGES, *(f"{REPORT}/{part}" for part in PAGES))
+PAGE_FOLDERS = ("", GRASP_PAGES, PICTURE_FOLDER, CLIP_FOLDER)
+RESULT_FOLDERS = (
+    "scenes",
+    "traces",
+    "proofs",
+    *PAGE_FOLDERS,
+    *(f"{REPORT}/{part}" for part in PAGE_FOLDERS),
+)
 """Subfolders into which commands write."""
 
 
@@ -50,7 +57,7 @@ def remove_results(folder: Path, file: str = GRASPS) -> None:
             part, suffix, mark = OF_EACH_GRASP[each]
             _remove([
                 path for path in (folder / part).glob(f"*{suffix}")
-                if ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
+                if PLANNED_ID.fullmatch(path.stem) or (path.is_file() and mark in path.read_bytes())
             ])  # fmt: skip
     if file == GRASPS:
         _remove([folder / BEST_PROOF])
@@ -63,7 +70,7 @@ def _remove(paths: Iterable[Path]) -> None:
 
 def require_report_folder(folder: Path) -> None:
     """Refuse to write pages into a folder that is neither empty nor a report."""
-    if folder.is_dir() and entries(folder) and not (folder / MARK).is_file():
+    if folder.is_dir() and entries(folder) and not (folder / REPORT_MARK).is_file():
         raise InputError(
             f"{folder}: this folder holds other files than a report; give another --out"
         )
@@ -79,7 +86,7 @@ def new_pages(folder: Path) -> Generator[Path]:
     earlier = (folder / INDEX).is_file()
     if not earlier:
         remove_pages(folder)
-    write_text(folder / MARK, MARKED)
+    write_text(folder / REPORT_MARK, MARKED)
     if not earlier:
         try:
             yield folder
@@ -102,11 +109,11 @@ def new_pages(folder: Path) -> Generator[Path]:
 
 def remove_report(folder: Path) -> None:
     """Remove a report, if there is one, and nothing else; its mark is removed last."""
-    if not (folder / MARK).is_file():
+    if not (folder / REPORT_MARK).is_file():
         return
     remove_pages(folder)
-    if entries(folder) == [folder / MARK]:
-        (folder / MARK).unlink()
+    if entries(folder) == [folder / REPORT_MARK]:
+        (folder / REPORT_MARK).unlink()
         with suppress(OSError):  # a command is at work in it
             folder.rmdir()
 
@@ -115,7 +122,7 @@ def remove_pages(folder: Path) -> None:
     """Remove the pages of a report, the first page first; its mark stays."""
     for pattern in OF_REPORT:
         _remove(folder.glob(pattern))
-    for kind in (GRASP_PAGES, PICTURES, CLIPS):
+    for kind in (GRASP_PAGES, PICTURE_FOLDER, CLIP_FOLDER):
         part = folder / kind
         if part.is_dir() and not any(part.iterdir()):
             part.rmdir()

@@ -14,15 +14,15 @@ MOST_LETTERS = 2**20
 """Largest number of characters of a settings file, which is usually short."""
 MOST_SAID = 200
 """Largest number of characters of what the parser says of a text."""
-ASIDE = re.compile(
+QUOTED_OR_COMMENT = re.compile(
     r'''"""(?:[^\\]|\\.)*?(?:"""|\\?\Z)|"(?:[^"\\\n]|\\.)*(?:"|\n|\\?\Z)|'''
     r"""'''.*?(?:'''|\Z)|'[^'\n]*(?:'|\n|\Z)|\#[^\n]*""",
     re.DOTALL,
 )
 """Pattern of quoted text and comments, in which dots are no key separators."""
-DEEPEST = 64
+MOST_KEY_PARTS = 64
 """Largest number of parts of a key."""
-LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
+LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_KEY_PARTS}}}")
 """Pattern of a key `a.b.c` with too many parts. The time of tomllib grows with the cube of their
 number: two minutes for a hundred kilobytes."""
 
@@ -36,8 +36,12 @@ def read_tables(path: Path) -> dict[str, Any]:
 
 def tables_of_toml(text: str) -> dict[str, Any]:
     """Parse the tables of a TOML text."""
-    if LONG_KEY.search(ASIDE.sub(lambda found: "q" if found[0][0] != "#" else "", text)):
-        raise InputError(f"a key of the TOML file has more than {DEEPEST} parts; use shorter keys")
+    if LONG_KEY.search(
+        QUOTED_OR_COMMENT.sub(lambda found: "q" if found[0][0] != "#" else "", text)
+    ):
+        raise InputError(
+            f"a key of the TOML file has more than {MOST_KEY_PARTS} parts; use shorter keys"
+        )
     try:
         found = tomllib.loads(text)
     except RecursionError as error:

@@ -16,7 +16,7 @@ from sim_validate.commands.flags import (
     AtFriction,
     FirstOnly,
     GraspId,
-    GraspsFile,
+    GraspsPath,
     Jobs,
     ProtocolName,
     Spoken,
@@ -42,7 +42,7 @@ class Hand(Spoken):
 class Reach(Spoken):
     """Flags of the command `reach`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     hand: HandName = "allegro"
     fingertips: Fingertips = ""
     grasp: GraspId = None

@@ -317,7 +317,7 @@ STEP = 10.0**-DIGITS
 """Step to which ends of a printed interval are rounded, and to which they are reproducible."""
 
 
-def analyze_file(command: flags.Analyze, reporter: Reporter) -> int:
+def analyze_file(command: flags.AnalyzeFlags, reporter: Reporter) -> int:
     """Analyse the grasps of a contacts file; an interrupted run still shows its results so far."""
     overrides = Overrides(command.friction, command.torque_scale_m, command.outward)
     text = read_text(command.contacts)

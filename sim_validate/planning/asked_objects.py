@@ -25,7 +25,7 @@ def is_mesh_file(name: str) -> bool:
     return path.suffix.lower().lstrip(".") in FORMATS or path.is_file()
 
 
-def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
+def load_object(name: str, mesh: flags.MeshFlags) -> Polyhedron:
     """Load a mesh file, or a built-in object if the name has no mesh ending."""
     path = Path(name)
     if path.suffix.lower() == ".json":
@@ -47,7 +47,7 @@ def load_object(name: str, mesh: flags.Mesh) -> Polyhedron:
             "file exists"
         )
     unlimited = replace(mesh.choices, **asdict(MeshLimits()))
-    if replace(mesh, choices=unlimited) != flags.Mesh():
+    if replace(mesh, choices=unlimited) != flags.MeshFlags():
         raise InputError(
             f"{name} is a built-in object, so leave out --unit, --scale, --faces, --patches..., "
             "--flatness-m, --largest-part and --center-of-mass-m, which say how mesh files are read"

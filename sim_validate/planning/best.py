@@ -162,7 +162,7 @@ def check_object(body: Polyhedron, planning: flags.Planning) -> None:
 
 
 def search_best(
-    body: Polyhedron, command: flags.Plan, wrenches: Array | None, stop: Stop,
+    body: Polyhedron, command: flags.PlanFlags, wrenches: Array | None, stop: Stop,
     reporter: Reporter,
 ) -> BestGrasp:  # fmt: skip
     """Search for the best grasp, for wrenches (m, 6) if asked, and show how the gap closes."""

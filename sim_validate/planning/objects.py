@@ -44,7 +44,7 @@ class ListedFace(Declared):
     center_m: Point
 
 
-def inspect_object(command: flags.Inspect, reporter: Reporter) -> int:
+def inspect_object(command: flags.InspectFlags, reporter: Reporter) -> int:
     """Show the facts about a mesh, such as its faces and mass properties."""
     body = load_object(command.object, command.mesh)
     spanning = (
@@ -124,7 +124,7 @@ def _on_faces(body: Polyhedron, facts: dict[str, Any]) -> str:
     )
 
 
-def list_objects(_: flags.Objects, reporter: Reporter) -> int:
+def list_objects(_: flags.ObjectsFlags, reporter: Reporter) -> int:
     """List the names of the built-in objects."""
     names = example_names()
     reporter.document({"objects": list(names)})

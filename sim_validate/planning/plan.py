@@ -1,6 +1,6 @@
 """Runs the command `plan`, which finds certified grasps of an object and writes them to a file.
 
-Its flags: `flags.Plan`. What --optimize, --regions and --best alone need is imported late.
+Its flags: `flags.PlanFlags`. What --optimize, --regions and --best alone need is imported late.
 """
 
 import math
@@ -163,7 +163,7 @@ def with_regions(
     return replace(found, grasps=grasps, ended=stop.why if left else found.ended)
 
 
-def plan_file(command: flags.Plan, reporter: Reporter) -> int:
+def plan_file(command: flags.PlanFlags, reporter: Reporter) -> int:
     """Plan grasps, write them to a file, and show the best of them."""
     wrenches, planning, failed = _task(command), command.planning, None
     body = object_to_plan(command.object, planning, reporter)
@@ -284,7 +284,7 @@ def say_ended(found: Plan, reporter: Reporter) -> int:
     return code
 
 
-def _task(command: flags.Plan) -> Array | None:
+def _task(command: flags.PlanFlags) -> Array | None:
     """Return the wrenches of a task, (m, 6), if it is to be done well."""
     if not command.best and (command.measure != "ferrari-canny" or command.wrenches):
         raise FlagsError(

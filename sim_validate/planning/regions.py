@@ -272,7 +272,7 @@ def _region(name: str, given: NDArray[Any], normal: Array, scale: float) -> Cont
         ) from error
 
 
-def certify_file(command: simulation_flags.Regions, reporter: Reporter) -> int:
+def certify_file(command: simulation_flags.RegionFlags, reporter: Reporter) -> int:
     """Certify independent contact regions for a file's grasps, and write them with their proofs."""
     saved = asked_grasps(
         command.grasps, reporter, grasp=command.grasp, friction=command.friction,

@@ -61,7 +61,7 @@ class TransferFile(ResultFile):
         return cls(AboutObject.of(found.old), AboutObject.of(found.new), found)
 
 
-def transfer_file(command: flags.Transfer, reporter: Reporter) -> int:
+def transfer_file(command: flags.TransferFlags, reporter: Reporter) -> int:
     """Carry the grasps of a file over to a changed part, write them, and say what has changed."""
     saved = asked_grasps(command.grasps, reporter, friction=command.friction)
     if saved is None:
@@ -120,7 +120,7 @@ def carried_to_json(found: Transfer, saved: Plan) -> str:
     return plan_to_json(found.new, plan)
 
 
-def _changed_part(command: flags.Transfer, old: Polyhedron) -> Polyhedron:
+def _changed_part(command: flags.TransferFlags, old: Polyhedron) -> Polyhedron:
     center, part = command.center_of_mass_m, Path(command.part)
     choices = extended(MeshChoices, command.limits)
     if part.suffix or part.is_file():  # a built-in object is as it is
@@ -128,7 +128,7 @@ def _changed_part(command: flags.Transfer, old: Polyhedron) -> Polyhedron:
         if center is None and (kept := same.pop("center_of_mass")) is not None:
             center = tuple(kept.tolist())
         choices = replace(choices, faces=same["faces"], largest_part=same["largest_part"])
-    mesh = flags.Mesh(command.lengths, choices, center_of_mass_m=center)
+    mesh = flags.MeshFlags(command.lengths, choices, center_of_mass_m=center)
     return load_object(command.part, mesh)
 
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-Unit = TypeVar("Unit")
+Argument = TypeVar("Argument")
 Result = TypeVar("Result")
 
-SHARE = Path("/sys/fs/cgroup/cpu.max")
+CPU_SHARE = Path("/sys/fs/cgroup/cpu.max")
 """The Linux file that limits a container's processor time: microseconds of use per period."""
 START_S = 1.0
 """Time in which a process starts [s]; work that takes less is done without others."""
@@ -25,7 +25,7 @@ def available_cores() -> int:
     allowed: Callable[[int], set[int]] | None = getattr(os, "sched_getaffinity", None)  # on Linux
     own = os.cpu_count() if allowed is None else len(allowed(0))
     try:
-        share, period = SHARE.read_text().split()
+        share, period = CPU_SHARE.read_text().split()
         return max(1, min(own or 1, int(share) // int(period)))
     except (OSError, ValueError):  # not in a container, or in one without a limit
         return own or 1
@@ -37,7 +37,7 @@ def processes(units: int, jobs: int) -> int:
 
 
 def each(
-    function: Callable[[Unit], Result], units: Sequence[Unit], *, jobs: int,
+    function: Callable[[Argument], Result], units: Sequence[Argument], *, jobs: int,
     stop: Callable[[], bool] | None = None,
 ) -> Iterator[Result]:  # fmt: skip
     """Yield the results of a function on each unit, in order, as they become ready.

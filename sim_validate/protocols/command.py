@@ -22,7 +22,7 @@ from sim_validate.protocols.published import protocol
 from sim_validate.protocols.verdict import Judgement, Judgements
 
 
-def judge_file(command: simulation_flags.Validate, reporter: Reporter) -> int:
+def judge_file(command: simulation_flags.ValidateFlags, reporter: Reporter) -> int:
     """Judge the grasps of a file by the published tests that are named, or else by our own."""
 
     def judge(saved: Plan, setup: Setup) -> tuple[Exit, Judgements]:
@@ -51,7 +51,7 @@ def judge_reach(command: hand_flags.Reach, reporter: Reporter) -> int:
 
 
 def _judged(
-    command: simulation_flags.Validate | hand_flags.Reach, saved: Plan,
+    command: simulation_flags.ValidateFlags | hand_flags.Reach, saved: Plan,
     cases: Sequence[Callable[[], Judgement]], jobs: int, reporter: Reporter,
 ) -> tuple[Exit, Judgements]:  # fmt: skip
     folder = command.out

@@ -39,7 +39,7 @@ from grasp_core.kinds import adapter, rules
 from grasp_core.messages import near, shown
 from grasp_core.settings import CHOSEN
 
-HOME = "https://example.org/graspproof"
+REPOSITORY = "https://example.org/graspproof"
 """Address of the repository, which .github/workflows/release.yml puts here."""
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 IN_FILES = re.compile(r"\b(None|NaN)\b")
@@ -55,7 +55,7 @@ class FileKind(NamedTuple):
     """Whether settings that the program chooses have no place in it."""
 
 
-KINDS: Mapping[str, FileKind] = {
+FILE_KINDS: Mapping[str, FileKind] = {
     "grasps": FileKind(GRASPS, "grasp_core.records.grasps_json:GraspsFile"),
     "best": FileKind(BEST, "sim_validate.planning.best:Best"),
     "transfer": FileKind(TRANSFER, "sim_validate.planning.transfer:TransferFile"),
@@ -82,16 +82,18 @@ KINDS: Mapping[str, FileKind] = {
 
 def address(name: str) -> str:
     """Return where the schema of a kind of files is published."""
-    return f"{HOME}/releases/latest/download/{name}.json"
+    return f"{REPOSITORY}/releases/latest/download/{name}.json"
 
 
 def named(text: str) -> str:
     """Return the short name of the kind of files that a text names, with or without its ending."""
-    names = {each.called: name for name, each in KINDS.items()} | {name: name for name in KINDS}
+    names = {each.called: name for name, each in FILE_KINDS.items()} | {
+        name: name for name in FILE_KINDS
+    }
     word = text.lower().removesuffix(".json").removesuffix(".toml")
     found = names.get(word) or names.get(f"{word}.json")
     if found is None:
-        hint = near(word, KINDS) or f"choose from {', '.join(KINDS)}"
+        hint = near(word, FILE_KINDS) or f"choose from {', '.join(FILE_KINDS)}"
         raise InputError(f"no kind of files is named {shown(text)}; {hint}")
     return found
 
@@ -99,7 +101,7 @@ def named(text: str) -> str:
 @cache
 def schema_of(name: str) -> Mapping[str, Any]:
     """Return the JSON Schema of the kind of files with a short name."""
-    called, place, by_users = KINDS[name]
+    called, place, by_users = FILE_KINDS[name]
     kind: type = resolve_name(place)
     generator = _OfUsers if by_users else _OfFiles
     made = adapter(kind).json_schema(

@@ -7,7 +7,7 @@ from sim_validate.commands.flags import Spoken
 
 
 @declared
-class Schema(Spoken):
+class SchemaFlags(Spoken):
     """Flags of the command `schema`."""
 
     kind: Positional[str | None] = None

@@ -20,7 +20,7 @@ from sim_validate.baselines.suite import suite_from_tables
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdicts
 from sim_validate.commands.config_file import flags_from
-from sim_validate.commands.simulation_flags import Run
+from sim_validate.commands.simulation_flags import RunFlags
 from sim_validate.datasets.config import DatasetConfig, config_to_toml
 from sim_validate.datasets.given_grasps import given_from_json
 from sim_validate.datasets.manifest import Listed, Manifest, left_out_from
@@ -302,6 +302,6 @@ TARGETS = (
     Target("dataset-config", _tables(DatasetConfig.of_table),
            lambda: [config_to_toml(DatasetConfig(objects=("wedge",))).encode()], _same_config,
            "toml"),
-    Target("flags", _tables(lambda tables: flags_from(tables, Run)), lambda: [FLAGS], _same_flags,
-           "toml"),
+    Target("flags", _tables(lambda tables: flags_from(tables, RunFlags)), lambda: [FLAGS],
+           _same_flags, "toml"),
 )  # fmt: skip

@@ -9,7 +9,7 @@ import trimesh
 from grasp_core.processes import local_processes
 from sim_validate.datasets import computing as workers
 from sim_validate.datasets.build import build
-from sim_validate.datasets.computing import Task, compute_all, do_task, do_unit
+from sim_validate.datasets.computing import UnitJob, compute_all, do_task, do_unit
 from sim_validate.datasets.config import DatasetConfig
 from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkerError, provenance, units_of
@@ -28,7 +28,7 @@ def staging(tmp_path):
 
 
 def task(staging, work, timeout_s=HANGING_S):
-    return Task(units_of(CONFIG)[0], staging, dict(provenance()), timeout_s, work)
+    return UnitJob(units_of(CONFIG)[0], staging, dict(provenance()), timeout_s, work)
 
 
 def sleep(*_):

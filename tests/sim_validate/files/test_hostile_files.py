@@ -143,7 +143,7 @@ def test_archives_that_lie_are_refused(case):
 
 
 def test_a_bomb_is_refused_by_what_it_claims_before_it_is_inflated(monkeypatch):
-    monkeypatch.setattr(array_files, "MOST_BYTES", 2**22)
+    monkeypatch.setattr(array_files, "MOST_ARRAY_BYTES", 2**22)
     bomb = _archive(*((f"{i}.npy", b"\0" * 2**20) for i in range(5)))
     assert len(bomb) < 2**14
     with pytest.raises(gc.InputError, match="the arrays of the npz file take"):

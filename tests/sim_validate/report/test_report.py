@@ -127,7 +127,7 @@ def test_its_commands_are_commands(small_run, small_report, asked, monkeypatch):
     assert len(lines) >= 5
     for line in lines:
         assert main(shlex.split(line)[1:]) == Exit.GOOD
-    assert {type(command).__name__ for command in asked} == {"View", "Replay"}
+    assert {type(command).__name__ for command in asked} == {"ViewFlags", "ReplayFlags"}
 
 
 @pytest.fixture
