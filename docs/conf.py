@@ -18,7 +18,7 @@ from sphinx.writers.html5 import HTML5Translator
 sys.path.insert(0, str(Path(__file__).parent))
 import api_reference
 
-from sim_validate.kit.schemas import KINDS, schema_text
+from sim_validate.schemas.file_schemas import FILE_KINDS, schema_text
 
 project = "graspproof"
 version = release = version_of("graspproof")
@@ -64,7 +64,7 @@ def write_schemas(app: Sphinx, fault: Exception | None) -> None:
     if fault is None:
         folder = Path(app.outdir, "schemas")
         folder.mkdir(exist_ok=True)
-        for name in KINDS:
+        for name in FILE_KINDS:
             (folder / f"{name}.json").write_text(schema_text(name), encoding="utf-8")
 
 

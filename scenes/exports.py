@@ -1,13 +1,4 @@
-"""Exports the grasps of a plan as one file of another program: MoveIt messages or a glTF scene.
-
-docs/files.md describes both. A moveit_msgs/Grasp is meant for one hand, so the four fingertips
-are taken as one, whose frame stands at the mean of the contacts and whose joints slide the
-fingertips. What such messages have no fields for is under `fingertips`.
-
-Sources:
-    moveit_msgs/msg/Grasp.msg and GripperTranslation.msg (github.com/moveit/moveit_msgs);
-    grasping_msgs/msg/GraspableObject.msg and Object.msg (github.com/mikeferguson/grasping_msgs).
-"""
+"""Exports the grasps of a plan as a binary glTF scene, which docs/files.md describes."""
 
 import importlib
 import math
@@ -20,32 +11,23 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.files.text_files import write_parts, write_text
+from grasp_core.files.text_files import write_parts
 from grasp_core.frames import poses_along
 from grasp_core.kinds import SMALLEST, instance, number, one_of, path_of
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
-from grasp_core.values import FINGERS, Grasp
+from grasp_core.values import Grasp
 from scenes.drawing import sheets
 from scenes.drawing.painting import approaches
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.settings import ENDINGS, GraspFormat
+from scenes.settings import EXPORT_ENDINGS, GraspFormat
 
 ROD_LENGTH = 0.5
 """Length of the rods where no free lines were planned, in object radii."""
-SPACING = 2.5
+GRID_SPACING = 2.5
 """Distance between neighbouring grasps of a grid, in object radii and rod lengths: two of each keep
 them apart, and the rest is for the fingertips."""
-Message = dict[str, Any]
-JOINTS = tuple(f"finger{finger}_{axis}" for finger in range(FINGERS) for axis in "xyz")
-MOTIONS = ("pre_grasp_approach", "post_grasp_retreat", "post_place_retreat")
-HEAD = """\
-# Grasps by four spherical fingertips: metres, newtons, vectors in the frame of the object.
-# graspable_object: a grasping_msgs/GraspableObject for a hand with joints fingerI_x, _y and _z.
-# fingertips: what such messages have no fields for.
-"""
-WIDTH = 120
-SECTIONS = 24
+ROD_SIDES = 24
 ROUGHNESS = 0.6
 
 
@@ -73,7 +55,7 @@ def placed_grasps(plan: Plan, fingertip_radius_m: float | None) -> tuple[PlacedG
     if plan.finger is not None:
         radius, length = radius or plan.finger.radius_m, plan.finger.approach_m
     columns = math.ceil(math.sqrt(len(plan)))
-    step = SPACING * (plan.body.radius + length)
+    step = GRID_SPACING * (plan.body.radius + length)
     return tuple(
         PlacedGrasp(
             grasp=grasp,
@@ -106,101 +88,6 @@ def _figures(plan: Plan, grasp: Grasp) -> Mapping[str, str | float]:
     return {"id": grasp.id, "family": grasp.family, **finite}
 
 
-def graspable_object(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> Message:
-    """Return a grasping_msgs/GraspableObject: an object with a moveit_msgs/Grasp for each grasp."""
-    return {"object": _object(body), "grasps": [_grasp(body.name, placed) for placed in grasps]}
-
-
-def _object(body: Polyhedron) -> Message:
-    mesh = {
-        "triangles": [{"vertex_indices": corners} for corners in body.triangles.tolist()],
-        "vertices": [_xyz(vertex) for vertex in body.vertices],
-    }
-    return {
-        "header": {"frame_id": body.name},
-        "name": body.name,
-        "properties": [{"name": "content_sha256", "value": body.content_sha256}],
-        "meshes": [mesh],
-        "mesh_poses": [_pose(np.zeros(3))],
-    }
-
-
-def _grasp(frame: str, placed: PlacedGrasp) -> Message:
-    grasp = placed.grasp
-    hand = grasp.positions.mean(axis=0)
-    touching = placed.rods[:, :3, 3] - hand
-    away = touching - placed.rod_length * placed.rods[:, :3, 2]
-    efforts = {"effort": grasp.witness.forces.ravel().tolist()}
-    return {
-        "id": grasp.id,
-        "pre_grasp_posture": _posture(away, {}),
-        "grasp_posture": _posture(touching, efforts),
-        "grasp_pose": {"header": {"frame_id": frame}, "pose": _pose(hand)},
-        "grasp_quality": grasp.ferrari_canny[0],
-        **{
-            name: {
-                "direction": {"header": {"frame_id": frame}, "vector": _xyz(np.zeros(3))},
-                "desired_distance": 0.0,
-                "min_distance": 0.0,
-            }
-            for name in MOTIONS
-        },
-    }
-
-
-def _posture(centers: Array, more: Message) -> Message:
-    """Return a trajectory_msgs/JointTrajectory of one point, for centres of fingertips (4, 3)."""
-    point = {"positions": centers.ravel().tolist(), **more}
-    return {"joint_names": list(JOINTS), "points": [point]}
-
-
-def _pose(place: Array) -> Message:
-    """Return a geometry_msgs/Pose that is not turned."""
-    return {"position": _xyz(place), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
-
-
-def _xyz(vector: Array) -> Message:
-    x, y, z = vector.tolist()
-    return {"x": x, "y": y, "z": z}
-
-
-def yaml_text(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> str:
-    """Return the text of a YAML file; equal grasps give equal text."""
-    try:
-        yaml: Any = importlib.import_module("yaml")
-    except ImportError as error:
-        raise InputError(
-            "writing YAML needs PyYAML: run pip install 'graspproof[moveit]' ('.[moveit]' in a "
-            "checkout), or take another format"
-        ) from error
-    document = {
-        "graspable_object": graspable_object(body, grasps),
-        "fingertips": [_fingertips(placed) for placed in grasps],
-    }
-    # meshes make long files, for which PyYAML has a compiled writer on most machines
-    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    return HEAD + yaml.dump(
-        document, Dumper=dumper, sort_keys=False, width=WIDTH, default_flow_style=None,
-        allow_unicode=True,
-    )  # fmt: skip
-
-
-def _fingertips(placed: PlacedGrasp) -> Mapping[str, object]:
-    ways = placed.rods[:, :3, 2].tolist()
-    return {
-        **placed.figures,
-        "fingertip_radius_m": placed.tip_radius,
-        "contacts": [
-            {
-                "position_m": contact.position.tolist(),
-                "normal": contact.normal.tolist(),
-                "approach_direction": way,
-            }
-            for contact, way in zip(placed.grasp.contacts, ways, strict=True)
-        ],
-    }
-
-
 def glb(body: Polyhedron, grasps: tuple[PlacedGrasp, ...]) -> bytes:
     """Return the bytes of a GLB file; equal grasps give equal bytes."""
     trimesh: Any = importlib.import_module("trimesh")
@@ -229,13 +116,13 @@ def _shapes(trimesh: Any, scene: Any, placed: PlacedGrasp, finger: int) -> tuple
     radius, length = placed.tip_radius, placed.rod_length
     tip, bar = f"tip_{finger}_{radius!r}", f"rod_{finger}_{radius!r}_{length!r}"
     if tip not in scene.geometry:
-        ball = trimesh.creation.uv_sphere(radius=radius, count=[SECTIONS // 2, SECTIONS])
+        ball = trimesh.creation.uv_sphere(radius=radius, count=[ROD_SIDES // 2, ROD_SIDES])
         ball.apply_translation([0.0, 0.0, -radius])  # it touches the origin of the contact's frame
-        scene.geometry[tip] = _painted(trimesh, ball, sheets.FINGERS[finger])
+        scene.geometry[tip] = _painted(trimesh, ball, sheets.FINGER_COLOURS[finger])
     if bar not in scene.geometry:
         segment = [[0.0, 0.0, -length], [0.0, 0.0, 0.0]]
-        made = trimesh.creation.cylinder(radius=radius, segment=segment, sections=SECTIONS)
-        scene.geometry[bar] = _painted(trimesh, made, sheets.FINGERS[finger])
+        made = trimesh.creation.cylinder(radius=radius, segment=segment, sections=ROD_SIDES)
+        scene.geometry[bar] = _painted(trimesh, made, sheets.FINGER_COLOURS[finger])
     return tip, bar
 
 
@@ -251,18 +138,16 @@ def _painted(trimesh: Any, mesh: Any, colour: str) -> Any:
 
 
 def export_grasps(
-    plan: Plan, path: str | Path, to: GraspFormat, *, fingertip_radius_m: float | None = None
-) -> Path:
+    plan: Plan, path: str | Path, to: GraspFormat = "gltf", *,
+    fingertip_radius_m: float | None = None,
+) -> Path:  # fmt: skip
     """Write the grasps of a plan for another program, as one file; equal plans give equal bytes.
-
-    `moveit` is YAML with the fields of ROS messages, which needs the extra of that name, and `gltf`
-    a binary glTF scene; docs/files.md describes them.
 
     Args:
         plan: A plan, as `gc.plan` or `gc.load_grasps` returns it; a slice or what `plan.filter`
             gives has fewer grasps.
-        path: Path of the file; missing folders are made. It ends in yaml or yml, or in glb.
-        to: The format.
+        path: Path of the file, which ends in glb; missing folders are made.
+        to: The format: `gltf`, a binary glTF scene, which docs/files.md describes.
         fingertip_radius_m: Radius of the fingertips, at most that of the object [m]; None takes
             the planned one, or a tenth of the object's radius, or less where that does not fit.
 
@@ -270,15 +155,14 @@ def export_grasps(
         The path.
 
     Raises:
-        InputError: A value is refused, the plan has no grasp, or the package that the format needs
-            is not installed.
+        InputError: A value is refused, or the plan has no grasp.
         OSError: The file cannot be written.
     """
     instance(plan, Plan, "plan", "gc.plan makes plans")
     path = path_of(path, "path")
     one_of(to, get_args(GraspFormat), "to")
-    if path.suffix.lower() not in ENDINGS[to]:
-        wanted = " or ".join(ENDINGS[to])
+    if path.suffix.lower() not in EXPORT_ENDINGS[to]:
+        wanted = " or ".join(EXPORT_ENDINGS[to])
         raise InputError(f"path must end in {wanted} for the format {to}, got {path.name[-40:]!r}")
     if fingertip_radius_m is not None:
         number(fingertip_radius_m, "fingertip_radius_m", ge=SMALLEST, le=plan.body.radius,
@@ -286,6 +170,4 @@ def export_grasps(
     if not plan.grasps:
         raise InputError("plan: expected at least one grasp to export, found none")
     placed = placed_grasps(plan, fingertip_radius_m)
-    if to == "moveit":
-        return write_text(path, yaml_text(plan.body, placed))
     return write_parts(path, [glb(plan.body, placed)])

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 MOST_ITERATIONS = 10_000
 Iterations = Annotated[int, Interval(ge=1, le=MOST_ITERATIONS)]
-Number = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]
+InBounds = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]
 Component = Annotated[float, Interval(ge=-1e4, le=1e4)]
 Field = tuple[Component, Component, Component]
 
@@ -45,7 +45,7 @@ class Softness(Settings):
         return friction, self.torsion_m, 0.0
 
 
-HARD = Softness()
+HARD_CONTACTS = Softness()
 
 
 @declared
@@ -92,8 +92,8 @@ class PhysicsSettings(Softness):
     magnetic: Field = (0.0, 0.0, 0.0)
     density: NotNegative = 0.0
     viscosity: NotNegative = 0.0
-    solref: tuple[Number, Number] = (0.004, 1.0)
-    solimp: tuple[Number, Number, Number, Number, Number] = (0.99, 0.99, 0.001, 0.5, 2.0)
+    solref: tuple[InBounds, InBounds] = (0.004, 1.0)
+    solimp: tuple[InBounds, InBounds, InBounds, InBounds, InBounds] = (0.99, 0.99, 0.001, 0.5, 2.0)
     condim: Literal[1, 3, 4, 6] = 3
     """Contact dimension of MuJoCo; 3 is a hard fingertip, which transmits no torsional friction. A
     `torsion_m` above zero makes it 4."""
@@ -167,15 +167,15 @@ last two are on elsewhere: they save time in large scenes, cost a seventh of it 
 change no bit of a motion."""
 
 
-GraspFormat: TypeAlias = Literal["moveit", "gltf"]
-ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"moveit": (".yaml", ".yml"), "gltf": (".glb",)}
+GraspFormat: TypeAlias = Literal["gltf"]
+EXPORT_ENDINGS: Mapping[GraspFormat, tuple[str, ...]] = {"gltf": (".glb",)}
 """Endings of the files that grasps are exported to, by format."""
-Surface = Literal["object", "pads"]
-Drive: TypeAlias = Literal["servo", "rigid"]
+SurfaceChoice = Literal["object", "pads"]
+DriveKind: TypeAlias = Literal["servo", "rigid"]
 
 
 @declared
-class Fingertips(Settings):
+class FingertipSettings(Settings):
     """How fingertips are built; a setting that is not given is chosen to suit the grasp."""
 
     max_normal_force_n: Quantity = 10.0
@@ -194,14 +194,14 @@ class Fingertips(Settings):
 
 
 @declared
-class FingerSettings(Fingertips):
+class FingerSettings(FingertipSettings):
     """How fingertips are built and driven; a setting that is None is chosen to suit the grasp.
 
     Raises:
         InputError: A number is out of range (1e-9 to 1e9), or a choice is unknown.
     """
 
-    drive: Annotated[Drive, CHOSEN] = "servo"
+    drive: Annotated[DriveKind, CHOSEN] = "servo"
     """How fingertips are held: pushed by servos, or rigidly fixed in place."""
     indentation: Annotated[float, Interval(ge=0.0, lt=1.0), CHOSEN] = 0.0
     """Depth of each fingertip in its face at the start, in grasp sizes; 0 means just touching."""
@@ -211,9 +211,9 @@ class FingerSettings(Fingertips):
 class ScaledScene(Settings):
     """What users choose about a scene with scaled masses, in which closure is tested."""
 
-    fingers: Fingertips = Fingertips()
-    physics: Softness = HARD
-    surface: Annotated[Surface | None, CHOSEN] = None
+    fingers: FingertipSettings = FingertipSettings()
+    physics: Softness = HARD_CONTACTS
+    surface: Annotated[SurfaceChoice | None, CHOSEN] = None
     """What fingertips touch: the object's own surface, or a flat pad at each contact; if not given,
     pads where the faces are patches of a curved surface, else the object."""
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import pytest
 
 if TYPE_CHECKING:
-    from sim_validate.baselines.part import Source
+    from sim_validate.baselines.part import SourceMesh
     from sim_validate.baselines.suite import Suite
     from sim_validate.closure.verdict import Verdict
     from sim_validate.execution.verdict import Execution
@@ -21,7 +21,7 @@ MARKER = (
     "grasp([file], *, object=None, friction=0.5, limit=1, families, cones, seed, unit): run the "
     "test with each grasp of a grasps.json, or planned for an object, as its fixture `grasp_case`"
 )
-NOTE, TOLD, WROTE = "mesh_note", "grasp_change", "baseline_written"
+NOTE, TOLD_AT_END, WROTE = "mesh_note", "grasp_change", "baseline_written"
 """Properties of tests that the terminal shows at the end: pytest carries them between processes."""
 MOST_TOLD = 40
 Properties: TypeAlias = Sequence[tuple[str, object]]
@@ -51,7 +51,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     """Collect `*.grasps.toml` files as tests."""
     if not file_path.name.endswith(ENDING):
         return None
-    kind: Any = GraspsFile  # pytest leaves the types of its constructors open
+    kind: Any = GraspSuiteFile  # pytest leaves the types of its constructors open
     return kind.from_parent(parent, path=file_path)
 
 
@@ -105,13 +105,13 @@ def sections(kept: Sequence[Properties]) -> list[tuple[str, list[str]]]:
 
 def _told(kept: Sequence[Properties], note: str, indent: str) -> list[str]:
     of_note = [given for given in map(dict, kept) if given.get(NOTE, "") == note]
-    said = sorted({str(given[TOLD]) for given in of_note if TOLD in given})
+    said = sorted({str(given[TOLD_AT_END]) for given in of_note if TOLD_AT_END in given})
     more = len(said) - MOST_TOLD
     cut = [f"and {more} more; --junitxml FILE lists all"] if more > 0 else []
     return [f"{indent}{text}" for text in (*said[:MOST_TOLD], *cut)]
 
 
-class GraspsFile(pytest.File):
+class GraspSuiteFile(pytest.File):
     """A `*.grasps.toml` file: which grasps must stay as stable as they were."""
 
     def collect(self) -> Iterator[pytest.Item]:
@@ -170,7 +170,7 @@ class GraspItem(_SuiteItem):
         fails = finding.status in (*failing(strict=suite.strict), Status.NOT_COMPARABLE)
         _note(self, "status", finding.status.value, suite.compared.mesh)
         if not fails and (told := passing(done)):
-            self.user_properties.append((TOLD, told))
+            self.user_properties.append((TOLD_AT_END, told))
         if finding.after is not None:
             self.user_properties += finding.after.properties().items()
         if fails:
@@ -210,12 +210,12 @@ def assert_stable(request: pytest.FixtureRequest) -> Callable[..., "Verdict"]:
 
     def check(*case: Any, friction: float | None = None, **asked: Any) -> "Verdict":
         """Simulate a grasp with its negative controls."""
-        from sim_validate.baselines.baseline import Entry
+        from sim_validate.baselines.baseline import KeptGrasp
         from sim_validate.baselines.suite import case_of, checked, demands_of
 
         chosen = case_of(case, friction)
         verdict, why = checked(chosen, demands_of(asked))
-        figures = Entry.of(verdict).properties()
+        figures = KeptGrasp.of(verdict).properties()
         status = "unstable" if why else "stable"
         _require(request.node, chosen.grasp.id, status, figures, chosen.source, why)
         return verdict
@@ -244,7 +244,7 @@ def assert_survives(request: pytest.FixtureRequest) -> Callable[..., "Execution"
 
 
 def _require(
-    item: pytest.Item, name: str, status: str, figures: Mapping[str, object], source: "Source",
+    item: pytest.Item, name: str, status: str, figures: Mapping[str, object], source: "SourceMesh",
     why: str,
 ) -> None:  # fmt: skip
     """Keep what a test found out about a grasp, and fail if that is not as it must be."""
@@ -254,7 +254,7 @@ def _require(
         raise UnstableError(why)
 
 
-def _note(item: pytest.Item, name: str, status: str, source: "Source | None" = None) -> None:
+def _note(item: pytest.Item, name: str, status: str, source: "SourceMesh | None" = None) -> None:
     """Keep the status of a grasp as a property of its test, and what must be known of its mesh."""
     item.user_properties.append((name, status))
     if source is not None and source.note:

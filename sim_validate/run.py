@@ -10,20 +10,15 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.records.grasps_json import plan_to_json
 from grasp_core.stopping import Stop
 from sim_validate.closure.command import prepared, simulate_grasps
+from sim_validate.commands import simulation_flags
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit, reason_of
+from sim_validate.commands.flags import ReportFlags
 from sim_validate.engine.gate import require_faithful
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.command import check_executing, execute_grasps, execution_of_run
-from sim_validate.kit import simulation_flags
-from sim_validate.kit.command_flags import Report
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit, reason_of
-from sim_validate.kit.files import (
-    REPORT,
-    alone_in,
-    remove_results,
-    require_report_folder,
-)
-from sim_validate.kit.workers import interrupts_end
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.results_folder import REPORT, remove_results, require_report_folder
 from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 from sim_validate.planning.plan import (
     plan_object,
@@ -33,6 +28,7 @@ from sim_validate.planning.plan import (
     show_gains,
     with_regions,
 )
+from sim_validate.processes.interrupts import interrupts_end
 from sim_validate.report.command import shown_report
 
 RESULTS = Path("graspproof-out")
@@ -46,7 +42,7 @@ REPORTED = 200
 """Largest number of grasps that `run` draws, in about a minute; `report` draws all."""
 
 
-def run_object(command: simulation_flags.Run, reporter: Reporter) -> int:
+def run_object(command: simulation_flags.RunFlags, reporter: Reporter) -> int:
     """Plan grasps of an object, simulate them, and write and show all results."""
     planning = command.planning
     check_executing(command)
@@ -65,7 +61,7 @@ def run_object(command: simulation_flags.Run, reporter: Reporter) -> int:
 def _run_in(
     folder: Path,
     body: Polyhedron,
-    command: simulation_flags.Run,
+    command: simulation_flags.RunFlags,
     trials: tuple[Setup, Agenda],
     reporter: Reporter,
 ) -> int:
@@ -116,12 +112,12 @@ def _run_in(
     return max(code, early)
 
 
-def _report(command: simulation_flags.Run, folder: Path, reporter: Reporter) -> None:
+def _report(command: simulation_flags.RunFlags, folder: Path, reporter: Reporter) -> None:
     """Write the results of a run as pages if asked to; a failure only gives a warning."""
     if command.no_report:
         return
     try:
-        shown_report(Report(folder, limit=REPORTED, jobs=command.testing.jobs), reporter)
+        shown_report(ReportFlags(folder, limit=REPORTED, jobs=command.testing.jobs), reporter)
     except (GraspError, OSError) as error:
         reporter.warn(f"no report: {reason_of(error)}")
 

@@ -17,11 +17,11 @@ from PIL import Image
 
 import grasp_core as gc
 import scenes
-from scenes.drawing.painting import Shape, View, best_view
-from scenes.drawing.panels import Entry, Panel, Scale, keyed
+from scenes.drawing.painting import Camera, Drawable, best_view
+from scenes.drawing.panels import Axis, KeyLine, Panel, keyed
 from scenes.drawing.pictures import (
     CONE_LENGTH,
-    SIDE,
+    PIXELS,
     Drawing,
     cone_sides,
     finger_size,
@@ -31,10 +31,10 @@ from scenes.drawing.pictures import (
     sheet_of,
 )
 from scenes.drawing.sheets import (
-    BAD,
-    FINGERS,
+    BAD_HEX,
+    FINGER_COLOURS,
     GLASS,
-    INK,
+    INK_HEX,
     Area,
     Dots,
     Line,
@@ -123,21 +123,21 @@ def planar(aside, title, *, turning=False):
     """
     half, friction, middle = 95.0, 0.35, np.array([190.0, 190.0])
     square = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    marks = [Area((middle + square,), GLASS, 0.25), outlined([middle + square], INK, 1.2)]
-    for finger, colour in enumerate(FINGERS):
+    marks = [Area((middle + square,), GLASS, 0.25), outlined([middle + square], INK_HEX, 1.2)]
+    for finger, colour in enumerate(FINGER_COLOURS):
         normal = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)][finger])
         along = np.array([-normal[1], normal[0]])
         side = 1.0 if turning or finger < 2 else -1.0
         at = middle - half * (normal + side * aside * along)
         cone = [at + 80.0 * (normal + slope * friction * along) for slope in (-1, 1)]
-        marks += [Area((np.array([at, *cone]),), colour, 0.35), Dots(at[None], INK, 3.0)]
+        marks += [Area((np.array([at, *cone]),), colour, 0.35), Dots(at[None], INK_HEX, 3.0)]
         marks += numbered(at - 24.0 * normal, 11.0, str(finger), colour)
         if not turning:
             force = 62.0 * (normal + side * aside * along)
             marks += arrow(np.array([at, at + force]), colour)
     if turning:
         angles = np.linspace(0.3, -4.4, 60)
-        marks += arrow(middle + 34.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1), INK)
+        marks += arrow(middle + 34.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1), INK_HEX)
     name = Words(middle[0], 362.0, title, "middle", 14.0)
     return Sheet(380.0, 380.0, title, (*marks, name))
 
@@ -186,16 +186,16 @@ def misplaced():
     """Share of misplaced objects that are kept, from the table of the benchmarks' page."""
     header, _, *rows = kept_by_distance()
     distances = np.array([float(cell) for cell in header[1:]])
-    panel = Panel(70.0, 28.0, 500.0, 240.0, Scale(0.0, float(distances.max())), Scale(0.0, 1.02))
+    panel = Panel(70.0, 28.0, 500.0, 240.0, Axis(0.0, float(distances.max())), Axis(0.0, 1.02))
     marks = [*panel.frame(distances.tolist(), (0.0, 0.25, 0.5, 0.75, 1.0), ".0%")]
-    for colour, (_, *cells) in zip(FINGERS, rows, strict=True):
+    for colour, (_, *cells) in zip(FINGER_COLOURS, rows, strict=True):
         counts = np.array([[int(part) for part in cell.split(" of ")] for cell in cells])
         shares = counts[:, 0] / counts[:, 1]
         marks += [
             panel.curve(distances, shares, colour),
             Dots(panel.at(distances, shares), colour, 3.5),
         ]
-    key = [Entry(row[0], colour) for colour, row in zip(FINGERS, rows, strict=True)]
+    key = [KeyLine(row[0], colour) for colour, row in zip(FINGER_COLOURS, rows, strict=True)]
     below, _ = keyed(key, 70.0, 325.0, 500.0)
     names = panel.named("misplaced objects", "distance from the expected place [mm]", "share kept")
     return Sheet(600.0, 350.0, "share kept", (*marks, *names, *below))
@@ -204,10 +204,10 @@ def misplaced():
 def placement():
     """Proved chance of closure of an icosahedron's grasps, by how far the object is off."""
     body, sizes = scenes.example_object("icosahedron"), np.arange(0.5, 6.1, 0.5)
-    panel = Panel(70.0, 28.0, 500.0, 240.0, Scale(0.0, 6.0), Scale(0.0, 1.02))
+    panel = Panel(70.0, 28.0, 500.0, 240.0, Axis(0.0, 6.0), Axis(0.0, 1.02))
     marks = [*panel.frame(np.arange(7.0), (0.0, 0.25, 0.5, 0.75, 1.0), ".2f")]
     methods = ("concurrent", "pencil", "regulus", "free")
-    for method, colour, dot in zip(methods, FINGERS, (6.0, 3.5, 3.5, 3.5), strict=True):
+    for method, colour, dot in zip(methods, FINGER_COLOURS, (6.0, 3.5, 3.5, 3.5), strict=True):
         grasp = gc.plan(body, FRICTION, families=method, limit=1).grasps[0]
         chances = []
         for size in sizes:
@@ -216,7 +216,7 @@ def placement():
             chances.append(0.0 if found is None else found.lower)
         places = panel.at(sizes, np.array(chances))
         marks += [panel.curve(sizes, np.array(chances), colour), Dots(places, colour, dot)]
-    key = [Entry(name, colour) for name, colour in zip(methods, FINGERS, strict=True)]
+    key = [KeyLine(name, colour) for name, colour in zip(methods, FINGER_COLOURS, strict=True)]
     below, _ = keyed(key, 70.0, 325.0, 500.0)
     names = panel.named(
         "object off its planned place", "standard deviation [mm and degrees]", "closed at least"
@@ -233,18 +233,22 @@ def trials():
     for place, kind in enumerate(KINDS):
         left, top = 30.0 + 300.0 * (place % 3), 30.0 + 205.0 * (place // 3)
         longest = max(float(run[kind][0][-1]) for run in runs)
-        panel = Panel(left, top, 250.0, 140.0, Scale(0.0, longest), Scale(0.0, 8.0))
-        marks += [*panel.frame(panel.x.ticks(4), (0.0, 2.0, 4.0, 6.0, 8.0)), panel.level(5.0, BAD)]
+        panel = Panel(left, top, 250.0, 140.0, Axis(0.0, longest), Axis(0.0, 8.0))
         marks += [
-            panel.curve(*run[kind], colour, 1.8) for run, colour in zip(runs, FINGERS, strict=False)
+            *panel.frame(panel.x.ticks(4), (0.0, 2.0, 4.0, 6.0, 8.0)),
+            panel.level(5.0, BAD_HEX),
+        ]
+        marks += [
+            panel.curve(*run[kind], colour, 1.8)
+            for run, colour in zip(runs, FINGER_COLOURS, strict=False)
         ]
         marks.append(Words(left, top - 14.0, f"{kind}: moved [mm]", "start", 13.0, bold=True))
     key = [
-        Entry(f"{mass_kg:g} kg", colour)
-        for mass_kg, colour in zip(MASSES_KG, FINGERS, strict=False)
+        KeyLine(f"{mass_kg:g} kg", colour)
+        for mass_kg, colour in zip(MASSES_KG, FINGER_COLOURS, strict=False)
     ]
     marks.append(Words(870.0, 425.0, "time [s]", "end"))
-    below, _ = keyed([*key, Entry("lost beyond", BAD, "dashes")], 30.0, 425.0, 700.0)
+    below, _ = keyed([*key, KeyLine("lost beyond", BAD_HEX, "dashes")], 30.0, 425.0, 700.0)
     return Sheet(900.0, 440.0, "six kinds of trials", (*marks, *below))
 
 
@@ -281,11 +285,11 @@ def changed():
     )
     plan = gc.plan(before, 0.4, limit=3)
     drawing = Drawing(before, plan["c-0-1-2-3"], 0.4)
-    shapes, view = drawing.shapes(), View.of_angles(-60.0, 25.0, before)
+    shapes, view = drawing.shapes(), Camera.of_angles(-60.0, 25.0, before)
     sheets = []
     for title, body in (("before", before), ("after: c-0-1-2-3 is gone", after)):
         shown = (*glass(body), *shapes[len(glass(before)) :])
-        sheet = sheet_of(shown, before, view, title, numbers=drawing.numbers(), side=SIDE)
+        sheet = sheet_of(shown, before, view, title, numbers=drawing.numbers(), side=PIXELS)
         sheets.append(titled(sheet, title))
     return beside(sheets)
 
@@ -306,14 +310,17 @@ def rows():
         cases.append((each.name, each.contacts, each.friction))
     sheets = []
     for name, contacts, friction in cases:
-        shapes = [*glass(body), Shape("contact", points=np.array([c.position for c in contacts]))]
+        shapes = [
+            *glass(body),
+            Drawable("contact", points=np.array([c.position for c in contacts])),
+        ]
         for contact in contacts:
             finger = int(np.linalg.norm(grasp.normals - contact.normal, axis=1).argmin())
             shapes += pin(finger, contact.position, contact.normal, size)
             sides = cone_sides(
                 contact.position, contact.normal, math.atan(friction), CONE_LENGTH * size
             )
-            shapes.append(Shape("force cone", finger, polygons=sides))
+            shapes.append(Drawable("force cone", finger, polygons=sides))
         sheets.append(titled(sheet_of(shapes, body, view, name, side=320), name))
     return beside(sheets)
 

@@ -12,7 +12,7 @@ from grasp_core.errors import InputError
 GRASPS, BEST, TRANSFER = "grasps.json", "best.json", "transfer.json"
 VERDICTS, EXECUTIONS, JUDGEMENTS = "verdicts.json", "executions.json", "judgements.json"
 REGIONS, REACHES = "regions.json", "reaches.json"
-MANIFEST, UNIT = "manifest.json", "unit.json"
+MANIFEST, UNIT, QUARANTINE = "manifest.json", "unit.json", "quarantine.jsonl"
 BASELINE, ANALYSES = "baseline", "document of analyses"
 WRENCH_FILE, CONTACTS_FILE = "wrench file", "contacts file"
 

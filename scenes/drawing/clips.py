@@ -21,11 +21,11 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array
 from grasp_core.errors import GraspError, InputError
 from grasp_core.files.text_files import write_parts
-from scenes.drawing.sheets import FINGERS, rgb
+from scenes.drawing.sheets import FINGER_COLOURS, rgb
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.held_scene import HeldScene
 
-FORMATS = (".gif", ".webp")
+CLIP_TYPES = (".gif", ".webp")
 ANGLES_DEG = (-50.0, 25.0)
 """Default azimuth and elevation of the camera [deg]."""
 SIZE = (480, 360)
@@ -34,16 +34,16 @@ RATE = 25.0
 """Frames per second of a clip."""
 SLOWER = 1.0 / (RATE * 0.01)
 """Factor by which clips of trials are slower than reality, with a sample of 10 ms in each frame."""
-NEARER = 0.9
+SHOWN_REACH = 0.9
 """Share of the fingertips' farthest reach that the picture must show: fingertips may come nearer to
 the picture's border than the object."""
-UP = np.array([0.0, 0.0, 1.0])
+UPWARD = np.array([0.0, 0.0, 1.0])
 RIGID = 7
 """Length of each row of joint positions in a scene with rigid fingertips, which holds only the pose
 of the object."""
 VISIBLE = 0.1
 """Size, in grasp sizes, to which small motions are magnified so that they are easily seen."""
-MOST = 1000.0
+MOST_ENLARGED = 1000.0
 PATIENCE_S = 300.0
 
 
@@ -58,7 +58,7 @@ def write_clip(
     layout = scene.layout
     tips = layout.holder.tips(joints[:, RIGID:])
     farthest = float(np.linalg.norm(tips, axis=2).max()) + layout.drive.radius_m
-    shown = max(layout.radius_m, NEARER * farthest)
+    shown = max(layout.radius_m, SHOWN_REACH * farthest)
     return _written(path, xml=scene.xml, joints=joints, radius=shown, caption=caption,
                     angles=np.broadcast_to(angles_deg, (len(joints), 2)))  # fmt: skip
 
@@ -75,19 +75,19 @@ def write_trial_clip(scene: Scene, joints: Array, path: Path, name: str) -> Path
 
 def write_held_clip(
     scene: HeldScene, joints: Array, path: Path, caption: str, *,
-    table: tuple[Array, Array] | None = None, up: Array = UP,
+    table: tuple[Array, Array] | None = None, up: Array = UPWARD,
 ) -> Path:  # fmt: skip
     """Draw the motion of a held object and its palm, joints (n, 13 + 3k)."""
     layout = scene.layout
     rotation: Any = importlib.import_module("scipy.spatial.transform").Rotation
-    turn = rotation.align_vectors(UP[None], up[None])[0]
+    turn = rotation.align_vectors(UPWARD[None], up[None])[0]
     drawn = joints.copy()
     drawn[:, :3] = turn.apply(joints[:, :3])
     drawn[:, 3:RIGID] = _turned(turn, joints[:, 3:RIGID])
     path_of_palm = turn.apply(joints[:, RIGID : RIGID + 3])
     tips = np.linalg.norm(layout.tip_centers, axis=1) + layout.tip_radius_m
     low, high = path_of_palm.min(axis=0), path_of_palm.max(axis=0)
-    shown = max(layout.radius_m, NEARER * float(tips.max()))
+    shown = max(layout.radius_m, SHOWN_REACH * float(tips.max()))
     parts = {"middle": 0.5 * (low + high), "palm": turn.as_quat(scalar_first=True)}
     if table is not None:
         place, quaternion = table
@@ -104,15 +104,15 @@ def _turned(turn: Any, quaternions: Array) -> Array:
 
 
 def _written(path: Path, **job_parts: Any) -> Path:
-    if path.suffix.lower() not in FORMATS:
-        raise InputError(f"{path}: a clip's name must end in {' or '.join(FORMATS)}")
+    if path.suffix.lower() not in CLIP_TYPES:
+        raise InputError(f"{path}: a clip's name must end in {' or '.join(CLIP_TYPES)}")
     if importlib.util.find_spec("PIL") is None:
         raise GraphicsError(
             "clips need Pillow: run pip install 'graspproof[clips]' ('.[clips]' in a checkout)"
         )
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder) / "job.npz", Path(folder) / f"clip{path.suffix.lower()}"
-        colours = [rgb(colour) for colour in FINGERS]
+        colours = [rgb(colour) for colour in FINGER_COLOURS]
         np.savez(job, size=SIZE, rate=RATE, colours=colours, **job_parts)
         said = ""
         for graphics in _graphics():
@@ -187,7 +187,7 @@ def magnified(joints: Array, scene: Scene) -> tuple[Array, float]:
     centers = joints[:, :3] + poses.apply(center)
     shifts, slides = centers - centers[0], joints[:, 7:] - joints[0, 7:]
     largest = float((np.linalg.norm(shifts, axis=1) + size * np.linalg.norm(turns, axis=1)).max())
-    factor = max(VISIBLE * size / max(largest, VISIBLE * size / MOST), 1.0)
+    factor = max(VISIBLE * size / max(largest, VISIBLE * size / MOST_ENLARGED), 1.0)
     power = 10.0 ** math.floor(math.log10(factor))
     factor = math.floor(factor / power) * power
     larger = rotation.from_rotvec(factor * turns)

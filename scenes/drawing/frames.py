@@ -14,11 +14,11 @@ from pathlib import Path
 import mujoco  # noqa: TID251 - this is the door to its renderer
 import numpy as np
 
-DISTANCE = 3.2
+CAMERA_RADII = 3.2
 """Distance of the camera from the scene, in radii of the part that is shown."""
 SKY, AMBIENT, DIFFUSE = (0.93, 0.95, 0.97), 0.45, 0.45
 """Colour of the background, and strengths of the ambient light and of the light from the camera."""
-INK, LETTERS = (30, 30, 40), 18
+TEXT_RGB, LETTERS = (30, 30, 40), 18
 
 
 def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
@@ -39,7 +39,7 @@ def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
     camera.lookat[:] = given.get("middle", 0.0)
     if "table" in given:
         data.mocap_pos[0], data.mocap_quat[0] = given["table"][:3], given["table"][3:]
-    camera.distance = DISTANCE * float(given["radius"])
+    camera.distance = CAMERA_RADII * float(given["radius"])
     frames, font = [], ImageFont.load_default(LETTERS)
     with mujoco.Renderer(model, height, width) as renderer:
         for joints, (azimuth, elevation) in zip(given["joints"], given["angles"], strict=True):
@@ -49,7 +49,7 @@ def draw_clip(given: Mapping[str, np.ndarray], out: str) -> None:
             mujoco.mj_kinematics(model, data)
             renderer.update_scene(data, camera)
             picture, corner = Image.fromarray(renderer.render()), (LETTERS // 2, LETTERS // 2)
-            ImageDraw.Draw(picture).text(corner, str(given["caption"]), INK, font=font)
+            ImageDraw.Draw(picture).text(corner, str(given["caption"]), TEXT_RGB, font=font)
             frames.append(picture)
     lasting = round(1000.0 / float(given["rate"]))
     frames[0].save(Path(out), save_all=True, append_images=frames[1:], duration=lasting, loop=0)

@@ -35,51 +35,51 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import first_best
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.painting import (
-    DISTANCE,
-    SAME_MERIT,
+    SAME_VIEW_MERIT,
+    VIEW_RADII,
     Alone,
+    Camera,
+    Drawable,
     Role,
-    Shape,
-    View,
     edge_on,
     least_gaps,
     views_at,
 )
 
-STEPS = 3
+QUARTER_SIDES = 3
 """Number of sides along a quarter of a circle."""
 FEWEST_CORNERS = 3
-SAME = 1e-9
+ONE_CORNER = 1e-9
 """Distance below which corners of a box of size 1 are one: far above rounding."""
 Truths: TypeAlias = NDArray[np.bool_]
-Ends: TypeAlias = tuple[bool, ...]
+BoxEnds: TypeAlias = tuple[bool, ...]
 """A truth about each axis of a box."""
-LONG, LEAST = 1.2, 2.5
+LONG, LEAST_RADII = 1.2, 2.5
 """Length of a piece of a part in thicknesses of the part, but at least so many radii of the hand's
 largest fingertip."""
-MOST_PIECES = 6
-OVERLAP = 0.02
+MOST_PART_PIECES = 6
+PIECE_OVERLAP = 0.02
 """How far a piece reaches into the next one, as a share of its length, so that no gap is seen."""
-NUMBER_BEYOND = 2.9
+NUMBER_RADII = 2.9
 """Distance of a finger's number from its contact, through the middle of the fingertip, in the
 fingertip's radii."""
-ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
+HAND_ELEVATIONS = (18, 28, 40, 0, -18, -28, -40)
 """Elevations of the views to choose from [deg]; of equally good ones the first is taken."""
 HIDDEN = 4.0
 """Fault of a view in which the hand hides all contacts."""
-BEHIND = 1.0
-ALONG = 0.8
+FAULT_BEHIND = 1.0
+FAULT_ALONG = 0.8
 """Fault of a view along the way from the middle of the hand to the object: fingers look short."""
-EDGE_ON = 0.5
+FAULT_EDGE_ON = 0.5
 """Fault of a view in which all of the object's faces are seen nearly as lines."""
-TINY = 1e-12
+LEAST_RAY_M = 1e-12
 """Least length of a ray along an axis, so that it may be divided by [m]."""
-INSIDE = 0.9
+HIDING_SHARE = 0.9
 """Share of a part's size within which it hides what is behind it: a fingertip's rim hides no
 contact."""
 
 
-WHOLE = np.ones((2, 3), dtype=bool)
+WHOLE_BOX = np.ones((2, 3), dtype=bool)
 """Ends of a rounded box of which nothing is cut off."""
 
 
@@ -94,7 +94,7 @@ def rounded_box(low: Array, high: Array, radius: float, outer: Truths) -> tuple[
     return tuple(corners[side] for side in sides)
 
 
-def _corners(low: Array, high: Array, radius: float, first: Ends, last: Ends) -> Array:
+def _corners(low: Array, high: Array, radius: float, first: BoxEnds, last: BoxEnds) -> Array:
     """Place every point of the ball, (rows * columns, 3) [m]."""
     ways, upper = _grid()
     reach = radius * np.where(upper, last, first)
@@ -102,12 +102,12 @@ def _corners(low: Array, high: Array, radius: float, first: Ends, last: Ends) ->
 
 
 @cache
-def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices, ...]:
+def _sides(long: BoxEnds, rounded: bool, first: BoxEnds, last: BoxEnds) -> tuple[Indices, ...]:
     """Return the corners of each side that has an area and is not a cut."""
     # which corners coincide does not depend on sizes, so that a box of size 1 tells
     high = np.array(long, dtype=float)
     corners = _corners(-high, high, float(rounded), first, last)
-    on_cut = np.abs(np.tile(corners, 2) - np.concatenate([-high, high])) < SAME
+    on_cut = np.abs(np.tile(corners, 2) - np.concatenate([-high, high])) < ONE_CORNER
     on_cut &= ~np.array([*first, *last])
     places = np.arange(len(corners)).reshape(_grid()[0].shape[:2])
     above, below = places[:-1], places[1:]
@@ -117,7 +117,9 @@ def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices,
     sides = list[Indices]()
     for side in (places[0], places[-1, ::-1], *around.reshape(-1, 4)):
         here = corners[side]
-        side = side[np.abs(np.roll(here, -1, axis=0) - here).max(axis=1) > SAME]  # each corner once
+        side = side[
+            np.abs(np.roll(here, -1, axis=0) - here).max(axis=1) > ONE_CORNER
+        ]  # each corner once
         if len(side) >= FEWEST_CORNERS and not on_cut[side].all(axis=0).any():
             sides.append(side)
     return tuple(sides)
@@ -126,11 +128,11 @@ def _sides(long: Ends, rounded: bool, first: Ends, last: Ends) -> tuple[Indices,
 @cache
 def _grid() -> tuple[Array, Truths]:
     """Return the points of a ball, (rows, columns, 3), and whether they are above on each axis."""
-    quarter = np.linspace(0.0, 0.5 * np.pi, STEPS + 1)
+    quarter = np.linspace(0.0, 0.5 * np.pi, QUARTER_SIDES + 1)
     heights = np.concatenate([quarter[::-1], -quarter])
-    above = np.repeat([1.0, -1.0], STEPS + 1)
+    above = np.repeat([1.0, -1.0], QUARTER_SIDES + 1)
     turns = (0.5 * np.pi * np.arange(4)[:, None] + quarter).ravel()
-    middles = np.repeat(0.5 * np.pi * np.arange(4) + 0.25 * np.pi, STEPS + 1)
+    middles = np.repeat(0.5 * np.pi * np.arange(4) + 0.25 * np.pi, QUARTER_SIDES + 1)
     flat, up = np.cos(heights)[:, None], np.sin(heights)[:, None]
     ones = np.ones((len(heights), len(turns)))
     ways = np.stack([flat * np.cos(turns), flat * np.sin(turns), up * ones], axis=-1)
@@ -251,18 +253,18 @@ def parts_of(held: PosedHand) -> HandParts:
     )
 
 
-def hand_shapes(held: PosedHand) -> tuple[Shape, ...]:
+def hand_shapes(held: PosedHand) -> tuple[Drawable, ...]:
     """Return the shapes of a hand in the object's frame, fingertips in the colours of contacts."""
-    parts, shapes = parts_of(held), list[Shape]()
-    least = LEAST * max(finger.tip.radius for finger in held.hand.fingers)
+    parts, shapes = parts_of(held), list[Drawable]()
+    least = LEAST_RADII * max(finger.tip.radius for finger in held.hand.fingers)
     for n, contact in enumerate(parts.contacts):
         role: Role = "hand" if contact is None else "fingertip"
         if (corners := parts.blocks[n]) is not None:
-            shapes.append(Shape(role, contact, polygons=_hull(corners)))
+            shapes.append(Drawable(role, contact, polygons=_hull(corners)))
             continue
         for sides in _pieces(parts.half_sizes[n], float(parts.radii[n]), least):
             placed = tuple(parts.middles[n] + side @ parts.axes[n].T for side in sides)
-            shapes.append(Shape(role, contact, polygons=placed))
+            shapes.append(Drawable(role, contact, polygons=placed))
     return tuple(shapes)
 
 
@@ -270,13 +272,13 @@ def _pieces(half: Array, radius: float, least: float) -> Iterator[tuple[Array, .
     """Yield the sides of a rounded box, cut into pieces about as long as the box is thick."""
     lengths = 2.0 * (half + radius)
     piece = max(LONG * float(lengths.min()), least)
-    counts = np.clip(np.rint(lengths / piece), 1, MOST_PIECES).astype(int)
+    counts = np.clip(np.rint(lengths / piece), 1, MOST_PART_PIECES).astype(int)
     counts[half == 0.0] = 1
     steps = 2.0 * half / counts
     for place in product(*map(range, counts.tolist())):
         at = np.array(place)
         outer = np.array([at == 0, at == counts - 1])
-        spare = OVERLAP * steps * ~outer
+        spare = PIECE_OVERLAP * steps * ~outer
         yield rounded_box(
             -half + steps * at - spare[0], -half + steps * (at + 1) + spare[1], radius, outer
         )
@@ -297,7 +299,7 @@ def numbers_behind(held: PosedHand) -> Array:
     """Return where the numbers of the fingers are written, behind the tips, (contacts, 3) [m]."""
     places = held.positions
     ways = (held.tips - places) / held.tip_radii[:, None]
-    return places + NUMBER_BEYOND * held.tip_radii[:, None] * ways
+    return places + NUMBER_RADII * held.tip_radii[:, None] * ways
 
 
 def extent_with(body: Polyhedron, parts: HandParts) -> Alone:
@@ -310,12 +312,12 @@ def extent_with(body: Polyhedron, parts: HandParts) -> Alone:
     return Alone(center, float((np.linalg.norm(middles - center, axis=1) + sizes).max()))
 
 
-def view_of_hand(body: Polyhedron, held: PosedHand) -> View:
+def view_of_hand(body: Polyhedron, held: PosedHand) -> Camera:
     """Choose a view in which contacts, object and hand are seen."""
     parts = parts_of(held)
     extent = extent_with(body, parts)
-    angles, axes = views_at(ELEVATIONS)
-    cameras = extent.center_of_mass + DISTANCE * extent.radius * axes[:, 2]
+    angles, axes = views_at(HAND_ELEVATIONS)
+    cameras = extent.center_of_mass + VIEW_RADII * extent.radius * axes[:, 2]
     centroids = np.array([face.centroid for face in body.faces])
     arms = cameras[:, None] - centroids
     facing = np.einsum("vfi,fi->vf", arms, body.normals) < 0.0  # normals point into the object
@@ -323,11 +325,11 @@ def view_of_hand(body: Polyhedron, held: PosedHand) -> View:
     covered = behind.sum(axis=1) / np.maximum(facing.sum(axis=1), 1)
     hidden = _hidden(held.positions, cameras, parts).mean(axis=1)
     apart = least_gaps(axes, np.vstack([held.positions, numbers_behind(held)]), extent)
-    merits = apart / body.radius - HIDDEN * hidden - BEHIND * covered
+    merits = apart / body.radius - HIDDEN * hidden - FAULT_BEHIND * covered
     way = body.center_of_mass - parts.middles.mean(axis=0)
-    along = np.abs(axes[:, 2] @ way) / max(float(np.linalg.norm(way)), TINY)
-    merits -= EDGE_ON * edge_on(body, axes) + ALONG * along
-    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], extent)
+    along = np.abs(axes[:, 2] @ way) / max(float(np.linalg.norm(way)), LEAST_RAY_M)
+    merits -= FAULT_EDGE_ON * edge_on(body, axes) + FAULT_ALONG * along
+    return Camera.of_angles(*angles[first_best(merits, SAME_VIEW_MERIT)], extent)
 
 
 def _hidden(points: Array, cameras: Array, parts: HandParts) -> Array:
@@ -336,13 +338,13 @@ def _hidden(points: Array, cameras: Array, parts: HandParts) -> Array:
     A ray is inside a box where it is between the two planes of each pair: from the last entry to
     the first exit. For a rounded box the box in it is taken, which a contact on it is outside of.
     """
-    sizes = INSIDE * (parts.half_sizes + parts.radii[:, None] / np.sqrt(3.0))
+    sizes = HIDING_SHARE * (parts.half_sizes + parts.radii[:, None] / np.sqrt(3.0))
     hides = np.zeros((len(cameras), len(points)), dtype=bool)
     for middle, turned, half in zip(parts.middles, parts.axes, sizes, strict=True):
         starts = (points - middle) @ turned
         ways = (cameras - middle) @ turned
         ways = ways[:, None] - starts
-        ways = np.where(np.abs(ways) < TINY, TINY, ways)
+        ways = np.where(np.abs(ways) < LEAST_RAY_M, LEAST_RAY_M, ways)
         one, two = (-half - starts) / ways, (half - starts) / ways
         enters, leaves = np.minimum(one, two).max(axis=2), np.maximum(one, two).min(axis=2)
         hides |= leaves > np.maximum(enters, 0.0)

@@ -32,10 +32,10 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.result import Plan
 from grasp_core.values import Grasp
 from scenes.drawing.hands import posed_hand
-from scenes.drawing.painting import Alone, Extent, Shape, View, look_of
+from scenes.drawing.painting import Alone, Camera, Drawable, Extent, look_of
 from scenes.drawing.pictures import (
     AZIMUTH_DEG,
-    ELEVATION_DEG,
+    OBJECT_ELEVATION_DEG,
     Drawing,
     coarse,
     glass,
@@ -47,29 +47,31 @@ from scenes.mujoco.closure_scene import Layout, Scene
 
 ASSETS = Path(__file__).parent / "assets"
 """Folder of the templates, styles and scripts of single drawings."""
-NOTHING = "-"
+NO_VALUE = "-"
 MILLION = 1e6
 """Size from which numbers are written with a power of ten."""
 OF_OBJECT = ("object", "edge")
 """Roles of what the grasps of one object share."""
-UNITS = 1000.0
+PER_RADIUS = 1000.0
 """Number of units of length in one object radius."""
 MM, CM3 = 1e3, 1e6
-WIDTH, HEIGHT = 900, 640
+PAGE_WIDTH, PAGE_HEIGHT = 900, 640
 Fact: TypeAlias = tuple[str, str, str]
 """Name, value and meaning of a figure on a page."""
 DISC = "radius of the largest disc that fits each region: there every finger may stand anywhere"
 CRITICAL = "least coefficient with which the contacts are in force closure; 0: none is needed"
-MARGIN = "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
+MARGIN_SAID = (
+    "how far inside their friction cones balanced forces can be, with normal parts of sum 1"
+)
 QUALITY = (
     "largest wrench resisted in every direction, with normal forces of sum 1 N; torques over the "
     "object's radius"
 )
-SIDE = 260
-MOST_CORNERS = 20_000
+LEGEND = 260
+MOST_DRAWN_CORNERS = 20_000
 """Largest number of points that are drawn: they take a third of a second, and a megabyte."""
-ROWS = 5
-Row = Sequence[str]
+LEGEND_ROWS = 5
+TableRow = Sequence[str]
 
 
 def filled(template: str, folder: Path = ASSETS, **values: object) -> str:
@@ -108,7 +110,7 @@ def _printed(value: object) -> object:
 def number(value: float | None, digits: int = 3) -> str:
     """Write a number for people, without powers of ten below a million; None is a dash."""
     if value is None:
-        return NOTHING
+        return NO_VALUE
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e+0" in text and abs(value) < MILLION else text
 
@@ -136,7 +138,7 @@ class Turntable(ByValue):
     def _repr_html_(self) -> str:
         """Return the page in a frame of its own, whose scripts cannot reach the notebook."""
         return (
-            f'<iframe sandbox="allow-scripts" width="{WIDTH}" height="{HEIGHT}" '
+            f'<iframe sandbox="allow-scripts" width="{PAGE_WIDTH}" height="{PAGE_HEIGHT}" '
             f'style="border:0;max-width:100%" srcdoc="{escape(self.page)}"></iframe>'
         )
 
@@ -187,7 +189,7 @@ def grasp_data(drawing: Drawing) -> dict[str, Any]:
         "numbers": _whole(drawing.numbers(), body),
         "axes": np.round(view.axes, 4).tolist(),
         "middle": _whole(view.center, body),
-        "distance": round(UNITS * view.distance / body.radius),
+        "distance": round(PER_RADIUS * view.distance / body.radius),
         "hidden": sorted({shape.role for shape in more}),
     }
 
@@ -223,7 +225,7 @@ def grasp_facts(
     disc = f"{number(MM * grasp.radius)} mm{at_plan}" if grasp.radius else "none is claimed"
     yield "Smallest independent disc", disc, DISC
     yield "Critical friction", f"{number(grasp.critical_friction)}{in_simulation}", CRITICAL
-    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN
+    yield "Margin of closure", f"{number(grasp.closure_margin)}{at_plan}", MARGIN_SAID
     lower, upper = map(number, grasp.ferrari_canny)
     between = lower if lower == upper else f"{lower} to {upper}"
     yield "Ferrari-Canny quality", f"{between} N{at_plan}", QUALITY
@@ -235,7 +237,7 @@ def as_text(data: object) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _shape(shape: Shape, body: Polyhedron) -> dict[str, Any]:
+def _shape(shape: Drawable, body: Polyhedron) -> dict[str, Any]:
     look = look_of(shape)
     points = np.empty((0, 3)) if shape.points is None else shape.points
     return {
@@ -250,7 +252,7 @@ def _shape(shape: Shape, body: Polyhedron) -> dict[str, Any]:
 
 def _whole(points: Array, body: Polyhedron) -> Any:
     """Write points in units of the drawing, as lists of any depth."""
-    return np.rint(UNITS / body.radius * (points - body.center_of_mass)).astype(int).tolist()
+    return np.rint(PER_RADIUS / body.radius * (points - body.center_of_mass)).astype(int).tolist()
 
 
 def html_of(value: object) -> str | None:
@@ -271,18 +273,20 @@ def html_of(value: object) -> str | None:
     ])  # fmt: skip
 
 
-def card(drawing: str, title: str, rows: Iterable[Row]) -> str:
+def card(drawing: str, title: str, rows: Iterable[TableRow]) -> str:
     """Put a title and a table beside a drawing."""
     return filled("card.html", drawing=drawing, title=title, rows=rows)
 
 
 def picture(
-    shapes: Sequence[Shape], extent: Extent, view: View, numbers: Array | None = None
+    shapes: Sequence[Drawable], extent: Extent, view: Camera, numbers: Array | None = None
 ) -> str:
     """Draw shapes as a small SVG element; nothing where there are too many of them."""
-    if sum(len(shape.vertices()) for shape in shapes) > MOST_CORNERS:
+    if sum(len(shape.vertices()) for shape in shapes) > MOST_DRAWN_CORNERS:
         return ""
-    return svg_of(sheet_of(shapes, extent, view, "picture", numbers=numbers, side=SIDE), paper=True)
+    return svg_of(
+        sheet_of(shapes, extent, view, "picture", numbers=numbers, side=LEGEND), paper=True
+    )
 
 
 def placed(layout: Layout) -> str:
@@ -294,13 +298,13 @@ def placed(layout: Layout) -> str:
         for finger, (tip, way) in enumerate(zip(layout.contacts, inward, strict=True))
         for shape in pin(finger, tip, way, size)
     ]
-    surface = Shape("object", polygons=tuple(coarse(layout.vertices, layout.triangles)))
-    view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, extent)
-    return picture([surface, *pins, Shape("contact", points=layout.contacts)], extent, view)
+    surface = Drawable("object", polygons=tuple(coarse(layout.vertices, layout.triangles)))
+    view = Camera.of_angles(AZIMUTH_DEG, OBJECT_ELEVATION_DEG, extent)
+    return picture([surface, *pins, Drawable("contact", points=layout.contacts)], extent, view)
 
 
 def _alone(body: Polyhedron) -> str:
-    return picture(glass(body), body, View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body))
+    return picture(glass(body), body, Camera.of_angles(AZIMUTH_DEG, OBJECT_ELEVATION_DEG, body))
 
 
 def _plan(plan: Plan) -> str:
@@ -309,10 +313,10 @@ def _plan(plan: Plan) -> str:
     if not len(plan):
         return card(_alone(body), title, [(plan.absence or "",)])
     first = Drawing(body, plan[0], plan.friction)
-    rows: list[Row] = [("grasp", "family", "radius", "closure margin")]
+    rows: list[TableRow] = [("grasp", "family", "radius", "closure margin")]
     rows += [
         (g.id, g.family, f"{MM * g.radius:.3g} mm" if g.radius else "-", f"{g.closure_margin:.4g}")
-        for g in plan[:ROWS]
+        for g in plan[:LEGEND_ROWS]
     ]
-    rows += [("...",)] if len(plan) > ROWS else []
+    rows += [("...",)] if len(plan) > LEGEND_ROWS else []
     return card(picture(first.shapes(), body, first.view(), first.numbers()), title, rows)

@@ -29,12 +29,12 @@ from grasp_core.solvers.ties import first_best
 from grasp_core.values import Grasp
 from scenes.drawing.panels import thinned
 from scenes.drawing.sheets import (
-    FINGERS,
-    FOCUS,
+    FINGER_COLOURS,
+    FOCUS_HEX,
     GLASS,
     HAND,
-    INK,
-    SURFACE,
+    INK_HEX,
+    SURFACE_HEX,
     Area,
     Dots,
     Line,
@@ -44,14 +44,14 @@ from scenes.drawing.sheets import (
     rgb,
 )
 
-DISTANCE = 9.0
+VIEW_RADII = 9.0
 """Distance of the camera, in object radii: perspective is visible, and distortion is small."""
-AZIMUTHS, ELEVATIONS = range(5, 360, 10), (18, 28, 40)
+AZIMUTHS, VIEW_ELEVATIONS = range(5, 360, 10), (18, 28, 40)
 """Azimuths and elevations of the views to choose from [deg]."""
-EDGE_ON = 0.12
+EDGE_ON_COSINE = 0.12
 """Cosine of the angle between a face's normal and the line of sight below which the face is seen
 nearly as a line."""
-SAME_MERIT = 1e-6
+SAME_VIEW_MERIT = 1e-6
 """Largest difference of merit at which two views count as equally good; the first one is then
 taken."""
 FORESHORTENED = 0.8
@@ -71,7 +71,7 @@ Extent: TypeAlias = Polyhedron | Alone
 
 
 @declared
-class View(Declared):
+class Camera(Declared):
     """A camera that looks at a point, with z of the object's frame upwards."""
 
     axes: Annotated[Array, ArrayShape(3, 3)]
@@ -85,7 +85,7 @@ class View(Declared):
         number(azimuth_deg, "azimuth_deg")
         number(elevation_deg, "elevation_deg")
         axes = _axes(math.radians(azimuth_deg), math.radians(elevation_deg))
-        return cls(axes, body.center_of_mass, DISTANCE * body.radius)
+        return cls(axes, body.center_of_mass, VIEW_RADII * body.radius)
 
     @property
     def camera(self) -> Array:
@@ -112,23 +112,23 @@ def approaches(grasp: Grasp) -> Array:
     return grasp.normals if grasp.approach_directions is None else grasp.approach_directions
 
 
-def best_view(body: Polyhedron, grasp: Grasp) -> View:
+def best_view(body: Polyhedron, grasp: Grasp) -> Camera:
     """Choose a view that keeps contacts and fingers apart and shows few faces edge-on."""
     outward = -approaches(grasp)
     ends = grasp.positions + body.radius * outward
-    angles, axes = views_at(ELEVATIONS)
+    angles, axes = views_at(VIEW_ELEVATIONS)
     fingers = axes[:, 2] @ outward.T
     apart = least_gaps(axes, np.vstack([grasp.positions, ends]), body) / body.radius
     pointing = np.maximum(np.abs(fingers) - FORESHORTENED, 0.0).sum(axis=1)
-    in_front = (fingers > SAME_MERIT).mean(axis=1)
+    in_front = (fingers > SAME_VIEW_MERIT).mean(axis=1)
     merits = apart + 0.1 * in_front - 2.0 * pointing - 0.5 * edge_on(body, axes)
-    return View.of_angles(*angles[first_best(merits, SAME_MERIT)], body)
+    return Camera.of_angles(*angles[first_best(merits, SAME_VIEW_MERIT)], body)
 
 
 def edge_on(body: Polyhedron, axes: Array) -> Array:
     """Return the share of an object's surface that is seen nearly as lines in each view, (n,)."""
     areas = np.array([face.area for face in body.faces])
-    return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON) @ areas / areas.sum()
+    return (np.abs(axes[:, 2] @ body.normals.T) < EDGE_ON_COSINE) @ areas / areas.sum()
 
 
 @cache
@@ -142,7 +142,7 @@ def views_at(elevations: tuple[int, ...]) -> tuple[list[tuple[int, int]], Array]
 def least_gaps(axes: Array, points: Array, body: Extent) -> Array:
     """Return the smallest distance between any two points (p, 3) in each picture, (n,) [m]."""
     turned = (points - body.center_of_mass) @ axes.transpose(0, 2, 1)
-    flat = turned[..., :2] * _enlarged(turned[..., 2], DISTANCE * body.radius)[..., None]
+    flat = turned[..., :2] * _enlarged(turned[..., 2], VIEW_RADII * body.radius)[..., None]
     first, second = np.triu_indices(len(points), 1)
     return np.linalg.norm(flat[:, first] - flat[:, second], axis=2).min(axis=1)
 
@@ -160,40 +160,40 @@ Near: TypeAlias = tuple[float, Mark]
 """A mark and its position along the line of sight [m]; larger values are nearer to the viewer."""
 SMOOTH_DEG = 20.0
 """Angle between the normals of two parts up to which their common edge is not drawn [deg]."""
-MOST_EDGES = 1500
+MOST_DRAWN_EDGES = 1500
 """Largest number of edges drawn; of more, as scans have them, only the sharpest are drawn."""
-SAME_POINT = 1e-6
+MERGED_CORNERS = 1e-6
 """Distance up to which two corners count as one, relative to the size of the surface."""
-LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
+LIGHT_DIRECTION = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
 """Direction towards the light, as (right, up, towards the viewer): from the left, above and in
 front."""
 DARKEST = 0.55
 """Brightness of a side that faces away from the light, as a share of its colour."""
-DASHES = 24
+DASHES_PER_WIDTH = 24
 """Number of parts, every other one drawn, in a dashed line as long as the picture is wide."""
 PIECES = 8
 """Number of parts in a solid line as long as the picture is wide; each part has its own depth."""
-FEW = 100
+FEW_POLYGONS = 100
 """Number of polygons of a surface up to which each has its own depth; of more, those that are
 equally bright and on the same side are joined."""
 SHADES = 7
 """Number of shades of joined surfaces and of round bars: hardly fewer than eight bits tell apart in
 clear glass."""
-SHORT: tuple[Role, ...] = ("friction cone",)
+SHORT_LINED: tuple[Role, ...] = ("friction cone",)
 """Roles whose lines are short, so that each is drawn whole."""
-MARGIN = 0.04
+EMPTY_MARGIN = 0.04
 """Width of the empty margin, as a share of the picture's width."""
-FARTHEST = 2.0
+CUT_RADII = 2.0
 """Distance from the object's centre beyond which points may be cut off, in object radii."""
-KEPT: tuple[Role, ...] = ("hand", "fingertip")
+NEVER_CUT: tuple[Role, ...] = ("hand", "fingertip")
 """Roles of which nothing is cut off, however far from the object it is."""
-MANY = 60
+MANY_CORNERS = 60
 """Number of corners of an area above which those that are not seen are left out."""
 POLYGON = 3
 
 
 @declared
-class Shape(Declared):
+class Drawable(Declared):
     """One thing to draw: polygons, lines and points in the object's frame, with a role."""
 
     role: Role
@@ -214,7 +214,7 @@ class Shape(Declared):
 class Window:
     """The square of what a view shows that is drawn on a sheet."""
 
-    view: View
+    view: Camera
     low: Array
     """Lower left corner of the square in the view, (2,) [m]."""
     width: float
@@ -224,16 +224,16 @@ class Window:
 
     @classmethod
     def around(
-        cls, shapes: Sequence[Shape], numbers: Array, body: Extent, view: View, side: float
+        cls, shapes: Sequence[Drawable], numbers: Array, body: Extent, view: Camera, side: float
     ) -> Self:
         """Choose the square around shapes, and around the places of numbers, (k, 3) [m]."""
         points = np.vstack([*(shape.vertices() for shape in shapes), numbers])
         distances = np.linalg.norm(points - body.center_of_mass, axis=1)
-        kept = [np.full(len(shape.vertices()), shape.role in KEPT) for shape in shapes]
+        kept = [np.full(len(shape.vertices()), shape.role in NEVER_CUT) for shape in shapes]
         hand = np.concatenate([*kept, np.full(len(numbers), any(each.any() for each in kept))])
-        flat, _ = view.seen(points[(distances <= FARTHEST * body.radius) | hand])
+        flat, _ = view.seen(points[(distances <= CUT_RADII * body.radius) | hand])
         low, high = flat.min(axis=0), flat.max(axis=0)
-        half = 0.5 * (1.0 + 2.0 * MARGIN) * float((high - low).max())
+        half = 0.5 * (1.0 + 2.0 * EMPTY_MARGIN) * float((high - low).max())
         middle = 0.5 * (low + high)
         low, high = middle - half, middle + half
         return cls(view, low, float(high[0] - low[0]), side)
@@ -250,10 +250,10 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RoleLook:
     """How shapes of one role, such as force cones, are drawn."""
 
-    colour: str = INK
+    colour: str = INK_HEX
     """Colour of shapes that are no finger's."""
     fill: float = 0.0
     """Opacity of polygons, from 0 to 1."""
@@ -270,31 +270,31 @@ class Look:
     """Whether shapes are convex bodies that nothing shines through."""
 
 
-LOOKS: dict[Role, Look] = {
-    "object": Look(GLASS, fill=0.13, shaded=True),
-    "edge": Look(line=0.18, opacity=0.75),
-    "finger": Look(fill=1.0, shaded=True, solid=True),
-    "friction cone": Look(line=0.16, opacity=0.9),
-    "force cone": Look(fill=0.28),
-    "region": Look(fill=0.6),
-    "line of force": Look(line=0.3, dashed=True),
-    "focus": Look(FOCUS, dot=1.9),
-    "plane": Look(SURFACE, fill=0.16, line=0.3),
-    "ruled surface": Look(SURFACE, fill=0.1, line=0.1, opacity=0.5),
-    "contact": Look(dot=1.2),
-    "hand": Look(HAND, fill=1.0, shaded=True, solid=True),
-    "fingertip": Look(HAND, fill=1.0, shaded=True, solid=True),
+LOOKS: dict[Role, RoleLook] = {
+    "object": RoleLook(GLASS, fill=0.13, shaded=True),
+    "edge": RoleLook(line=0.18, opacity=0.75),
+    "finger": RoleLook(fill=1.0, shaded=True, solid=True),
+    "friction cone": RoleLook(line=0.16, opacity=0.9),
+    "force cone": RoleLook(fill=0.28),
+    "region": RoleLook(fill=0.6),
+    "line of force": RoleLook(line=0.3, dashed=True),
+    "focus": RoleLook(FOCUS_HEX, dot=1.9),
+    "plane": RoleLook(SURFACE_HEX, fill=0.16, line=0.3),
+    "ruled surface": RoleLook(SURFACE_HEX, fill=0.1, line=0.1, opacity=0.5),
+    "contact": RoleLook(dot=1.2),
+    "hand": RoleLook(HAND, fill=1.0, shaded=True, solid=True),
+    "fingertip": RoleLook(HAND, fill=1.0, shaded=True, solid=True),
 }
 
 
-def look_of(shape: Shape) -> Look:
+def look_of(shape: Drawable) -> RoleLook:
     """Return how a shape is drawn: as others of its role, in the colour of its finger."""
     look = LOOKS[shape.role]
-    return look if shape.finger is None else replace(look, colour=FINGERS[shape.finger])
+    return look if shape.finger is None else replace(look, colour=FINGER_COLOURS[shape.finger])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface:
+class DrawnSurface:
     """Polygons of a closed surface, corners counter-clockwise as seen from outside."""
 
     corners: Array
@@ -309,12 +309,12 @@ class Surface:
     """Unit normals, outwards, (polygons, 3); zero for polygons without area."""
 
     @classmethod
-    def of(cls, polygons: Sequence[Array]) -> "Surface":
+    def of(cls, polygons: Sequence[Array]) -> "DrawnSurface":
         """Number the corners of polygons, and measure their normals."""
         corners = np.vstack(polygons)
         counts = np.array([len(polygon) for polygon in polygons])
         size = float(np.ptp(corners, axis=0).max())
-        places = np.rint(corners / (SAME_POINT * size)).astype(np.int64)
+        places = np.rint(corners / (MERGED_CORNERS * size)).astype(np.int64)
         names = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
         ends, following = np.cumsum(counts), np.arange(1, len(corners) + 1)
         following[ends - 1] = ends - counts
@@ -349,13 +349,13 @@ class Surface:
 
 def feature_edges(polygons: Sequence[Array]) -> Array:
     """Find the edges at which a surface is bent, the sharpest first, (k, 2, 3) [m]."""
-    surface = Surface.of(polygons)
+    surface = DrawnSurface.of(polygons)
     places, _, angles = surface.edges()
-    order = np.argsort(-angles, kind="stable")[:MOST_EDGES]
+    order = np.argsort(-angles, kind="stable")[:MOST_DRAWN_EDGES]
     return surface.segments(places[order[angles[order] > math.radians(SMOOTH_DEG)]])
 
 
-def outline(surface: Surface, camera: Array) -> Array:
+def outline(surface: DrawnSurface, camera: Array) -> Array:
     """Find the smooth edges between polygons that face the camera and others, (k, 2, 3) [m]."""
     one, two, angles = surface.edges()
     front = surface.facing(camera)
@@ -363,7 +363,7 @@ def outline(surface: Surface, camera: Array) -> Array:
     return surface.segments(one[between & (angles <= math.radians(SMOOTH_DEG))])
 
 
-def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
+def joined(surface: DrawnSurface, chosen: Array) -> tuple[Array, ...]:
     """Join polygons of a surface that meet, and return the loops around them, each (k, 3) [m]."""
     places = np.flatnonzero(chosen[surface.owners])
     first, second = surface.names[places], surface.names[surface.following[places]]
@@ -385,7 +385,7 @@ def joined(surface: Surface, chosen: Array) -> tuple[Array, ...]:
     return tuple(loops)
 
 
-def painted(shapes: Iterable[Shape], window: Window) -> Iterator[Mark]:
+def painted(shapes: Iterable[Drawable], window: Window) -> Iterator[Mark]:
     """Yield the marks of a picture, in the order to draw them; lines that look alike are joined."""
     parts = [part for shape in shapes for part in _parts(shape, window)]
     marks = [mark for _, mark in sorted(parts, key=lambda each: each[0])]
@@ -400,16 +400,16 @@ def painted(shapes: Iterable[Shape], window: Window) -> Iterator[Mark]:
             yield Line(lines, *look)
 
 
-def _parts(shape: Shape, window: Window) -> Iterator[Near]:
+def _parts(shape: Drawable, window: Window) -> Iterator[Near]:
     look = look_of(shape)
     if look.fill and shape.polygons:
         paint = _solid if look.solid else FILLED.get(shape.role, _each)
         yield from paint(shape, look, window)
     if shape.role == "object" and shape.polygons:
-        for line in outline(Surface.of(shape.polygons), window.view.camera):
+        for line in outline(DrawnSurface.of(shape.polygons), window.view.camera):
             yield from _line(line, LOOKS["edge"], window)
     for line in shape.lines if look.line else ():
-        if shape.role in SHORT:
+        if shape.role in SHORT_LINED:
             flat, near = window.seen(line)
             yield float(near.mean()), Line((flat,), look.colour, _thick(look, window), look.opacity)
         else:
@@ -421,7 +421,7 @@ def _parts(shape: Shape, window: Window) -> Iterator[Near]:
         yield float(near) + 0.02 * window.width, dot
 
 
-def _thick(look: Look, window: Window) -> float:
+def _thick(look: RoleLook, window: Window) -> float:
     """Return how wide lines are on the sheet [pixels]."""
     return round(0.01 * look.line * window.side, 3)
 
@@ -429,12 +429,12 @@ def _thick(look: Look, window: Window) -> float:
 def _area(flats: Iterable[Array], colour: str, opacity: float, window: Window) -> Area:
     """Fill loops of places in the view [m], without corners that would not be seen."""
     loops = tuple(map(window.place, flats))
-    if sum(map(len, loops)) > MANY:
+    if sum(map(len, loops)) > MANY_CORNERS:
         loops = tuple(thinned(closed(loop))[:-1] for loop in loops)
     return Area(tuple(loop for loop in loops if len(loop) >= POLYGON), colour, opacity)
 
 
-def _each(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
+def _each(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
     bright = _brightness(_normals(shape.polygons), window.view).tolist()
     for polygon, shade in zip(shape.polygons, bright, strict=True):
         flat, near = window.view.seen(polygon)
@@ -442,12 +442,12 @@ def _each(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
         yield float(near.mean()), _area([flat], colour, look.fill, window)
 
 
-def _glass(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
+def _glass(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
     """Draw a clear surface; of many polygons, those that look alike are joined."""
-    if len(shape.polygons) <= FEW:
+    if len(shape.polygons) <= FEW_POLYGONS:
         yield from _each(shape, look, window)
         return
-    surface, view = Surface.of(shape.polygons), window.view
+    surface, view = DrawnSurface.of(shape.polygons), window.view
     front = surface.facing(view.camera)
     levels = _levels(_brightness(surface.normals, view))
     nearness = view.seen(surface.corners)[1]
@@ -460,7 +460,7 @@ def _glass(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
             yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
 
 
-def _solid(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
+def _solid(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
     """Draw a convex body: its outline, and on it the sides that face the viewer."""
     corners, view = shape.vertices(), window.view
     flat, near = view.seen(corners)
@@ -480,14 +480,14 @@ def _solid(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
         yield depth, _area(flats, _shaded(look.colour, _shade(level)), look.fill, window)
 
 
-def _cone(shape: Shape, look: Look, window: Window) -> Iterator[Near]:
+def _cone(shape: Drawable, look: RoleLook, window: Window) -> Iterator[Near]:
     rim = np.array([polygon[1] for polygon in shape.polygons])
     flat, near = window.view.seen(shape.vertices())
     for part in (convex_hull(flat), window.view.seen(rim)[0]):
         yield float(near.mean()), _area([part], look.colour, look.fill, window)
 
 
-FILLED: dict[Role, Callable[[Shape, Look, Window], Iterator[Near]]] = {
+FILLED: dict[Role, Callable[[Drawable, RoleLook, Window], Iterator[Near]]] = {
     "object": _glass, "force cone": _cone,
 }  # fmt: skip
 """How areas of some roles are drawn, other than each on its own."""
@@ -501,10 +501,10 @@ def _normals(polygons: Sequence[Array]) -> Array:
     return normals / np.maximum(lengths, np.finfo(np.float64).tiny)
 
 
-def _brightness(normals: Array, view: View) -> Array:
+def _brightness(normals: Array, view: Camera) -> Array:
     """Compute the brightness of flat sides from their angle to the light, `DARKEST` to 1, (k,)."""
     seen = normals @ view.axes.T
-    facing = np.where(seen[:, 2] > 0.0, 1.0, -1.0) * (seen @ LIGHT)
+    facing = np.where(seen[:, 2] > 0.0, 1.0, -1.0) * (seen @ LIGHT_DIRECTION)
     bright = DARKEST + (1.0 - DARKEST) * np.maximum(facing, 0.0)
     return np.where(seen.any(axis=1), bright, 1.0)
 
@@ -522,7 +522,7 @@ def _shaded(colour: str, shade: float) -> str:
     return colour if shade >= 1.0 else hexed(tuple(shade * part for part in rgb(colour)))
 
 
-def _line(line: Array, look: Look, window: Window) -> Iterator[Near]:
+def _line(line: Array, look: RoleLook, window: Window) -> Iterator[Near]:
     flat, near = window.view.seen(line)
     nearer, thick = 0.005 * look.line * window.width, _thick(look, window)
     for start, end, first, last in zip(flat, flat[1:], near, near[1:], strict=False):
@@ -534,10 +534,10 @@ def _line(line: Array, look: Look, window: Window) -> Iterator[Near]:
                 yield depth, Line((window.place(ends),), look.colour, thick, look.opacity)
 
 
-def _spans(length: float, look: Look) -> Sequence[tuple[float, float]]:
+def _spans(length: float, look: RoleLook) -> Sequence[tuple[float, float]]:
     """Return which parts of a line are drawn, each as two shares of the line's length."""
     if look.dashed:
-        count = 2 * max(round(0.5 * DASHES * length), 1) + 1
+        count = 2 * max(round(0.5 * DASHES_PER_WIDTH * length), 1) + 1
         return [(part / count, (part + 1) / count) for part in range(0, count, 2)]
     count = max(round(PIECES * length), 1)
     return [(part / count, (part + 1) / count) for part in range(count)]

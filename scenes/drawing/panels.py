@@ -10,23 +10,23 @@ import numpy as np
 from grasp_core.arrays import Array
 from scenes.drawing.sheets import LETTER, NEUTRAL, Area, Dots, Line, Mark, Sheet, Words, ink_line
 
-NARROW, WIDE = set("ijl.,:;|'!fItr()[] -"), set("mwMW@%+=<>≤")
+NARROW_LETTERS, WIDE = set("ijl.,:;|'!fItr()[] -"), set("mwMW@%+=<>≤")
 NARROW_WIDTH, USUAL_WIDTH, WIDE_WIDTH = 0.42, 0.66, 1.0
 """Widths of letters in DejaVu Sans, the widest of common fonts, in letter sizes."""
 LONG_RANGE = 300.0
 """Ratio of an axis's ends above which the axis shows only powers of ten."""
 NICE = (1.0, 2.0, 5.0, 10.0)
 """Steps between ticks, times powers of ten."""
-EDGE = 8.0
-TICK = 4.0
-SMALL = 11.0
+PANEL_EDGE = 8.0
+TICK_WAY = 4.0
+SMALL_TYPE = 11.0
 ROW, SAMPLE = 16.0, 18.0
-EVEN = 0.2
+CURVE_TOLERANCE = 0.2
 """Distance by which a drawn curve may miss its points [pixels]."""
 Marker: TypeAlias = Literal["disc", "square", "cross"]
 Kind: TypeAlias = Literal["line", "dashes", "area"] | Marker
 """What stands beside a text of a key."""
-CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
+MARKER_CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
     "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
     "cross": ((-0.5, 0.0), (-1.0, -0.5), (-0.5, -1.0), (0.0, -0.5), (0.5, -1.0), (1.0, -0.5),
               (0.5, 0.0), (1.0, 0.5), (0.5, 1.0), (0.0, 0.5), (-0.5, 1.0), (-1.0, 0.5)),
@@ -37,13 +37,13 @@ CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
 def width_of(text: str, size: float) -> float:
     """Return a width that the text does not exceed in fonts that readers may have [pixels]."""
     return size * sum(
-        NARROW_WIDTH if letter in NARROW else WIDE_WIDTH if letter in WIDE else USUAL_WIDTH
+        NARROW_WIDTH if letter in NARROW_LETTERS else WIDE_WIDTH if letter in WIDE else USUAL_WIDTH
         for letter in text
     )
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class Axis:
     """The range of an axis."""
 
     low: float
@@ -74,7 +74,7 @@ class Scale:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class KeyLine:
     """A line of a key: what a colour stands for."""
 
     text: str
@@ -90,8 +90,8 @@ class Panel:
     top: float
     width: float
     height: float
-    x: Scale
-    y: Scale
+    x: Axis
+    y: Axis
 
     def at(self, x: Array, y: Array) -> Array:
         """Find where points are on the sheet, (k, 2); those beyond an axis are at its end."""
@@ -126,28 +126,30 @@ class Panel:
         faint = list[Array]()
         for value in x_ticks:
             x = left + self.width * float(self.x.shares(np.array(value)))
-            yield ink_line([(x, low), (x, low + TICK)])
-            yield Words(x, low + TICK + 0.8 * SMALL, f"{value:g}", "middle", SMALL)
+            yield ink_line([(x, low), (x, low + TICK_WAY)])
+            yield Words(x, low + TICK_WAY + 0.8 * SMALL_TYPE, f"{value:g}", "middle", SMALL_TYPE)
         for value in y_ticks:
             y = low - self.height * float(self.y.shares(np.array(value)))
-            yield ink_line([(left - TICK, y), (left, y)])
-            yield Words(left - TICK - 2.0, y, f"{value:{y_form}}", "end", SMALL)
+            yield ink_line([(left - TICK_WAY, y), (left, y)])
+            yield Words(left - TICK_WAY - 2.0, y, f"{value:{y_form}}", "end", SMALL_TYPE)
             faint.append(np.array([[left, y], [right, y]]))
         yield Line(tuple(faint), NEUTRAL, 0.5, 0.35)
 
     def named(self, title: str, across: str, up: str) -> Iterator[Words]:
         """Write the title of the panel, and the names of its axes."""
         middle = self.left + 0.5 * self.width
-        yield Words(EDGE, self.top - LETTER, title, bold=True)
+        yield Words(PANEL_EDGE, self.top - LETTER, title, bold=True)
         if across:
-            low = self.top + self.height + TICK + 2.4 * SMALL
-            yield Words(middle, low, across, "middle", SMALL)
+            low = self.top + self.height + TICK_WAY + 2.4 * SMALL_TYPE
+            yield Words(middle, low, across, "middle", SMALL_TYPE)
         if up:
-            yield Words(SMALL, self.top + 0.5 * self.height, up, "middle", SMALL, upwards=True)
+            yield Words(
+                SMALL_TYPE, self.top + 0.5 * self.height, up, "middle", SMALL_TYPE, upwards=True
+            )
 
     def sheet(
         self, size: tuple[float, float], names: tuple[str, str, str], marks: Iterable[Mark],
-        entries: Sequence[Entry], *, key_height: float = 2.0 * ROW, name: str = "",
+        entries: Sequence[KeyLine], *, key_height: float = 2.0 * ROW, name: str = "",
     ) -> Sheet:  # fmt: skip
         """Put marks, names and a key at the bottom on a sheet [pixels], called as the panel is."""
         width, height = size
@@ -155,20 +157,22 @@ class Panel:
         return Sheet(width, height, name or names[0], (*marks, *self.named(*names), *key))
 
 
-def keyed(entries: Sequence[Entry], left: float, top: float, wide: float) -> tuple[list[Mark], int]:
+def keyed(
+    entries: Sequence[KeyLine], left: float, top: float, wide: float
+) -> tuple[list[Mark], int]:
     """Lay out a key in rows that are at most so wide; return its marks and the number of rows."""
     marks, x, row = list[Mark](), left, 0
     for entry in entries:
-        long = SAMPLE + 6.0 + width_of(entry.text, SMALL) + 10.0
+        long = SAMPLE + 6.0 + width_of(entry.text, SMALL_TYPE) + 10.0
         if x > left and x + long - 10.0 > left + wide:
             x, row = left, row + 1
         y = top + (row + 0.5) * ROW
-        marks += [*_sample(entry, x, y), Words(x + SAMPLE + 6.0, y, entry.text, size=SMALL)]
+        marks += [*_sample(entry, x, y), Words(x + SAMPLE + 6.0, y, entry.text, size=SMALL_TYPE)]
         x += long
     return marks, row + 1
 
 
-def _sample(entry: Entry, x: float, y: float) -> Iterable[Mark]:
+def _sample(entry: KeyLine, x: float, y: float) -> Iterable[Mark]:
     if entry.kind == "area":
         box = [(x, y - 5.0), (x + SAMPLE, y - 5.0), (x + SAMPLE, y + 5.0), (x, y + 5.0)]
         return [Area((np.array(box),), entry.colour, 0.3)]
@@ -182,7 +186,7 @@ def marker(kind: Marker, center: Array, size: float, colour: str) -> Mark:
     """Draw a marker of a shape."""
     if kind == "disc":
         return Dots(center[None], colour, size)
-    return Area((center + size * np.array(CORNERS[kind]),), colour)
+    return Area((center + size * np.array(MARKER_CORNERS[kind]),), colour)
 
 
 def thinned(points: Array) -> Array:
@@ -204,7 +208,7 @@ def thinned(points: Array) -> Array:
             np.hypot(*arms.T)
         )  # fmt: skip
         worst = int(away.argmax())
-        if away[worst] > EVEN:
+        if away[worst] > CURVE_TOLERANCE:
             middle = first + 1 + worst
             kept.add(middle)
             open_ends += [(first, middle), (middle, last)]

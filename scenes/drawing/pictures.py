@@ -31,7 +31,7 @@ from grasp_core.objects.surface import Face
 from grasp_core.solvers.ties import SAME_SHARE, first_best
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.hands import (
-    WHOLE,
+    WHOLE_BOX,
     PosedHand,
     hand_shapes,
     numbers_behind,
@@ -42,26 +42,26 @@ from scenes.drawing.hands import (
 from scenes.drawing.painting import (
     LOOKS,
     POLYGON,
+    Camera,
+    Drawable,
     Extent,
     Role,
-    Shape,
-    View,
     Window,
     approaches,
     best_view,
     feature_edges,
     painted,
 )
-from scenes.drawing.panels import ROW, Entry, Kind, keyed
-from scenes.drawing.sheets import FINGERS, NEUTRAL, Sheet, closed, format_of, numbered
+from scenes.drawing.panels import ROW, KeyLine, Kind, keyed
+from scenes.drawing.sheets import FINGER_COLOURS, NEUTRAL, Sheet, closed, format_of, numbered
 
 RULINGS = 40
-PARALLEL = 1e-9
+LEAST_CROSS_PRODUCT = 1e-9
 """Least length of the cross product that gives the direction of a transversal, relative to the
 squared reach."""
 BAR_LENGTH, BAR_RADIUS, BALL_RADIUS = 0.75, 0.04, 0.1
 """Length and radius of a finger's bar, and radius of its fingertip, in finger sizes."""
-NUMBER_BEYOND = 0.12
+NUMBER_OFFSET = 0.12
 """Distance of a finger's number from the end of its bar, in finger sizes."""
 CONE_LENGTH = 0.42
 """Length of a cone's sides, in finger sizes."""
@@ -70,31 +70,31 @@ STOUT = 1.3
 proportion to their radius, and long or thin ones fingers in proportion to how thick they are."""
 BEYOND = 0.2
 """Length by which a line is drawn past the points it connects, in object radii."""
-REACH = 0.95
+SURFACE_REACH = 0.95
 """Radius around the object's centre within which the ruled surface of a regulus is drawn, in object
 radii."""
-FARTHEST = 4.0
+FORCE_LINE_END = 4.0
 """Greatest length of a line of force, and greatest distance from the centre at which a focus still
 has its plane drawn, in object radii; the foci of built-in objects are within three."""
 SLACK_RAD = 1e-6
 """Angle by which rounding may make a force cone exceed its friction cone [rad]."""
 MOST_TRIANGLES = 2500
 """Largest number of triangles drawn for the object; finer surfaces are simplified first."""
-SIDES = 20
+CIRCLE = 20
 """Number of corners of the polygons that replace circles."""
 
 
-SIDE = 500
+PIXELS = 500
 """Width of a picture, and its height without the key [pixels]."""
 NUMBER, NUMBER_SHARE = 8.0, 0.028
 """Radius of the circle around a finger's number: at least so many pixels, and such a share of the
 picture's width."""
-FINGER_LABELS = tuple((str(finger), colour) for finger, colour in enumerate(FINGERS))
+FINGER_LABELS = tuple((str(finger), colour) for finger, colour in enumerate(FINGER_COLOURS))
 MOST_NUMBERED = 20
 """Largest number of faces that have their numbers on a picture of the object."""
-AZIMUTH_DEG, ELEVATION_DEG = 35.0, 28.0
+AZIMUTH_DEG, OBJECT_ELEVATION_DEG = 35.0, 28.0
 """The view of an object without fingers [deg]."""
-EXPLAINED: tuple[Role, ...] = (
+KEY_ROLES: tuple[Role, ...] = (
     "finger", "friction cone", "force cone", "region", "line of force", "focus", "plane",
     "ruled surface", "hand",
 )  # fmt: skip
@@ -108,7 +108,7 @@ def rulings(points: Array, directions: Array, center: Array, reach: float) -> tu
         planes = np.cross(points[1:3] - start, directions[1:3])
         way = np.cross(planes[0], planes[1])
         length = float(np.linalg.norm(way))
-        if length > PARALLEL * reach**2:
+        if length > LEAST_CROSS_PRODUCT * reach**2:
             way = way / length
             middle = float((center - start) @ way)
             room = reach**2 - float(np.linalg.norm(center - start - middle * way)) ** 2
@@ -142,7 +142,7 @@ class Drawing:
         check_on_faces(self.body, self.grasp)
         value_of(Friction, self.friction, "friction")
 
-    def shapes(self) -> tuple[Shape, ...]:
+    def shapes(self) -> tuple[Drawable, ...]:
         """List the shapes of the object and of the grasp."""
         shown = self._straight() if self.held is None else self._by_hand(self.held)
         return (*glass(self.body), *shown)
@@ -151,31 +151,31 @@ class Drawing:
         """Return where the fingers' numbers are written, behind their bars or tips, (k, 3) [m]."""
         if self.held is not None:
             return numbers_behind(self.held)
-        beyond = (BAR_LENGTH + NUMBER_BEYOND) * finger_size(self.body)
+        beyond = (BAR_LENGTH + NUMBER_OFFSET) * finger_size(self.body)
         return self.grasp.positions - beyond * approaches(self.grasp)
 
-    def view(self) -> View:
+    def view(self) -> Camera:
         """Choose a view in which the grasp is seen well, or the hand in it."""
         if self.held is not None:
             return view_of_hand(self.body, self.held)
         return best_view(self.body, self.grasp)
 
-    def sheet(self, view: View | None = None, *, legend: bool = False) -> Sheet:
+    def sheet(self, view: Camera | None = None, *, legend: bool = False) -> Sheet:
         """Draw the grasp in the style of the paper, with the hand in it if there is one."""
         if view is not None:
-            instance(view, View, "view", "View.of_angles makes one")
+            instance(view, Camera, "view", "Camera.of_angles makes one")
         value_of(bool, legend, "legend")
         name = f"Grasp {self.grasp.id} of {self.body.name}"
         if self.held is not None:
             name += f" with the hand {self.held.hand.name}"
         shapes, view = self.shapes(), view or self.view()
-        sheet = sheet_of(shapes, self.body, view, name, numbers=self.numbers(), side=SIDE)
+        sheet = sheet_of(shapes, self.body, view, name, numbers=self.numbers(), side=PIXELS)
         if not legend:
             return sheet
-        marks, rows = keyed(_entries(shapes), 20.0, SIDE, SIDE - 30.0)
-        return Sheet(SIDE, SIDE + ROW * (rows + 0.5), sheet.name, (*sheet.marks, *marks))
+        marks, rows = keyed(_entries(shapes), 20.0, PIXELS, PIXELS - 30.0)
+        return Sheet(PIXELS, PIXELS + ROW * (rows + 0.5), sheet.name, (*sheet.marks, *marks))
 
-    def _straight(self) -> Iterator[Shape]:
+    def _straight(self) -> Iterator[Drawable]:
         grasp, size = self.grasp, finger_size(self.body)
         half_angle = math.atan(self.friction)
         for finger, (contact, cone, inward) in enumerate(
@@ -185,58 +185,58 @@ class Drawing:
             yield self._friction_cone(contact, finger)
             lean = float(angles_between(cone.axis, contact.normal))
             if lean + cone.half_angle <= half_angle + SLACK_RAD:
-                yield Shape("force cone", finger, polygons=cone_sides(
+                yield Drawable("force cone", finger, polygons=cone_sides(
                     contact.position, cone.axis, cone.half_angle, CONE_LENGTH * size
                 ))  # fmt: skip
             yield from self._region(finger)
         yield from self._regulus() if grasp.family == "regulus" else self._lines_to_foci()
-        yield Shape("contact", points=grasp.positions)
+        yield Drawable("contact", points=grasp.positions)
 
-    def _by_hand(self, held: PosedHand) -> Iterator[Shape]:
+    def _by_hand(self, held: PosedHand) -> Iterator[Drawable]:
         for finger, contact in enumerate(held.contacts):
             yield self._friction_cone(contact, finger)
         for finger in range(len(self.grasp.contacts)):
             yield from self._region(finger)
         yield from hand_shapes(held)
-        yield Shape("contact", points=held.positions)
+        yield Drawable("contact", points=held.positions)
 
-    def _friction_cone(self, contact: Contact, finger: int) -> Shape:
+    def _friction_cone(self, contact: Contact, finger: int) -> Drawable:
         tip, length = contact.position, CONE_LENGTH * finger_size(self.body)
         rim = cone_rim(tip, contact.normal, math.atan(self.friction), length)
         spokes = [np.array([tip, corner]) for corner in rim[::5]]
-        return Shape("friction cone", finger, lines=(closed(rim), *spokes))
+        return Drawable("friction cone", finger, lines=(closed(rim), *spokes))
 
-    def _region(self, finger: int) -> Iterator[Shape]:
+    def _region(self, finger: int) -> Iterator[Drawable]:
         region = self.grasp.regions[finger].polygon
         if len(region) >= POLYGON:
-            yield Shape("region", finger, polygons=(region,))
+            yield Drawable("region", finger, polygons=(region,))
 
-    def _lines_to_foci(self) -> Iterator[Shape]:
+    def _lines_to_foci(self) -> Iterator[Drawable]:
         grasp, radius, middle = self.grasp, self.body.radius, self.body.center_of_mass
         beyond, points = BEYOND * radius, grasp.focus_points
         foci = np.repeat(points, len(grasp.contacts) // len(points), axis=0)
-        yield Shape("focus", points=points)
+        yield Drawable("focus", points=points)
         for finger, (start, focus) in enumerate(zip(grasp.positions, foci, strict=True)):
-            length = min(float(np.linalg.norm(focus - start)) + beyond, FARTHEST * radius)
+            length = min(float(np.linalg.norm(focus - start)) + beyond, FORCE_LINE_END * radius)
             line = np.array([start, start + length * _unit(focus - start)])
-            yield Shape("line of force", finger, lines=(line,))
+            yield Drawable("line of force", finger, lines=(line,))
         away = np.linalg.norm(points - middle, axis=1)
-        if grasp.family == "pencil" and away.max() <= FARTHEST * radius:
+        if grasp.family == "pencil" and away.max() <= FORCE_LINE_END * radius:
             one, two = points
             along, x = beyond * _unit(two - one), grasp.positions
             ends = np.array([one - along, two + along])
             quads = (np.array([x[first], ends[0], x[first + 1], ends[1]]) for first in (0, 2))
-            yield Shape("plane", polygons=tuple(quads), lines=(ends,))
+            yield Drawable("plane", polygons=tuple(quads), lines=(ends,))
 
-    def _regulus(self) -> Iterator[Shape]:
+    def _regulus(self) -> Iterator[Drawable]:
         radius, middle = self.body.radius, self.body.center_of_mass
         starts, ways = self.grasp.positions, self.grasp.witness.directions
-        ruled = rulings(starts, ways, middle, REACH * radius)
-        yield Shape("ruled surface", polygons=between(ruled), lines=ruled)
+        ruled = rulings(starts, ways, middle, SURFACE_REACH * radius)
+        yield Drawable("ruled surface", polygons=between(ruled), lines=ruled)
         for finger, (start, way) in enumerate(zip(starts, ways, strict=True)):
             ahead = max(float((middle - start) @ way), 0.0)
             line = np.array([start, start + (2.0 * ahead + BEYOND * radius) * way])
-            yield Shape("line of force", finger, lines=(line,))
+            yield Drawable("line of force", finger, lines=(line,))
 
 
 def finger_size(body: Polyhedron) -> float:
@@ -244,14 +244,14 @@ def finger_size(body: Polyhedron) -> float:
     return float(min(body.radius, STOUT * math.cbrt(0.75 * body.volume / math.pi)))
 
 
-def glass(body: Polyhedron) -> tuple[Shape, ...]:
+def glass(body: Polyhedron) -> tuple[Drawable, ...]:
     """Return the shapes of the object: its surface, and the edges at which it is bent."""
     if body.patches is None:
         panes = edged = tuple(piece[::-1] for face in body.faces for piece in face.pieces)
     else:  # a fine surface keeps the edges of its own triangles
         panes = tuple(coarse(body.vertices, body.triangles))
         edged = tuple(body.vertices[body.triangles])
-    return Shape("object", polygons=panes), Shape("edge", lines=tuple(feature_edges(edged)))
+    return Drawable("object", polygons=panes), Drawable("edge", lines=tuple(feature_edges(edged)))
 
 
 def coarse(vertices: Array, triangles: Indices) -> Array:
@@ -275,13 +275,13 @@ def coarse(vertices: Array, triangles: Indices) -> Array:
     return middles[joined[np.sort(first)]]
 
 
-def pin(finger: int, tip: Array, inward: Array, size: float) -> tuple[Shape, Shape]:
+def pin(finger: int, tip: Array, inward: Array, size: float) -> tuple[Drawable, Drawable]:
     """Return the fingertip and the bar of a finger of a given size that stands on a point."""
     middle, radius = tip - BALL_RADIUS * size * inward, BALL_RADIUS * size
     bar = tube(middle, tip - BAR_LENGTH * size * inward, BAR_RADIUS * size)
     return (
-        Shape("finger", finger, polygons=rounded_box(middle, middle, radius, WHOLE)),
-        Shape("finger", finger, polygons=bar),
+        Drawable("finger", finger, polygons=rounded_box(middle, middle, radius, WHOLE_BOX)),
+        Drawable("finger", finger, polygons=bar),
     )
 
 
@@ -290,11 +290,11 @@ def _unit(vector: Array) -> Array:
 
 
 def ring(center: Array, axis: Array, radius: float) -> Array:
-    """Return points of a circle around a unit axis, (SIDES, 3)."""
+    """Return points of a circle around a unit axis, (CIRCLE, 3)."""
     # The axis of the frame that is farthest from the circle's axis gives a safe cross product.
     side = np.cross(axis, np.eye(3)[first_best(-np.abs(axis), SAME_SHARE)])
     side /= np.linalg.norm(side)
-    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    angles = 2.0 * np.pi * np.arange(CIRCLE) / CIRCLE
     around = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
     return center + radius * around
 
@@ -303,12 +303,12 @@ def tube(start: Array, end: Array, radius: float) -> tuple[Array, ...]:
     """Make the sides and the two ends of a round bar between two points."""
     axis = (end - start) / np.linalg.norm(end - start)
     low, high = ring(start, axis, radius), ring(end, axis, radius)
-    sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(SIDES)]
+    sides = [np.array([low[i - 1], low[i], high[i], high[i - 1]]) for i in range(CIRCLE)]
     return (*sides, low[::-1], high)
 
 
 def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array:
-    """Return the circle at the wide end of a cone with sides of a given length, (SIDES, 3)."""
+    """Return the circle at the wide end of a cone with sides of a given length, (CIRCLE, 3)."""
     height = length * math.cos(half_angle)
     return ring(tip + height * axis, axis, length * math.sin(half_angle))
 
@@ -316,7 +316,7 @@ def cone_rim(tip: Array, axis: Array, half_angle: float, length: float) -> Array
 def cone_sides(tip: Array, axis: Array, half_angle: float, length: float) -> tuple[Array, ...]:
     """Make the triangles between the tip of a cone and its rim."""
     rim = cone_rim(tip, axis, half_angle, length)
-    return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(SIDES))
+    return tuple(np.array([tip, rim[i - 1], rim[i]]) for i in range(CIRCLE))
 
 
 def write_picture(
@@ -325,7 +325,7 @@ def write_picture(
     path: str | Path,
     friction: float = 0.5,
     *,
-    view: View | None = None,
+    view: Camera | None = None,
     hand: Hand | None = None,
     reach: HandReach | None = None,
 ) -> Path:
@@ -351,7 +351,7 @@ def write_picture(
 def write_object_picture(body: Polyhedron, path: Path) -> Path:
     """Draw an object without fingers, and write the picture to a file."""
     format_of(path)
-    view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, body)
+    view = Camera.of_angles(AZIMUTH_DEG, OBJECT_ELEVATION_DEG, body)
     has_numbers = body.patches is None and len(body.faces) <= MOST_NUMBERED
     towards = [
         index
@@ -361,7 +361,7 @@ def write_object_picture(body: Polyhedron, path: Path) -> Path:
     places = np.array([_middle(body.faces[face]) for face in towards]).reshape(-1, 3)
     labels = [(str(face), NEUTRAL) for face in towards]
     sheet = sheet_of(
-        glass(body), body, view, body.name, numbers=places, side=SIDE, labels=labels
+        glass(body), body, view, body.name, numbers=places, side=PIXELS, labels=labels
     )  # fmt: skip
     return sheet.write(path)
 
@@ -376,7 +376,7 @@ def _middle(face: Face) -> Array:
 
 
 def grasp_figure(
-    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None,
+    body: Polyhedron, grasp: Grasp, friction: float, *, view: Camera | None = None,
     legend: bool = True, hand: Hand | None = None, reach: HandReach | None = None,
 ) -> Sheet:  # fmt: skip
     """Draw a grasp as `write_picture` does, as a sheet that a notebook shows.
@@ -389,7 +389,7 @@ def grasp_figure(
 
 
 def sheet_of(
-    shapes: Sequence[Shape], extent: Extent, view: View, name: str, *, side: int,
+    shapes: Sequence[Drawable], extent: Extent, view: Camera, name: str, *, side: int,
     numbers: Array | None = None, labels: Sequence[tuple[str, str]] = FINGER_LABELS,
 ) -> Sheet:  # fmt: skip
     """Draw shapes on a square sheet, with labels at the places of numbers, (k, 3) [m]."""
@@ -404,11 +404,11 @@ def sheet_of(
     return Sheet(side, side, name, (*painted(shapes, window), *marks))
 
 
-def _entries(shapes: Sequence[Shape]) -> list[Entry]:
+def _entries(shapes: Sequence[Drawable]) -> list[KeyLine]:
     found = {shape.role: shape for shape in reversed(shapes)}
     return [
-        Entry(role, LOOKS[role].colour if found[role].finger is None else NEUTRAL, _kind(role))
-        for role in EXPLAINED if role in found
+        KeyLine(role, LOOKS[role].colour if found[role].finger is None else NEUTRAL, _kind(role))
+        for role in KEY_ROLES if role in found
     ]  # fmt: skip
 
 

@@ -35,15 +35,16 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.kinds import path_of
 
-FINGERS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
+FINGER_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
 """Colour of each finger, which its cones, region, line of force and curves share."""
-INK, GLASS, FOCUS, SURFACE = "#30363d", "#8296ab", "#D55E00", "#0072B2"
+INK_HEX, GLASS, FOCUS_HEX, SURFACE_HEX = "#30363d", "#8296ab", "#D55E00", "#0072B2"
 HAND = "#b9b0a4"
 """Colour of a hand's links: warm and muted, so that it is neither a finger's nor the object's."""
-GOOD, BAD, NEUTRAL = "#0072B2", "#D55E00", "#686e77"
+GOOD_HEX, BAD_HEX, NEUTRAL = "#0072B2", "#D55E00", "#686e77"
 PAPER = "#ffffff"
 NIGHT = {
-    INK: "#dfe4ea", GOOD: "#56aee8", NEUTRAL: "#a3adb8", PAPER: "#14181d", BAD: "#ff8a4c",
+    INK_HEX: "#dfe4ea", GOOD_HEX: "#56aee8", NEUTRAL: "#a3adb8", PAPER: "#14181d",
+    BAD_HEX: "#ff8a4c",
 }  # fmt: skip
 """Colours that take the place of others where the reader's screen is dark."""
 RAMP = ("#00224e", "#434e6c", "#7d7c78", "#bcaf6f", "#fee838")
@@ -75,25 +76,25 @@ def levels_of(values: Array, low: float, high: float) -> Indices:
     return np.clip(LEVELS * (values - low) / span, 0, LEVELS - 1).astype(np.int64)
 
 
-FORMATS = ("svg", "png")
+PICTURE_FORMATS = ("svg", "png")
 ASSETS = Path(__file__).parent / "assets"
 FONT_FAMILY, FONT_FILES = "DejaVu Sans", ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf")
 """The letters of PNG files: Latin and Greek ones and signs of DejaVu Sans 2.37."""
 LETTER = 12.0
-ROUND = 48
+ROUND_CORNERS = 48
 """Number of corners of a polygon that replaces a circle."""
 Anchor: TypeAlias = Literal["start", "middle", "end"]
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PALETTE, BITS = 3, 8
 """PNG's number for pixels that name a colour of a palette, and the bits of such a name."""
-PARTS = 4
+PARTS_PER_PIXEL = 4
 """Number of parts of a pixel in which places are written."""
-BASELINE = 0.35
+BASELINE_DROP = 0.35
 """Distance of the baseline of letters below their middle, in letter sizes."""
 FONT = "system-ui,sans-serif"
-DASHES = "20 16"
+DASH_LENGTHS = "20 16"
 """Lengths of dashes and of the gaps between them [parts of pixels]."""
-Look: TypeAlias = tuple[tuple[str, str], ...]
+SvgAttributes: TypeAlias = tuple[tuple[str, str], ...]
 """Names and values of presentation attributes."""
 
 
@@ -190,8 +191,8 @@ class Sheet(ByValue):
 def format_of(path: Path) -> str:
     """Return the picture format that the ending of a file's name stands for."""
     form = path.suffix.lower().removeprefix(".")
-    if form not in FORMATS:
-        raise InputError(f"{path}: a picture's name must end in .{' or .'.join(FORMATS)}")
+    if form not in PICTURE_FORMATS:
+        raise InputError(f"{path}: a picture's name must end in .{' or .'.join(PICTURE_FORMATS)}")
     return form
 
 
@@ -233,8 +234,8 @@ def beside(sheets: Sequence[Sheet]) -> Sheet:
 
 
 def circle(center: Array, radius: float) -> Array:
-    """Return the corners of a polygon that looks like a circle, (ROUND, 2)."""
-    angles = 2.0 * np.pi * np.arange(ROUND) / ROUND
+    """Return the corners of a polygon that looks like a circle, (ROUND_CORNERS, 2)."""
+    angles = 2.0 * np.pi * np.arange(ROUND_CORNERS) / ROUND_CORNERS
     return center + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
@@ -261,7 +262,7 @@ def numbered(center: Array, radius: float, text: str, colour: str) -> tuple[Mark
 
 def ink_line(points: Sequence[tuple[float, float]]) -> Line:
     """Draw a thin line in ink through points."""
-    return Line((np.array(points),), INK, 1.0)
+    return Line((np.array(points),), INK_HEX, 1.0)
 
 
 def _image_png(levels: Indices) -> bytes:
@@ -319,7 +320,7 @@ def night_style() -> str:
     return f"@media(prefers-color-scheme:dark){{{rules}}}"
 
 
-def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[Look, str]:
+def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[SvgAttributes, str]:
     counts = Counter(
         look for plain, marks in runs if not plain for look, _ in groupby(marks, key=_look)
     )
@@ -327,7 +328,7 @@ def _names(runs: Iterable[tuple[bool, list[Mark]]]) -> dict[Look, str]:
     return {look: f"k{place}" for place, look in enumerate(again)}
 
 
-def _drawn(marks: Iterable[Mark], names: Mapping[Look, str]) -> str:
+def _drawn(marks: Iterable[Mark], names: Mapping[SvgAttributes, str]) -> str:
     """Write areas, lines and dots; neighbours that look alike share a group."""
     groups = list[str]()
     for look, alike in groupby(marks, key=_look):
@@ -340,19 +341,19 @@ def _drawn(marks: Iterable[Mark], names: Mapping[Look, str]) -> str:
     return "".join(groups)
 
 
-def _attributes(look: Look, names: Mapping[Look, str]) -> str:
+def _attributes(look: SvgAttributes, names: Mapping[SvgAttributes, str]) -> str:
     if look in names:
         night = "".join(f" {value}" for key, value in look if key == "class")
         return f' class="{names[look]}{night}"'
     return "".join(f' {key}="{value}"' for key, value in look)
 
 
-def _look(mark: Mark) -> Look:
+def _look(mark: Mark) -> SvgAttributes:
     match mark:
         case Area():
             return _paint("fill", mark.fill, mark.opacity)
         case Line():
-            dashes = (("stroke-dasharray", DASHES),) if mark.dashed else ()
+            dashes = (("stroke-dasharray", DASH_LENGTHS),) if mark.dashed else ()
             return (*_paint("stroke", mark.colour, mark.opacity), _width(mark.width), *dashes)
         case Dots():
             look = _paint("stroke", mark.colour, mark.opacity)
@@ -361,14 +362,14 @@ def _look(mark: Mark) -> Look:
             return ()
 
 
-def _paint(kind: str, colour: str, opacity: float) -> Look:
+def _paint(kind: str, colour: str, opacity: float) -> SvgAttributes:
     name = (("class", f"{kind[0]}{list(NIGHT).index(colour)}"),) if colour in NIGHT else ()
     faint = () if opacity >= 1.0 else ((f"{kind}-opacity", f"{opacity:.2g}".lstrip("0")),)
     return (*name, (kind, colour), *faint)
 
 
 def _width(width: float) -> tuple[str, str]:
-    return "stroke-width", f"{PARTS * width:.3g}"
+    return "stroke-width", f"{PARTS_PER_PIXEL * width:.3g}"
 
 
 def _path(mark: Mark) -> str:
@@ -378,7 +379,7 @@ def _path(mark: Mark) -> str:
         case Line():
             return "".join(map(_steps, mark.lines))
         case Dots():
-            places = np.rint(PARTS * mark.points).astype(int).tolist()
+            places = np.rint(PARTS_PER_PIXEL * mark.points).astype(int).tolist()
             return "".join(f"M{x} {y}h0" for x, y in places)
         case Words() | Image():
             return ""
@@ -386,7 +387,7 @@ def _path(mark: Mark) -> str:
 
 def _steps(points: Array) -> str:
     """Write a line as a path: its first point, and the steps to the others."""
-    whole = np.rint(PARTS * points).astype(int)
+    whole = np.rint(PARTS_PER_PIXEL * points).astype(int)
     steps = np.diff(whole, axis=0)
     x, y = whole[0].tolist()
     kept = steps[steps.any(axis=1)].ravel().tolist() or [0, 0]
@@ -403,12 +404,12 @@ def _plain(mark: Mark) -> str:
         )
     if not isinstance(mark, Words):
         return ""
-    low = BASELINE * mark.size
+    low = BASELINE_DROP * mark.size
     x, y = (mark.x + low, mark.y) if mark.upwards else (mark.x, mark.y + low)
     turned = f' transform="rotate(-90 {x:.1f} {y:.1f})"' if mark.upwards else ""
     anchor = "" if mark.anchor == "start" else f' text-anchor="{mark.anchor}"'
     bold = ' font-weight="bold"' if mark.bold else ""
-    ink = _attributes(_paint("fill", INK, 1.0), {})
+    ink = _attributes(_paint("fill", INK_HEX, 1.0), {})
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" font-size="{mark.size:.3g}"{anchor}{bold}{turned}{ink}>'
         f"{escape(mark.text)}</text>"

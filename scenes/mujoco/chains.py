@@ -38,13 +38,7 @@ from grasp_core.arrays import Array, to_digits
 from grasp_core.by_value import ByValue
 from grasp_core.declared import Declared, declared
 from grasp_core.hands.hand import PALM, Hand, HandFinger, Link, LinkShape
-from grasp_core.hands.hand_arrays import (
-    HandPlaces,
-    jacobian,
-    places,
-    rotation_about,
-    tip_jacobians,
-)
+from grasp_core.hands.hand_arrays import HandPlaces, jacobian, places, rotation_about, tip_jacobians
 from grasp_core.hands.hand_motors import chains
 from grasp_core.hands.reach import Stance
 from grasp_core.quality.motors import Motors

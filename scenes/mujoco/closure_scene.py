@@ -39,7 +39,7 @@ from scenes.mujoco.fingertips import fitting_radius
 from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText, placed
 from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import HARD, FingerSettings, PhysicsSettings, Softness, Surface
+from scenes.settings import HARD_CONTACTS, FingerSettings, PhysicsSettings, Softness, SurfaceChoice
 
 if TYPE_CHECKING:
     from scenes.mujoco.chains import StandingHand
@@ -124,7 +124,7 @@ class Layout(SceneObject):
     """Forces of a gentle grasp in the contact frames, balanced where possible, (k, 3) [N]."""
     approach: Array
     """Starting points of the fingers, relative to their contacts, (k, 3) [m]."""
-    softness: Softness = HARD
+    softness: Softness = HARD_CONTACTS
     on_pads: bool = True
     """Whether each fingertip touches a pad at its contact, and not the object's own surface."""
 
@@ -159,7 +159,7 @@ def build_scene(
     *,
     fingers: FingerSettings | None = None,
     physics: PhysicsSettings | None = None,
-    surface: Surface | None = None,
+    surface: SurfaceChoice | None = None,
 ) -> Scene:
     """Make a MuJoCo scene from an object and a grasp.
 
@@ -177,7 +177,7 @@ def build_scene(
     """
     check_body(body)
     if surface is not None:
-        one_of(surface, get_args(Surface), "surface")
+        one_of(surface, get_args(SurfaceChoice), "surface")
     if fingers is not None:
         instance(fingers, FingerSettings, "fingers")
     physics = PhysicsSettings() if physics is None else physics
@@ -249,15 +249,15 @@ def _keys(layout: Layout) -> dict[str, dict[str, Array]]:
     }
 
 
-def surface_of(body: Polyhedron) -> Surface:
+def surface_of(body: Polyhedron) -> SurfaceChoice:
     """Choose what fingertips touch on an object: pads where it is curved, else the object."""
     return "object" if body.patches is None else "pads"
 
 
 def arrange(
     body: Polyhedron, grasp: Grasp | Sequence[Contact], friction: float,
-    fingers: FingerSettings | None = None, softness: Softness = HARD,
-    surface: Surface | None = None,
+    fingers: FingerSettings | None = None, softness: Softness = HARD_CONTACTS,
+    surface: SurfaceChoice | None = None,
 ) -> Layout:  # fmt: skip
     """Place object, fingertips and drives for a grasp.
 

@@ -30,12 +30,12 @@ from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.verdict import ExecutedGrasp, Execution
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.kept_figures import Kept, keeps
+from sim_validate.files.kept_figures import Kept, keeps
+from sim_validate.files.result_files import AboutObject
 from sim_validate.settings import ExecutionSettings
 
-DIGITS = 12
-MARK = '"grasps_file"'
+KEPT_DIGITS = 12
+BASELINE_MARK = '"grasps_file"'
 
 
 def in_baselines(kind: type) -> Iterator[Figure]:
@@ -50,17 +50,17 @@ def in_baselines(kind: type) -> Iterator[Figure]:
         yield each._replace(kind=Annotated[Number, how]) if numbered else each
 
 
-@keeps(in_baselines(Verdict), DIGITS)
+@keeps(in_baselines(Verdict), KEPT_DIGITS)
 class VerdictFigures(Kept):
     """The figures of a verdict."""
 
 
-@keeps(in_baselines(Execution), DIGITS)
+@keeps(in_baselines(Execution), KEPT_DIGITS)
 class ExecutionFigures(Kept):
     """The figures of an execution."""
 
 
-@keeps(in_baselines(ExecutedGrasp), DIGITS)
+@keeps(in_baselines(ExecutedGrasp), KEPT_DIGITS)
 class ExecutedFigures(Kept):
     """The figures of a grasp that was to be executed."""
 
@@ -73,7 +73,7 @@ class ExecutedFigures(Kept):
 
 
 @declared
-class Entry(Declared):
+class KeptGrasp(Declared):
     """What a baseline keeps of one grasp."""
 
     id: str
@@ -170,7 +170,7 @@ class Baseline(RecordFile):
     part: RecordedPart | None = None
     """The part that it was written on; None where that is the one that the grasps were planned on.
     """
-    entries: Annotated[tuple[Entry, ...], Field(alias="grasps")] = ()
+    entries: Annotated[tuple[KeptGrasp, ...], Field(alias="grasps")] = ()
 
     def _check_together(self) -> None:
         if len({entry.id for entry in self.entries}) < len(self.entries):
@@ -199,7 +199,7 @@ def write_baseline(path: Path, baseline: Baseline) -> None:
 
 def check_writable(path: Path) -> None:
     """Refuse a path where a file stands that is not a baseline of any version."""
-    if path.exists() and MARK not in read_text(path):
+    if path.exists() and BASELINE_MARK not in read_text(path):
         raise InputError(
             f"{path}: this file is not a baseline and will not be overwritten; choose another path"
         )

@@ -19,7 +19,7 @@ from grasp_core.figures import NONE, Shown, cell, compared
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import arithmetic, versions
 from scenes.settings import FingerSettings
-from sim_validate.baselines.baseline import Baseline, Entry, How, write_baseline
+from sim_validate.baselines.baseline import Baseline, How, KeptGrasp, write_baseline
 from sim_validate.baselines.compare import WORDS, Carried, Finding, Status, bands_between, compare
 from sim_validate.baselines.part import Present
 from sim_validate.closure.validate import Job
@@ -34,11 +34,11 @@ from sim_validate.engine.setup import (
 )
 from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp, held_controls_in_words, losses_in_words
-from sim_validate.kit.files import AboutObject
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.files.result_files import AboutObject
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 
-Report = Callable[[int, int], None]
+ReportSteps = Callable[[int, int], None]
 
 
 def _silent(_: int, __: int) -> None:
@@ -46,7 +46,7 @@ def _silent(_: int, __: int) -> None:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measured:
+class MeasuredGrasps:
     """Verdicts on the grasps of a file, and the baseline made of them."""
 
     now: Present
@@ -70,8 +70,8 @@ class Measured:
 
 def measured(
     now: Present, files: tuple[Path, Path], limit: int | None, how: How, processors: int = 1,
-    report: Report = _silent,
-) -> Measured:  # fmt: skip
+    report: ReportSteps = _silent,
+) -> MeasuredGrasps:  # fmt: skip
     """Simulate the first grasps of a file and make a baseline of their verdicts."""
     now = now.testable(limit)
     saved, chosen = now.saved, now.saved.grasps
@@ -103,7 +103,7 @@ def measured(
             (verdicts if isinstance(answer, Verdict) else executions)[grasp.id] = answer
         report(done, total)
     entries = [
-        Entry.of(verdicts[grasp.id], executions.get(grasp.id))
+        KeptGrasp.of(verdicts[grasp.id], executions.get(grasp.id))
         for grasp in chosen
         if grasp.id not in refused
     ]
@@ -118,7 +118,7 @@ def measured(
         arithmetic=arithmetic(),
         entries=tuple(sorted(entries, key=lambda entry: entry.id)),
     )
-    return Measured(now, files, kept, verdicts, refused, executions)
+    return MeasuredGrasps(now, files, kept, verdicts, refused, executions)
 
 
 def _as_seen_from(baseline: Path, grasps: Path) -> str:
@@ -160,19 +160,19 @@ def _planned_radius(saved: Plan) -> float | None:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Checked:
+class CheckedBaseline:
     """The result of a check: how the grasps of a baseline have changed."""
 
     findings: tuple[Finding, ...]
-    measured: Measured
+    measured: MeasuredGrasps
     how: str
     """How strictly results were compared, in words."""
 
 
 def check(
     before: Baseline, now: Present, files: tuple[Path, Path], how: How, processors: int = 1,
-    report: Report = _silent, name: str | None = None,
-) -> Checked:  # fmt: skip
+    report: ReportSteps = _silent, name: str | None = None,
+) -> CheckedBaseline:  # fmt: skip
     """Simulate grasps again, or the one with an id, and compare them with a baseline."""
     now = now.first(before.limit)
     if name is not None:
@@ -181,11 +181,11 @@ def check(
     how = with_planned_fingers(how, before, now.saved)
     if not now.saved.grasps and (now.gone or name is not None):
         body = AboutObject.of(now.saved.body)
-        found = Measured(now, files, replace(before, entries=(), object=body), {}, {})
+        found = MeasuredGrasps(now, files, replace(before, entries=(), object=body), {}, {})
     else:
         found = measured(now, files, before.limit, how, processors, report)
     carried = _carried(now)
-    return Checked(
+    return CheckedBaseline(
         compare(before, found.baseline, found.refused, carried),
         found,
         bands_between(before, found.baseline, carried)[1],
@@ -198,7 +198,7 @@ def _carried(now: Present) -> Carried | None:
     return Carried(now.change, now.gone) if known else None
 
 
-def demanded(done: Checked) -> Checked:
+def demanded(done: CheckedBaseline) -> CheckedBaseline:
     """Count grasps that do not survive their execution as regressed, whatever the baseline says.
 
     A grasp that has no entry now, or whose settings differ from the baseline's, stays as it is.
@@ -214,10 +214,10 @@ def demanded(done: Checked) -> Checked:
     return replace(done, findings=tuple(findings))
 
 
-PLAIN = Shown("", infinite="infinite")
+PLAIN_TEXT = Shown("", infinite="infinite")
 
 
-def explained(done: Checked) -> str:
+def explained(done: CheckedBaseline) -> str:
     """Explain a change: prediction, simulation, baseline, and commands to run next."""
     (finding,) = done.findings
     verdict, how = done.measured.verdicts.get(finding.id), done.how
@@ -238,7 +238,7 @@ def explained(done: Checked) -> str:
     return "\n".join([*lines, *_next_steps(finding.id, at, done.measured)])
 
 
-def passing(done: Checked) -> str:
+def passing(done: CheckedBaseline) -> str:
     """Say in one short line what became of a grasp that passes, if anything."""
     (finding,) = done.findings
     if not done.measured.now.change and finding.status is not Status.IMPROVED:
@@ -261,7 +261,7 @@ def written(path: Path, baseline: Baseline, now: Present) -> str:
     return f"{said}{left if gone else ''}"
 
 
-def _next_steps(name: str, at: str | None, found: Measured) -> Iterator[str]:
+def _next_steps(name: str, at: str | None, found: MeasuredGrasps) -> Iterator[str]:
     now, (baseline, grasps) = found.now, (shlex.quote(str(path)) for path in found.files)
     chosen = f" --wrench={shlex.quote(at)}" if at else ""
     check = f"  all of them: graspproof baseline check {baseline} --grasps {grasps}"
@@ -322,7 +322,7 @@ def _rows(records: Sequence[Declared | None], start: str) -> Iterator[tuple[str,
     """Yield what differences call each figure that a record has, and its cells in SI units."""
     kind = next((type(record) for record in records if record is not None), None)
     for figure in () if kind is None else compared(kind):
-        cells = [cell(figure.of(record), PLAIN) for record in records]
+        cells = [cell(figure.of(record), PLAIN_TEXT) for record in records]
         if {*cells} != {NONE}:
             yield (f"{start}{figure.called}", *cells)
 

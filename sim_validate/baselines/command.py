@@ -9,16 +9,16 @@ from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import extended
 from sim_validate.baselines import flags as baseline_flags
 from sim_validate.baselines.baseline import How, check_writable, read_baseline
-from sim_validate.baselines.check import Checked, check, measured, setup_for
+from sim_validate.baselines.check import CheckedBaseline, check, measured, setup_for
 from sim_validate.baselines.compare import Finding, Status, failing
 from sim_validate.baselines.part import Present, present
 from sim_validate.closure.command import check_noise
+from sim_validate.commands.console import TABLE_ROWS, Reporter
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.setup import Agenda, setup_from_file, wrenches_from_file
-from sim_validate.kit.console import TABLE_ROWS, Reporter
-from sim_validate.kit.exit_codes import Exit
 
 
-def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
+def record_baseline(command: baseline_flags.RecordFlags, reporter: Reporter) -> int:
     """Simulate grasps and write the results as a baseline, to compare later results with."""
     check_writable(command.out)
     saved = load_grasps(command.grasps)
@@ -39,7 +39,7 @@ def record_baseline(command: baseline_flags.Record, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def check_baseline(command: baseline_flags.Check, reporter: Reporter) -> int:
+def check_baseline(command: baseline_flags.CheckFlags, reporter: Reporter) -> int:
     """Simulate the grasps of a baseline again and report how each result differs."""
     before = read_baseline(command.baseline)
     path = command.grasps or command.baseline.parent / before.grasps_file
@@ -76,7 +76,7 @@ def exit_code(findings: Sequence[Finding], *, strict: bool) -> int:
     return Exit.INPUT if Status.NOT_COMPARABLE in came else Exit.GOOD
 
 
-def _show(done: Checked, reporter: Reporter) -> None:
+def _show(done: CheckedBaseline, reporter: Reporter) -> None:
     differing = [finding for finding in done.findings if finding.status is not Status.SAME]
     reporter.records("grasps that differ from the baseline", differing)
     counts = Counter(finding.status.value for finding in done.findings)

@@ -19,13 +19,13 @@ from grasp_core.declared import Declared, declared
 from grasp_core.figures import Compared, Shown, Worse, compared, figure, unit_of
 from grasp_core.files.records import UNRECORDED, record_of
 from grasp_core.transferring.transfer import FRICTION_BAND
-from sim_validate.baselines.baseline import DIGITS, Baseline, Entry
+from sim_validate.baselines.baseline import KEPT_DIGITS, Baseline, KeptGrasp
 from sim_validate.engine.traces import LET_GO, Outcome
 
 DIGITS_OF_CHANGE = 2
 LEAST_DIGITS = 4
 DECISIVE = ("graspproof", "mujoco", "machine")
-ASIDE = "python"
+UNCOMPARED_VERSION = "python"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class Difference:
     """Whether the difference follows from wrenches that are now held or no longer held."""
 
 
-def differences(one: Entry, other: Entry, bands: Bands) -> tuple[Difference, ...]:
+def differences(one: KeptGrasp, other: KeptGrasp, bands: Bands) -> tuple[Difference, ...]:
     """List every difference between two verdicts on a grasp, and between its executions."""
     found = [*differing_figures(one.verdict, other.verdict, bands)]
     if one.execution is not None and other.execution is not None:  # else the settings differ
@@ -171,7 +171,7 @@ def _change(before: float, after: float, band: float) -> str:
     """Write a number before and after, to two digits of what changed, and its band."""
     change, largest = after - before, max(abs(before), abs(after))
     digits = math.ceil(math.log10(largest / abs(change))) + DIGITS_OF_CHANGE
-    digits = min(max(digits, LEAST_DIGITS), DIGITS)
+    digits = min(max(digits, LEAST_DIGITS), KEPT_DIGITS)
     share = f"{100.0 * change / before:+.2g} %, " if before > 0.0 else ""
     return f"{before:.{digits}g} -> {after:.{digits}g} ({share}band {band:.2g})"
 
@@ -193,19 +193,19 @@ class Status(StrEnum):
     contacts are no longer in force closure."""
 
 
-FAILED = (Status.REGRESSED, Status.MISSING, Status.NEW, Status.GONE)
+FAILING = (Status.REGRESSED, Status.MISSING, Status.NEW, Status.GONE)
 
 
 def failing(*, strict: bool) -> tuple[Status, ...]:
     """List the statuses that fail a check besides "not comparable"; strict adds "improved"."""
-    return (*FAILED, Status.IMPROVED) if strict else FAILED
+    return (*FAILING, Status.IMPROVED) if strict else FAILING
 
 
 WORDS = {
     Status.SAME: "same", Status.WITHIN: "same", Status.GREY: "same", Status.IMPROVED: "better",
     Status.REGRESSED: "worse",
 }  # fmt: skip
-EXACT = Bands(
+EXACT_BANDS = Bands(
     predicted=1e-9, simulated=1e-9, least=0.0, length_m=1e-7, angle_rad=1e-6,
     grey=0.0, exact=True,
 )  # fmt: skip
@@ -246,8 +246,8 @@ class Finding(Declared):
     differences: tuple[str, ...] = ()
     beyond: Annotated[tuple[str, ...], UNRECORDED] = ()
     """Those of the differences that are beyond their bands."""
-    before: Entry | None = None
-    after: Entry | None = None
+    before: KeptGrasp | None = None
+    after: KeptGrasp | None = None
 
     @property
     def further(self) -> tuple[str, ...]:
@@ -267,7 +267,7 @@ def bands_between(
     if carried is not None and _is_other_part(before, after):
         bands = replace(OTHER_PART, friction=FRICTION_BAND * before.friction)
         return bands, "with the bands of a changed part"
-    names = sorted({*before.versions, *after.versions} - {ASIDE})
+    names = sorted({*before.versions, *after.versions} - {UNCOMPARED_VERSION})
     changed = [name for name in names if before.versions.get(name) != after.versions.get(name)]
     others = [
         f"{name} {before.versions.get(name)} -> {after.versions.get(name)}" for name in changed
@@ -277,7 +277,7 @@ def bands_between(
     if others or before.arithmetic != after.arithmetic:
         why = ", ".join(others) or "another processor"
         return OTHER_PROCESSOR, f"with the bands of rounding: {why}"
-    return EXACT, "exactly"
+    return EXACT_BANDS, "exactly"
 
 
 def compare(
@@ -353,7 +353,7 @@ def _by_name(value: Any) -> Any:
 
 
 def _gone(
-    name: str, one: Entry | None, why: str, changed: tuple[str, ...], moved: str | None
+    name: str, one: KeptGrasp | None, why: str, changed: tuple[str, ...], moved: str | None
 ) -> Finding:
     """Judge a grasp that does not exist on the part, which has moved since the baseline or not.
 
@@ -367,7 +367,7 @@ def _gone(
 
 
 def _compared(
-    one: Entry, other: Entry, friction: float, bands: Bands, changed: tuple[str, ...],
+    one: KeptGrasp, other: KeptGrasp, friction: float, bands: Bands, changed: tuple[str, ...],
     moved: str | None,
 ) -> Finding:  # fmt: skip
     every = differences(one, other, bands)

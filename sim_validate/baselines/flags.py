@@ -9,21 +9,21 @@ from tyro.conf import Positional, arg
 from grasp_core.declared import declared
 from grasp_core.kinds import Seed
 from grasp_core.transferring.settings import IfChanged
-from sim_validate.kit.command_flags import PLAIN, FirstOnly, GraspsFile, Jobs, Spoken
-from sim_validate.kit.workers import available_cores
+from sim_validate.commands.flags import BARE, FirstOnly, GraspsPath, Jobs, Spoken
+from sim_validate.processes.workers import available_cores
 from sim_validate.settings import ChosenTrials
 
-MeshFile = Annotated[Path | None, arg(help=(
+MeshPath = Annotated[Path | None, arg(help=(
     "The mesh file that the grasps were planned from; if not given, a file with the object's name "
     "beside them or the baseline."
 ))]  # fmt: skip
 
 
 @declared
-class Record(Spoken):
+class RecordFlags(Spoken):
     """Flags of the command `baseline record`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     out: Annotated[Path, arg(aliases=("-o",))]
     """Path of the baseline to write."""
     limit: FirstOnly = None
@@ -31,16 +31,16 @@ class Record(Spoken):
     """TOML file of simulation settings (see docs/files.md)."""
     wrenches: Path | None = None
     """JSON file of wrenches that each grasp must hold in full (see docs/files.md)."""
-    more: Annotated[ChosenTrials, PLAIN] = field(default_factory=ChosenTrials)
+    more: Annotated[ChosenTrials, BARE] = field(default_factory=ChosenTrials)
     seed: Seed | None = None
     """Seed of all random choices; if not given, the seed that the grasps were planned with."""
-    object: MeshFile = None
+    object: MeshPath = None
     changed_part: IfChanged = field(default_factory=IfChanged)
     jobs: Jobs = field(default_factory=available_cores)
 
 
 @declared
-class Check(Spoken):
+class CheckFlags(Spoken):
     """Flags of the command `baseline check`."""
 
     baseline: Positional[Path]
@@ -53,6 +53,6 @@ class Check(Spoken):
     """Fail also if a grasp has become better."""
     bless: bool = False
     """Write the new results over the baseline, even if grasps have become worse."""
-    object: MeshFile = None
+    object: MeshPath = None
     changed_part: IfChanged = field(default_factory=IfChanged)
     jobs: Jobs = field(default_factory=available_cores)

@@ -35,13 +35,13 @@ from grasp_core.transferring.transfer import (
 )
 from sim_validate.baselines.baseline import Baseline, RecordedPart
 
-TABLE = "changed_part"
+CHANGED_PART = "changed_part"
 CARRY = IfChanged()
 NONE_MOVED = "no face moved"
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class SourceMesh:
     """The mesh file that grasps were planned from, if it was found."""
 
     file: Path | None = None
@@ -60,7 +60,7 @@ def source_of(
     folders: Iterable[Path],
     named: Path | None = None,
     scale: float | None = None,
-) -> Source:
+) -> SourceMesh:
     """Find the mesh file that grasps were planned from.
 
     Of several files with the object's name, an unchanged one is taken, or else the first.
@@ -72,16 +72,18 @@ def source_of(
                 f"{grasps}: these grasps were not planned from a mesh file, so not from {named}; "
                 "leave `object` out, or plan from the file"
             )
-        return Source()
+        return SourceMesh()
     found = [named] if named is not None else _beside(body.name, [grasps.parent, *folders])
     for path in found:
         if hashlib.sha256(read_bytes(path)).hexdigest() == body.source_sha256:
-            return Source(file=path)  # the body was read from these very bytes, whatever their unit
+            return SourceMesh(
+                file=path
+            )  # the body was read from these very bytes, whatever their unit
         if (unit := fitting_exactly(path, body, scale)) is not None:
-            return Source(file=path, unit=unit)
+            return SourceMesh(file=path, unit=unit)
     if found:
-        return Source(file=found[0], changed=True)
-    return Source(
+        return SourceMesh(file=found[0], changed=True)
+    return SourceMesh(
         note=f"{grasps}: the mesh that it holds was tested; the file it was planned from, "
         f"{body.name!r} with some ending, is not beside it (`object` in a *.grasps.toml says where)"
     )
@@ -121,7 +123,7 @@ class Present:
     saved: Plan
     """The grasps that can be tested: those of the file, or what became of them on the changed part,
     with their old ids."""
-    source: Source = field(default_factory=Source)
+    source: SourceMesh = field(default_factory=SourceMesh)
     carried: Transfer | None = None
     """How they were carried over; None where the part is as it was."""
     unit: str = ""
@@ -213,7 +215,7 @@ class Present:
         return self.change + carried
 
     @property
-    def mesh(self) -> Source:
+    def mesh(self) -> SourceMesh:
         """Return the mesh file, with what readers must know about it."""
         return replace(self.source, note=self.note)
 

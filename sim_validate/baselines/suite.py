@@ -24,17 +24,17 @@ from grasp_core.values import Grasp
 from scenes.example_objects import example_object
 from sim_validate.baselines import check
 from sim_validate.baselines.baseline import Baseline, How, check_writable, read_baseline
-from sim_validate.baselines.part import CARRY, TABLE, IfChanged, Present, Source, present
+from sim_validate.baselines.part import CARRY, CHANGED_PART, IfChanged, Present, SourceMesh, present
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.engine.setup import Agenda, Setup, wrenches_from_file
 from sim_validate.execution.execute import ExecutionJob, executed_grasp
 from sim_validate.execution.verdict import ExecutedGrasp
-from sim_validate.kit.files import read_tables
+from sim_validate.files.toml_files import read_tables
 from sim_validate.settings import ExecutionSettings, LimitSearch, Noise
 
-ENDING = ".grasps.toml"
-GIVEN = ("limits", "random_wrenches", "repeats", "noise", "seed")
+SUITE_ENDING = ".grasps.toml"
+AGENDA_SETTINGS = ("limits", "random_wrenches", "repeats", "noise", "seed")
 """Settings that replace those of the agenda of the baseline."""
 
 
@@ -71,7 +71,7 @@ class Suite(Settings):
     """How grasps are executed."""
     changed_part: IfChanged = CARRY
     """What to do if the part has another shape than the grasps were planned for."""
-    path: Annotated[Path, CHOSEN] = Path(ENDING)
+    path: Annotated[Path, CHOSEN] = Path(SUITE_ENDING)
     """The file itself."""
 
     @cached_property
@@ -123,7 +123,7 @@ class Suite(Settings):
         """The paths of the baseline and of the grasps."""
         return self.baseline, self.grasps
 
-    def tested(self, name: str) -> check.Checked:
+    def tested(self, name: str) -> check.CheckedBaseline:
         """Simulate one grasp again, and compare the result with the baseline."""
         now, before = self.compared, self.kept
         done = check.check(before, now, self.files, self._how(before), name=name)
@@ -157,7 +157,7 @@ class Suite(Settings):
                 f"{self.path}: survives: expected a table [execution] too, which says how grasps "
                 "are executed, but the file has none"
             )
-        given: dict[str, Any] = {name: getattr(self, name) for name in GIVEN}
+        given: dict[str, Any] = {name: getattr(self, name) for name in AGENDA_SETTINGS}
         if self.wrenches is not None:
             given["wrenches"] = wrenches_from_file(self.wrenches)
         asked = {name: value for name, value in given.items() if value is not None}
@@ -172,7 +172,7 @@ def suite_from_toml(path: Path) -> Suite:
 
 def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     """Build a suite from the settings of a `*.grasps.toml` file."""
-    usual = path.name.removesuffix(ENDING) + ".baseline.json"
+    usual = path.name.removesuffix(SUITE_ENDING) + ".baseline.json"
     with about(path):
         suite = Suite.of_table({"baseline": usual, **given})
     paths = {
@@ -182,10 +182,10 @@ def suite_from_tables(given: Mapping[str, Any], path: Path) -> Suite:
     return replace(suite, path=path, **found)
 
 
-FRICTION = 0.5
+USUAL_FRICTION = 0.5
 TRIALS = ("wrenches", "repeats", "noise", "random_wrenches", "seed")
 """Settings of an agenda that a test may give by their names."""
-SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
+PLAN_SETTINGS = ("object", "friction", "limit", "families", "cones", "seed", "unit", "scale")
 
 
 @declared
@@ -195,7 +195,7 @@ class GraspCase(Declared):
     body: Polyhedron
     grasp: Grasp
     friction: float
-    source: Source = field(default_factory=Source)
+    source: SourceMesh = field(default_factory=SourceMesh)
     """The mesh file that the grasp was planned from, if it comes from a file of grasps."""
     gone: str = ""
     """Why the grasp does not exist on its changed part; empty if it does. Object and grasp are then
@@ -212,7 +212,7 @@ def case_of(
         return case if friction is None else replace(case, friction=friction)
     frictions = [*given[2:], *([] if friction is None else [friction])]
     if kinds[:2] == [Polyhedron, Grasp] and len(frictions) <= 1:
-        return GraspCase(given[0], given[1], frictions[0] if frictions else FRICTION)
+        return GraspCase(given[0], given[1], frictions[0] if frictions else USUAL_FRICTION)
     got = ", ".join(kind.__name__ for kind in kinds)
     raise InputError(
         f"{asking}: expected a grasp_case, or an object, a grasp and a friction; got {got}"
@@ -225,9 +225,9 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
         raise InputError(
             f"@pytest.mark.grasp takes the path of one file of grasps, got {list(args)}"
         )
-    known = ("friction", TABLE) if args else SETTINGS
+    known = ("friction", CHANGED_PART) if args else PLAN_SETTINGS
     named(settings, known, "@pytest.mark.grasp")
-    friction = value_of(float, settings.get("friction", FRICTION), "friction")
+    friction = value_of(float, settings.get("friction", USUAL_FRICTION), "friction")
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
     wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
@@ -249,7 +249,7 @@ def _cases_of_file(folder: Path, path: Path, settings: Mapping[str, Any]) -> lis
     saved = load_grasps(path)
     friction = value_of(float, settings.get("friction", saved.friction), "friction")
     _check_any(saved.grasps, saved.body, friction)
-    asked = IfChanged.of_table(settings.get(TABLE, {}), TABLE)
+    asked = IfChanged.of_table(settings.get(CHANGED_PART, {}), CHANGED_PART)
     now = present(replace(saved, friction=friction), path, [folder], asked)
     tested = {grasp.id: grasp for grasp in now.saved.grasps}
     return [

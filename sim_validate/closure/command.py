@@ -25,6 +25,10 @@ from scenes.drawing.clips import GraphicsError, available_graphics, has_display,
 from scenes.example_objects import example_object
 from sim_validate.closure.validate import Job, validate, validated
 from sim_validate.closure.verdict import Verdict, Verdicts, trace_arrays
+from sim_validate.commands import flags, simulation_flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
+from sim_validate.commands.exit_codes import Exit, FlagsError
+from sim_validate.commands.simulation_flags import Testing
 from sim_validate.engine.gate import measured_gate, require_faithful
 from sim_validate.engine.setup import (
     Agenda,
@@ -35,14 +39,12 @@ from sim_validate.engine.setup import (
     wrenches_from_file,
 )
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit import command_flags, simulation_flags
-from sim_validate.kit.compiling import EVERYTHING, compile_loops
-from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
-from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import alone_in, remove_results, write_arrays
-from sim_validate.kit.simulation_flags import Testing
-from sim_validate.kit.workers import available_cores
+from sim_validate.files.array_files import write_arrays
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_grasps
+from sim_validate.processes.compiling import EVERYTHING, compile_loops
+from sim_validate.processes.workers import available_cores
 from sim_validate.settings import ChosenTrials, Noise
 
 Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, RecordFile]]
@@ -50,7 +52,7 @@ Judge: TypeAlias = Callable[[Plan, Setup], tuple[Exit, RecordFile]]
 
 
 def validate_file(
-    command: simulation_flags.Validate, reporter: Reporter, judge: Judge | None = None
+    command: simulation_flags.ValidateFlags, reporter: Reporter, judge: Judge | None = None
 ) -> int:
     """Simulate the grasps of a file, or let another test judge them, and report which hold."""
     chosen = asked_grasps(
@@ -167,7 +169,7 @@ LOOPS = {
 }
 
 
-def check_installation(command: command_flags.Doctor, reporter: Reporter) -> int:
+def check_installation(command: flags.DoctorFlags, reporter: Reporter) -> int:
     """Plan and simulate a tetrahedron whose answers are known, and report all checks."""
     if command.compile:
         reporter.say("compiling all inner loops, which takes two minutes of one core")

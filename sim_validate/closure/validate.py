@@ -35,12 +35,7 @@ from grasp_core.arrays import Array
 from grasp_core.closure.contacts import contact_frames, stacked
 from grasp_core.errors import InputError, UndecidedError
 from grasp_core.kinds import Count, Friction, function, instance, several, value_of
-from grasp_core.objects.on_faces import (
-    check_body,
-    check_on_faces,
-    edge_distance,
-    within,
-)
+from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance, within
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import facets_of
 from grasp_core.values import Contact, Grasp
@@ -55,13 +50,7 @@ from sim_validate.closure.verdict import (
     Verdict,
     WrenchVerdict,
 )
-from sim_validate.engine.gate import (
-    Gate,
-    measured_gate,
-    misplaced,
-    require_faithful,
-    require_touch,
-)
+from sim_validate.engine.gate import Gate, measured_gate, misplaced, require_faithful, require_touch
 from sim_validate.engine.limits_and_friction import (
     Analysis,
     CriticalFriction,
@@ -76,8 +65,8 @@ from sim_validate.engine.limits_and_friction import (
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulate import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, judge, rotated
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 from sim_validate.settings import Noise
 
 

@@ -31,7 +31,7 @@ from sim_validate.engine.gate import Gate
 from sim_validate.engine.limits_and_friction import CriticalFriction, SimulatedLimit
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
-from sim_validate.kit.files import AboutGrasps, AboutObject
+from sim_validate.files.result_files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 
 AGREEMENT = 0.02

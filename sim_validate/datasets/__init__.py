@@ -1,7 +1,8 @@
 """How are tables of grasps made, checked and read?
 
 A configuration names many objects and several frictions; the tables of a dataset hold objects,
-grasps and trials. The work is split into units: one object at one friction each. Every finished
-unit is kept in a staging folder; in the end the rows of all units become the tables. `build` makes
-a dataset, `verify` checks it, `card` documents it, and `isaac` writes its grasps for Isaac.
+grasps and trials. `build` makes a dataset: the work is split into units, each one object at one
+friction (`work_units`), which worker processes compute (`computing`, `making_rows`). Every finished
+unit is kept, so that a build can be resumed (`resuming`); in the end the rows of all units become
+the tables (`writing`). `verify` checks a dataset, and `open_dataset` reads it.
 """

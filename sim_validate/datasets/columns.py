@@ -22,11 +22,11 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import seat
 from grasp_core.values import FINGERS, Contact
 from sim_validate.closure.verdict import Verdict
-from sim_validate.datasets.config import EXECUTED, NAMES, Name, SplitName, id_beginning
+from sim_validate.datasets.config import EXECUTED, TABLE_NAMES, Name, SplitName, id_beginning
 from sim_validate.datasets.parquet import (
-    Asked,
-    Column,
+    InGroup,
     Known,
+    TableColumn,
     Tables,
     Within,
     cells_of,
@@ -35,33 +35,33 @@ from sim_validate.datasets.parquet import (
 )
 from sim_validate.engine.traces import HoldVerdict, Outcome
 from sim_validate.execution.verdict import Execution, ExecutionTrial
-from sim_validate.kit.kept_figures import Kept, keeps
+from sim_validate.files.kept_figures import Kept, keeps
 
-GIVEN = "given"
+FROM_TOOL = "given"
 """Label of grasps that another tool made."""
 VARIED = "varied"
 """Label of rows that are made from a grasp and may hold or not."""
 NOT_TRIED = "not_tried"
 """Outcome of given grasps that cannot be simulated: their `note` says why, and no cell claims
 anything else about them."""
-UNIT = 1e-9
+UNIT_TOLERANCE = 1e-9
 """Largest difference between a normal's length and one."""
-ROUNDING = 1e-6
+ROUNDOFF = 1e-6
 """Share of any number that processors may round differently."""
 CLAIMS = (
     "survived", "mass_kg", "squeeze_n", "load_multiple", "predicted_first_slip",
     "simulated_first_slip", "executed_trials", "execution_mismatches",
 )  # fmt: skip
 """Cells that only executed grasps have."""
-TOLD = ("load_multiple", "payload_kg", "predicted_first_slip", "simulated_first_slip")
+IN_OWN_COLUMNS = ("load_multiple", "payload_kg", "predicted_first_slip", "simulated_first_slip")
 """Figures of executions that have columns of their own."""
 ByFinger: TypeAlias = Annotated[Array, Shape(None, 3, nan=True)]
 """A vector for each finger, (k, 3); tables have four, null after the last."""
-Lengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
+FourLengths: TypeAlias = Annotated[Array, Shape(FINGERS, nan=True)]
 Four: TypeAlias = Annotated[Indices, Shape(FINGERS, whole=True)]
 Joints: TypeAlias = Annotated[Array, Shape("hand")]
 """An angle for each joint of the hand."""
-Points: TypeAlias = Annotated[Array, Shape(FINGERS, 3)]
+FourPoints: TypeAlias = Annotated[Array, Shape(FINGERS, 3)]
 
 
 @declared
@@ -100,7 +100,7 @@ class VerdictCells(Kept):
     """Figures of a verdict."""
 
 
-@keeps(in_columns(Execution, TOLD, "execution_"))
+@keeps(in_columns(Execution, IN_OWN_COLUMNS, "execution_"))
 class ExecutionCells(Kept):
     """Figures of an execution."""
 
@@ -138,15 +138,15 @@ class GraspRow(Declared):
     """Largest distance by which a given contact was moved."""
     force_closed: bool | None = None
     """Whether it is proved to be in force closure."""
-    closure_margin: Annotated[Known, Within(ROUNDING, 1e-7)] = None
+    closure_margin: Annotated[Known, Within(ROUNDOFF, 1e-7)] = None
     """Margin of the exact test of force closure."""
-    critical_friction: Annotated[Known, Within(10.0 * ROUNDING, 1e-7)] = None
+    critical_friction: Annotated[Known, Within(10.0 * ROUNDOFF, 1e-7)] = None
     """Smallest coefficient with force closure."""
     region_radius_m: Known = None
     """Radius of the smallest contact region; 0 for points."""
     region_kind: str | None = None
     """How contact regions were made: cone, disc, or point for none."""
-    region_radii_m: Lengths | None = None
+    region_radii_m: FourLengths | None = None
     """Largest disc radius in each contact region."""
     ferrari_canny_lower_n: Known = None
     """Proved lower bound of Ferrari-Canny quality."""
@@ -165,87 +165,87 @@ class GraspRow(Declared):
     verdict: Annotated[VerdictCells | None, FLAT] = None
     """Figures of the verdict; null for controls."""
 
-    executed: Annotated[bool, Asked(EXECUTED)] = False
+    executed: Annotated[bool, InGroup(EXECUTED)] = False
     """Whether trials were simulated; false for negative controls, and where no squeeze carries the
     weight."""
-    survived: Annotated[bool | None, Asked(EXECUTED)] = None
+    survived: Annotated[bool | None, InGroup(EXECUTED)] = None
     """Whether the object survived every trial; false also where no squeeze carries the weight; null
     where it is not known."""
-    execution_note: Annotated[str | None, Asked(EXECUTED)] = None
+    execution_note: Annotated[str | None, InGroup(EXECUTED)] = None
     """Why a grasp was not executed, or which trials were not possible."""
-    mass_kg: Annotated[Known, Asked(EXECUTED), Within(ROUNDING)] = None
+    mass_kg: Annotated[Known, InGroup(EXECUTED), Within(ROUNDOFF)] = None
     """Mass of the object in the execution."""
-    squeeze_n: Annotated[ByFinger | None, Asked(EXECUTED)] = None
+    squeeze_n: Annotated[ByFinger | None, InGroup(EXECUTED)] = None
     """Contact forces on the object at rest, by finger."""
-    load_multiple: Annotated[Known, Asked(EXECUTED)] = None
+    load_multiple: Annotated[Known, InGroup(EXECUTED)] = None
     """Multiple of the weight, in any direction, that the squeeze is proved to carry."""
-    predicted_first_slip: Annotated[Known, Asked(EXECUTED)] = None
+    predicted_first_slip: Annotated[Known, InGroup(EXECUTED)] = None
     """Least multiple of a trial's load at which a contact slips, predicted; null if none ever
     does."""
-    simulated_first_slip: Annotated[Known, Asked(EXECUTED)] = None
+    simulated_first_slip: Annotated[Known, InGroup(EXECUTED)] = None
     """Least multiple of a trial's load that slips, from simulated contact forces."""
-    executed_trials: Annotated[int | None, Asked(EXECUTED)] = None
+    executed_trials: Annotated[int | None, InGroup(EXECUTED)] = None
     """Number of trials of the execution."""
-    execution_mismatches: Annotated[int | None, Asked(EXECUTED)] = None
+    execution_mismatches: Annotated[int | None, InGroup(EXECUTED)] = None
     """Number of the execution's own negative controls that did not slip, but must."""
-    execution: Annotated[ExecutionCells | None, FLAT, Asked(EXECUTED)] = None
+    execution: Annotated[ExecutionCells | None, FLAT, InGroup(EXECUTED)] = None
     """Figures of the execution."""
 
-    kind: Annotated[str | None, Asked("kinds")] = None
+    kind: Annotated[str | None, InGroup("kinds")] = None
     """`planned`, `given`, the name of a negative control, or `friction_below`, .. `mass_near`."""
-    made_from: Annotated[str | None, Asked("kinds")] = None
+    made_from: Annotated[str | None, InGroup("kinds")] = None
     """The grasp that a varied one was made from; null for others."""
-    friction_ratio: Annotated[Known, Asked("kinds")] = None
+    friction_ratio: Annotated[Known, InGroup("kinds")] = None
     """Friction over critical friction; null where none is known."""
-    displaced_m: Annotated[Lengths | None, Asked("kinds"), Within(0.0, ROUNDING)] = None
+    displaced_m: Annotated[FourLengths | None, InGroup("kinds"), Within(0.0, ROUNDOFF)] = None
     """Distance of each contact from that of `made_from`."""
-    region_exit_m: Annotated[Lengths | None, Asked("kinds")] = None
+    region_exit_m: Annotated[FourLengths | None, InGroup("kinds")] = None
     """How far the region reached in the direction of that move; null where the contact did not
     move."""
-    mass_ratio: Annotated[Known, Asked("kinds")] = None
+    mass_ratio: Annotated[Known, InGroup("kinds")] = None
     """Mass over the mass at which `made_from` is predicted to lose the object."""
 
-    span_angle_rad: Annotated[Known, Asked("closure"), Within(ROUNDING, ROUNDING)] = None
+    span_angle_rad: Annotated[Known, InGroup("closure"), Within(ROUNDOFF, ROUNDOFF)] = None
     """Half-angle below which cones positively span."""
-    smallest_singular_value: Annotated[Known, Asked("closure"), Within(ROUNDING, ROUNDING)] = None
+    smallest_singular_value: Annotated[Known, InGroup("closure"), Within(ROUNDOFF, ROUNDOFF)] = None
     """Least singular value of the grasp map."""
-    closed_share: Annotated[Share | None, Asked("placement")] = None
+    closed_share: Annotated[Share | None, InGroup("placement")] = None
     """Proved lower bound of the chance of force closure where the object is off by 2 mm and 2
     degrees (standard deviations); null where no bound was proved."""
-    closed_share_reason: Annotated[str | None, Asked("placement")] = None
+    closed_share_reason: Annotated[str | None, InGroup("placement")] = None
     """Why no bound was proved of a grasp in force closure."""
-    witness_forces_n: Annotated[Points | None, Asked("closure")] = None
+    witness_forces_n: Annotated[FourPoints | None, InGroup("closure")] = None
     """Balanced forces on the object, normal parts sum to one."""
 
-    predicted_loss: Annotated[Known, Asked("margins")] = None
+    predicted_loss: Annotated[Known, InGroup("margins")] = None
     """Least multiple of a trial's load that loses it."""
-    payload_kg: Annotated[Known, Asked("margins"), Within(ROUNDING)] = None
+    payload_kg: Annotated[Known, InGroup("margins"), Within(ROUNDOFF)] = None
     """Mass that the squeeze is proved to carry."""
-    tip_radius_m: Annotated[Known, Asked("margins")] = None
+    tip_radius_m: Annotated[Known, InGroup("margins")] = None
     """Radius of the fingertips of the execution."""
 
-    least_push_n: Annotated[Known, Asked("least_squeeze")] = None
+    least_push_n: Annotated[Known, InGroup("least_squeeze")] = None
     """Least largest push that carries the weight any way."""
-    least_squeeze_n: Annotated[ByFinger | None, Asked("least_squeeze")] = None
+    least_squeeze_n: Annotated[ByFinger | None, InGroup("least_squeeze")] = None
     """Contact forces at rest with that push."""
 
-    hand_reached: Annotated[bool | None, Asked("hand")] = None
+    hand_reached: Annotated[bool | None, InGroup("hand")] = None
     """Whether a pose of the hand was found; null if not closed."""
-    hand_reason: Annotated[str | None, Asked("hand")] = None
+    hand_reason: Annotated[str | None, InGroup("hand")] = None
     """Why no pose was found; empty where one was."""
-    hand_fingers: Annotated[Four | None, Asked("hand")] = None
+    hand_fingers: Annotated[Four | None, InGroup("hand")] = None
     """Number of the hand's finger at each contact."""
-    hand_joints_rad: Annotated[Joints | None, Asked("hand")] = None
+    hand_joints_rad: Annotated[Joints | None, InGroup("hand")] = None
     """Joint angles, finger by finger from the palm."""
-    T_object_palm_m: Annotated[Annotated[Array, Shape(4, 4)] | None, Asked("hand")] = None
+    T_object_palm_m: Annotated[Annotated[Array, Shape(4, 4)] | None, InGroup("hand")] = None
     """Pose of the palm in the object's frame."""
-    hand_points_m: Annotated[Points | None, Asked("hand")] = None
+    hand_points_m: Annotated[FourPoints | None, InGroup("hand")] = None
     """Contacts of the fingertips."""
-    hand_normals: Annotated[Points | None, Asked("hand")] = None
+    hand_normals: Annotated[FourPoints | None, InGroup("hand")] = None
     """Inward unit normals at these."""
-    hand_open_joints_rad: Annotated[Joints | None, Asked("hand")] = None
+    hand_open_joints_rad: Annotated[Joints | None, InGroup("hand")] = None
     """Joint angles with open fingers; null if none found."""
-    hand_approach: Annotated[Annotated[Array, Shape(3)] | None, Asked("hand")] = None
+    hand_approach: Annotated[Annotated[Array, Shape(3)] | None, InGroup("hand")] = None
     """Direction of the palm's straight way in; null if none."""
 
     def _check_together(self) -> None:
@@ -253,11 +253,11 @@ class GraspRow(Declared):
             there = np.isfinite(getattr(self, name)).all(axis=1)
             if there.sum() != self.contacts or not there[: self.contacts].all():
                 raise InputError(f"{name} must have the {self.contacts} that `contacts` says first")
-        if not (np.abs(np.linalg.norm(self.normals, axis=1) - 1.0) <= UNIT).all():
+        if not (np.abs(np.linalg.norm(self.normals, axis=1) - 1.0) <= UNIT_TOLERANCE).all():
             raise InputError("contact_normals must be unit vectors")
         if not self.was_tried:
             claims = (self.held, self.force_closed, self.closure_margin)
-            if self.label != GIVEN or self.trials or any(claim is not None for claim in claims):
+            if self.label != FROM_TOOL or self.trials or any(claim is not None for claim in claims):
                 raise InputError("the row claims results, although the grasp was not tried")
         elif self.held is None or self.force_closed is None or not self.trials:
             raise InputError("a grasp that was tried must have trials, held and force_closed")
@@ -312,7 +312,7 @@ class GraspRow(Declared):
 
     def held_on(self, body: Polyhedron) -> Polyhedron:
         """Return the object; on curved surfaces contacts not planned have faces of their own."""
-        other = self.label in (GIVEN, VARIED)
+        other = self.label in (FROM_TOOL, VARIED)
         return seat(body, self.points, self.normals).body if other else body
 
 
@@ -346,18 +346,18 @@ class ExecutionRow(Declared):
     trial: Number
     """Number of the trial, from 0 for each grasp."""
     tried: Annotated[ExecutionTrial, FLAT]
-    seed: Annotated[Seed | None, Asked("margins")] = None
+    seed: Annotated[Seed | None, InGroup("margins")] = None
     """Seed that a misplaced trial was drawn by; null for others."""
 
 
-ROWS: Mapping[Name, type[Any]] = {
+ROW_CLASSES: Mapping[Name, type[Any]] = {
     "objects": ObjectRow, "grasps": GraspRow, "trials": TrialRow, "executions": ExecutionRow,
 }  # fmt: skip
 """The class of each table's rows."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class DatasetRows:
     """Rows of all tables that belong together."""
 
     objects: tuple[ObjectRow, ...] = ()
@@ -369,16 +369,16 @@ class Rows:
         """Return the rows of a table."""
         return getattr(self, name)
 
-    def of_unit(self, row: ObjectRow, friction: float) -> "Rows":
+    def of_unit(self, row: ObjectRow, friction: float) -> "DatasetRows":
         """Return the rows of one object at one friction."""
         beginning = id_beginning(row.object_id, friction)
         own = {
             name: tuple(each for each in self.of(name) if each.grasp_id.startswith(beginning))
-            for name in NAMES if name != "objects"
+            for name in TABLE_NAMES if name != "objects"
         }  # fmt: skip
-        return Rows((row,), **own)
+        return DatasetRows((row,), **own)
 
-    def cells(self, name: Name, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
+    def cells(self, name: Name, columns: tuple[TableColumn, ...]) -> list[dict[str, Any]]:
         """Return the cells of the rows of a table."""
         return [cells_of(row, columns) for row in self.of(name)]
 
@@ -386,16 +386,19 @@ class Rows:
 def groups_asked() -> Iterator[str]:
     """Yield the names of all groups of columns."""
     marks = (
-        rule for kind in ROWS.values() for each in types(kind).values() for rule in rules(each)
+        rule
+        for kind in ROW_CLASSES.values()
+        for each in types(kind).values()
+        for rule in rules(each)
     )
-    yield from dict.fromkeys(mark.group for mark in marks if isinstance(mark, Asked))
+    yield from dict.fromkeys(mark.group for mark in marks if isinstance(mark, InGroup))
 
 
 def dataset_tables(groups: Mapping[str, int]) -> Tables:
     """Return the tables of a dataset with their columns; groups of columns have their sizes."""
     return {
-        name: columns_of(ROWS[name], groups)
-        for name in NAMES
+        name: columns_of(ROW_CLASSES[name], groups)
+        for name in TABLE_NAMES
         if name != "executions" or EXECUTED in groups
     }
 

@@ -1,17 +1,23 @@
-"""Runs the commands that build, import, verify and export datasets."""
+"""Runs the commands that build, import and verify datasets."""
 
 from contextlib import AbstractContextManager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from grasp_core.by_value import counted
 from grasp_core.errors import InputError
+from grasp_core.files.file_kinds import QUARANTINE
 from grasp_core.files.records import record_of
 from grasp_core.mesh_files.limits import FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
+from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.datasets import flags as dataset_flags
-from sim_validate.datasets.build import CARD, Engine, build
+from sim_validate.datasets.build import build
+from sim_validate.datasets.card import CARD
+from sim_validate.datasets.clusters import dask_workers, ray_workers
+from sim_validate.datasets.computing import Engine
 from sim_validate.datasets.config import (
     CREDITS,
     DatasetConfig,
@@ -19,34 +25,35 @@ from sim_validate.datasets.config import (
     PlannedContent,
     config_from_toml,
 )
-from sim_validate.datasets.isaac import export
 from sim_validate.datasets.open_dataset import CONFIG, splits_in_words
 from sim_validate.datasets.verify import verify
-from sim_validate.kit.console import TABLE_ROWS, Reporter, say_cut
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.workers import dask_workers, ray_workers
 
 
-def build_dataset(command: dataset_flags.Build, reporter: Reporter) -> int:
+def build_dataset(command: dataset_flags.BuildFlags, reporter: Reporter) -> int:
     """Make a dataset, or resume a build that was interrupted."""
-    first = Path(command.objects[0]) if command.objects else Path()
-    if first.suffix == ".toml":
-        unsaid = (PlannedContent(), Learning())
-        if len(command.objects) > 1 or (command.content, command.learning) != unsaid:
-            raise InputError(
-                f"{first} holds all settings of the dataset: give no other objects and no flags "
-                "but --out beside it"
-            )
-        config = config_from_toml(first)
-        config = replace(config, objects=_listed(config.objects))
-    else:
-        learning = None if command.learning == Learning() else command.learning
-        objects = _listed(command.objects)
-        config = extended(DatasetConfig, command.content, objects=objects, learning=learning)
+    config = _configuration(command)
     return _build(config, command.out, command.work, reporter)
 
 
-def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
+def _configuration(command: dataset_flags.BuildFlags) -> DatasetConfig:
+    """Read the settings of a dataset from flags, or from the file that is given in their place."""
+    first = Path(command.objects[0]) if command.objects else Path()
+    if first.suffix != ".toml":
+        learning = None if command.learning == Learning() else command.learning
+        objects = _listed(command.objects)
+        return extended(DatasetConfig, command.content, objects=objects, learning=learning)
+    if len(command.objects) > 1 or (command.content, command.learning) != (
+        PlannedContent(), Learning(),
+    ):  # fmt: skip
+        raise InputError(
+            f"{first} holds all settings of the dataset: give no other objects and no flags but "
+            "--out beside it"
+        )
+    config = config_from_toml(first)
+    return replace(config, objects=_listed(config.objects))
+
+
+def import_dataset(command: dataset_flags.ImportFlags, reporter: Reporter) -> int:
     """Judge the grasps of another tool, and write the results as a dataset."""
     config = extended(
         DatasetConfig, command.content, objects=(command.object,), contacts=str(command.contacts),
@@ -55,7 +62,9 @@ def import_dataset(command: dataset_flags.Import, reporter: Reporter) -> int:
     return _build(config, command.out, command.work, reporter)
 
 
-def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter: Reporter) -> int:
+def _build(
+    config: DatasetConfig, out: Path, work: dataset_flags.Working, reporter: Reporter
+) -> int:
     _warn(config, reporter)
     with reporter.progress("building") as steps, _engine(work) as engine:
         built = build(config, out, engine, steps.update, work.timeout_s)
@@ -70,14 +79,14 @@ def _build(config: DatasetConfig, out: Path, work: dataset_flags.Work, reporter:
     )
     reporter.say(splits_in_words(manifest))
     if manifest.quarantined:
-        reporter.warn(f"{out / 'quarantine.jsonl'} says why objects were left out")
+        reporter.warn(f"{out / QUARANTINE} says why objects were left out")
     reporter.document(
         {"out": str(out), "manifest": {"schema": manifest.SCHEMA, **record_of(manifest)}}
     )
     return Exit.PARTIAL if manifest.quarantined else Exit.GOOD
 
 
-def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
+def _engine(work: dataset_flags.Working) -> AbstractContextManager[Engine]:
     if work.engine != "local":
         start = ray_workers if work.engine == "ray" else dask_workers
         return start(work.jobs, work.address)
@@ -89,7 +98,7 @@ def _engine(work: dataset_flags.Work) -> AbstractContextManager[Engine]:
     return local_processes(work.jobs)
 
 
-def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
+def verify_dataset(command: dataset_flags.VerifyFlags, reporter: Reporter) -> int:
     """Check a dataset and list its faults."""
     faults = verify(command.dataset, command.share, command.seed)
     for fault in faults[:TABLE_ROWS]:
@@ -100,20 +109,6 @@ def verify_dataset(command: dataset_flags.Verify, reporter: Reporter) -> int:
     )
     reporter.document({"dataset": str(command.dataset), "faults": faults})
     return Exit.NEGATIVE if faults else Exit.GOOD
-
-
-def export_dataset(command: dataset_flags.Export, reporter: Reporter) -> int:
-    """Write the grasps of a dataset in force closure for another program."""
-    with reporter.progress("exporting") as steps:
-        done = export(command.dataset, command.out, command.split, steps.update)
-    counts = ", ".join(f"{count} {name}" for name, count in done.rows.items())
-    reporter.say(f"{command.out}: {done.files} files, {counts}")
-    if not done.rows["grasps"]:
-        where = f"the split {command.split} of the dataset" if command.split else "the dataset"
-        reporter.warn(f"{command.dataset}: {where} has no grasps")
-    asked = {"dataset": str(command.dataset), "to": command.to, "split": command.split}
-    reporter.document({**asked, "out": str(command.out), **asdict(done)})
-    return Exit.GOOD
 
 
 def _warn(config: DatasetConfig, reporter: Reporter) -> None:

@@ -25,12 +25,12 @@ from grasp_core.settings import Settings, as_table
 from sim_validate.settings import ExecutionSettings, LimitSearch
 
 Name: TypeAlias = Literal["objects", "grasps", "trials", "executions"]
-NAMES: tuple[Name, ...] = get_args(Name)
+TABLE_NAMES: tuple[Name, ...] = get_args(Name)
 SplitName: TypeAlias = Literal["train", "validation", "test"]
 SPLITS: tuple[tuple[SplitName, float], ...] = (("test", 0.1), ("validation", 0.2), ("train", 1.0))
 """Upper ends of each split's share of hashes: an object is in the first split whose end is above
 its hash."""
-SHORT = 16
+ID_DIGITS = 16
 """Number of digits of an object's hash in the names of its grasps."""
 KEYS: Mapping[Name, tuple[str, ...]] = {
     "objects": ("object_id",), "grasps": ("object_id", "grasp_id"), "trials": ("grasp_id", "trial"),
@@ -49,16 +49,16 @@ EXECUTED = "executed"
 
 def id_beginning(object_id: str, friction: float) -> str:
     """Return the first part of the names of all grasps of one object at one friction."""
-    return f"{object_id[:SHORT]}-{friction}-"
+    return f"{object_id[:ID_DIGITS]}-{friction}-"
 
 
-EXECUTION = "execution"
+EXECUTING = "execution"
 LEARNING = "learning"
 """Names of the tables in a settings file."""
-HandName: TypeAlias = Literal["", "allegro", "allegro-urdf", "leap"]
-Figure: TypeAlias = Literal["closure", "least_squeeze", "placement"]
+BuiltInHand: TypeAlias = Literal["", "allegro", "allegro-urdf", "leap"]
+FigureGroup: TypeAlias = Literal["closure", "least_squeeze", "placement"]
 """A group of figures that each grasp has on request."""
-CONTROLS = 5
+CONTROL_KINDS = 5
 """Number of kinds of synthetic negative controls that a grasp has at most."""
 CREDITS = ("title", "license", "creator", "url", "published")
 """Settings that only inform people; no row depends on them."""
@@ -80,13 +80,13 @@ class Learning(Settings):
     """Rows per grasp with contacts moved on their faces, each out of its region."""
     mass_near: Varied = 0
     """Rows per grasp that is executed with a mass near the one at which it is predicted to fail."""
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[FigureGroup, ...] = ()
     """Groups of figures that each grasp has; docs/datasets.md says what each costs."""
     seeds: tuple[Annotated[int, Interval(ge=0, le=MOST_COUNT)], ...] = ()
     """Seeds by which objects are misplaced once more in executions, besides the execution's own."""
-    synthetic: Annotated[int, Interval(ge=0, le=CONTROLS)] = CONTROLS
+    synthetic: Annotated[int, Interval(ge=0, le=CONTROL_KINDS)] = CONTROL_KINDS
     """Largest number of synthetic negative controls of each grasp, drawn from all that exist."""
-    hand: HandName = ""
+    hand: BuiltInHand = ""
     """Built-in hand whose pose is looked for in each grasp in force closure; empty for none."""
 
     def _check_together(self) -> None:
@@ -191,7 +191,7 @@ class DatasetConfig(PlannedContent):
         if self.learning is not None and self.learning.executes and self.execution is None:
             raise InputError(
                 f"{LEARNING}.{self.learning.executes}: only executed grasps have a mass and a "
-                f"squeeze; add a table [{EXECUTION}], or leave this setting out"
+                f"squeeze; add a table [{EXECUTING}], or leave this setting out"
             )
         if self.published and not _is_date(self.published):
             raise InputError(
@@ -220,7 +220,7 @@ class DatasetConfig(PlannedContent):
 
 def config_from_toml(path: Path) -> DatasetConfig:
     """Read a configuration from a file."""
-    from sim_validate.kit.files import read_tables  # slow, and no flag needs it
+    from sim_validate.files.toml_files import read_tables  # slow, and no flag needs it
 
     given = read_tables(path)
     with about(path):
@@ -237,7 +237,7 @@ def _is_date(text: str) -> bool:
 
 def config_to_toml(config: DatasetConfig) -> str:
     """Write a configuration as a file, whose first line tells editors where its schema is."""
-    from sim_validate.kit.schemas import address  # slow, and no flag needs it
+    from sim_validate.schemas.file_schemas import address  # slow, and no flag needs it
 
     return f"#:schema {address('dataset')}\n{settings_text(config)}"
 
@@ -245,7 +245,7 @@ def config_to_toml(config: DatasetConfig) -> str:
 def settings_text(config: DatasetConfig) -> str:
     """Write every setting in the order of the class; equal configurations give equal texts."""
     given = as_table(config)
-    tables = {name: given.pop(name) for name in (EXECUTION, LEARNING) if name in given}
+    tables = {name: given.pop(name) for name in (EXECUTING, LEARNING) if name in given}
     parts = [_lines(given), *(f"[{name}]\n{_lines(each)}" for name, each in tables.items())]
     return "\n".join(parts)
 

@@ -9,13 +9,13 @@ from tyro.conf import Positional
 from grasp_core.declared import declared
 from grasp_core.kinds import Count, Seed, Share
 from grasp_core.settings import Settings
-from sim_validate.datasets.config import Content, Learning, PlannedContent, SplitName
-from sim_validate.kit.command_flags import PLAIN, Positive, Spoken
-from sim_validate.kit.workers import available_cores
+from sim_validate.commands.flags import BARE, Positive, Spoken
+from sim_validate.datasets.config import Content, Learning, PlannedContent
+from sim_validate.processes.workers import available_cores
 
 
 @declared
-class Work(Settings):
+class Working(Settings):
     """Where a dataset is computed, and how much time; no row depends on these."""
 
     engine: Literal["local", "ray", "dask"] = "local"
@@ -30,7 +30,7 @@ class Work(Settings):
 
 
 @declared
-class Build(Spoken):
+class BuildFlags(Spoken):
     """Flags of the command `dataset build`."""
 
     objects: Positional[tuple[str, ...]]
@@ -38,13 +38,13 @@ class Build(Spoken):
     settings but --out (see docs/datasets.md)."""
     out: Path
     """Folder of the dataset."""
-    content: Annotated[PlannedContent, PLAIN] = field(default_factory=PlannedContent)
-    learning: Annotated[Learning, PLAIN] = field(default_factory=Learning)
-    work: Annotated[Work, PLAIN] = field(default_factory=Work)
+    content: Annotated[PlannedContent, BARE] = field(default_factory=PlannedContent)
+    learning: Annotated[Learning, BARE] = field(default_factory=Learning)
+    work: Annotated[Working, BARE] = field(default_factory=Working)
 
 
 @declared
-class Import(Spoken):
+class ImportFlags(Spoken):
     """Flags of the command `dataset import`."""
 
     contacts: Positional[Path]
@@ -55,12 +55,12 @@ class Import(Spoken):
     """Folder of the dataset."""
     outward: bool = False
     """Read the file's normals as pointing out of the object, not into it."""
-    content: Annotated[Content, PLAIN] = field(default_factory=Content)
-    work: Annotated[Work, PLAIN] = field(default_factory=Work)
+    content: Annotated[Content, BARE] = field(default_factory=Content)
+    work: Annotated[Working, BARE] = field(default_factory=Working)
 
 
 @declared
-class Verify(Spoken):
+class VerifyFlags(Spoken):
     """Flags of the command `dataset verify`."""
 
     dataset: Positional[Path]
@@ -69,17 +69,3 @@ class Verify(Spoken):
     """Share of all objects and frictions that is computed again, at least one; 0 for none."""
     seed: Seed = 0
     """Seed of the random choice of the sample that is computed again."""
-
-
-@declared
-class Export(Spoken):
-    """Flags of the command `dataset export`."""
-
-    dataset: Positional[Path]
-    """Folder of the dataset."""
-    out: Path
-    """Folder to write to; it must be empty or not exist."""
-    to: Literal["isaac"] = "isaac"
-    """Format: Isaac grasp files, one for each object at each friction."""
-    split: SplitName | None = None
-    """Export only the objects of this split; if not given, all objects."""

@@ -43,7 +43,7 @@ from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import ExecutionCells, ExecutionRow, GraspRow
 from sim_validate.datasets.config import DatasetConfig, Learning
-from sim_validate.datasets.parquet import Cells
+from sim_validate.datasets.parquet import RowCells
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.execution.execute import execute, tip_radius
 from sim_validate.execution.verdict import ExecutedGrasp, ExecutionTrial
@@ -138,7 +138,7 @@ hand_named = cache(load_hand)
 """Return a built-in hand, one value for all grasps of a process, as searches are kept by it."""
 
 
-def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact]) -> Cells:
+def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Contact]) -> RowCells:
     """Return the figures on request that any contacts have, closed or not."""
     if "closure" not in config.asked.figures:
         return {}
@@ -154,7 +154,7 @@ def contact_cells(config: DatasetConfig, body: Polyhedron, contacts: Sequence[Co
 
 def placement_cells(
     config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float
-) -> Cells:
+) -> RowCells:
     """Return the proved chance of closure of a misplaced grasp, if it is asked for."""
     if "placement" not in config.asked.figures:
         return {}
@@ -163,7 +163,7 @@ def placement_cells(
     return {"closed_share_reason": bounded} if missing else {"closed_share": bounded.lower}
 
 
-def hand_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> Cells:
+def hand_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: float) -> RowCells:
     """Return the pose of a hand in a grasp in force closure, if one is asked for."""
     if not config.asked.hand:
         return {}
@@ -182,7 +182,7 @@ def hand_cells(config: DatasetConfig, body: Polyhedron, grasp: Grasp, friction: 
     }
 
 
-def squeeze_cells(config: DatasetConfig, body: Polyhedron, row: GraspRow) -> Cells:
+def squeeze_cells(config: DatasetConfig, body: Polyhedron, row: GraspRow) -> RowCells:
     """Return the figures on request that only executed contacts have."""
     if config.execution is None or row.mass_kg is None:
         return {}
@@ -198,7 +198,7 @@ def squeeze_cells(config: DatasetConfig, body: Polyhedron, row: GraspRow) -> Cel
     return cells
 
 
-RATIOS = {
+VARIED_RATIOS = {
     "friction_below": (0.6, 0.9),
     "friction_near": (0.95, 1.05),
     "friction_above": (1.1, 5.0),
@@ -206,13 +206,13 @@ RATIOS = {
 }
 """Least and largest ratio of a varied friction or mass to the one at which the verdict changes.
 Between them every logarithm of a ratio is as likely."""
-DIGITS = 4
+VARIED_DIGITS = 4
 """Significant digits of a varied friction or mass, which tables then show as they are."""
-TRIES = 32
+MOVE_TRIES = 32
 """Number of random ways in which a contact is moved until it stays on its face."""
 PAST = (0.05, 1.0)
 """How far past its region's end a contact moves, over the way to there or `LEAST_WAY`."""
-UNMOVED: Cells = {"displaced_m": (0.0,) * FINGERS, "region_exit_m": (None,) * FINGERS}
+UNMOVED: RowCells = {"displaced_m": (0.0,) * FINGERS, "region_exit_m": (None,) * FINGERS}
 """What rows say where no contact moved: the regions' ends are not known then."""
 LEAST_WAY = 0.1
 """Least way that a contact's move is measured by, in object radii: regions may be points."""
@@ -228,7 +228,7 @@ class Variant:
     """The contacts and their object."""
     friction: float
     proved: Grasp | ClosureCertificate
-    cells: Cells
+    cells: RowCells
     """What its row says of how it was varied."""
     mass_kg: float | None = None
     """Mass of the object in the execution; None for the mass of the settings [kg]."""
@@ -302,7 +302,7 @@ def _past(
     """Move a contact past its region's end on its face; return how far the region reached, too."""
     contact, face = grasp.contacts[finger], body.faces[grasp.faces[finger]]
     frame = plane_frame(contact.normal)
-    for _ in range(TRIES):
+    for _ in range(MOVE_TRIES):
         turn = rng.uniform(0.0, 2.0 * math.pi)
         way = frame @ np.array([math.cos(turn), math.sin(turn)])
         reached = region_exit(grasp.regions[finger], contact, way)
@@ -314,7 +314,7 @@ def _past(
 
 
 def _decided(
-    kind: str, number: int, at: Seated, friction: float, moved: Cells
+    kind: str, number: int, at: Seated, friction: float, moved: RowCells
 ) -> Iterator[Variant]:
     """Yield a variant with its proof, unless rounding does not let closure be decided."""
     name = f"{kind}-{number}"
@@ -344,12 +344,12 @@ def heavier(
 
 
 def _ratio(kind: str, rng: np.random.Generator) -> float:
-    least, most = RATIOS[kind]
+    least, most = VARIED_RATIOS[kind]
     return math.exp(rng.uniform(math.log(least), math.log(most)))
 
 
 def _short(value: float) -> float:
-    return float(f"{value:.{DIGITS - 1}e}")
+    return float(f"{value:.{VARIED_DIGITS - 1}e}")
 
 
 def validated_with(

@@ -2,7 +2,7 @@
 
 A field is a column of its name. A record that is `FLAT` in the row gives a column for each of its
 entries, also one that keeps the figures of another class, so that a new figure is a new column.
-`Asked` marks fields that a dataset only has on request.
+`InGroup` marks fields that a dataset only has on request.
 
 Equal rows give equal bytes. Every page carries a checksum, and reading checks it: without that, a
 flipped bit goes unnoticed. Units and meanings are in the metadata of the columns. A whole dataset
@@ -37,12 +37,12 @@ from grasp_core.values import FINGERS
 from sim_validate.datasets.config import KEYS, Name
 
 CellKind: TypeAlias = Literal["text", "bool", "int", "float"]
-Cells: TypeAlias = Mapping[str, Any]
+RowCells: TypeAlias = Mapping[str, Any]
 """The cells of a row as plain values, by column."""
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class InGroup:
     """The mark of a field that a dataset has only if it has a group of columns."""
 
     group: str
@@ -61,7 +61,7 @@ Known = OrInfinity | None
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class TableColumn:
     """Name, type, unit and meaning of one column of a table."""
 
     name: str
@@ -72,22 +72,22 @@ class Column:
     """Shape of each cell; () for a plain value."""
 
 
-Tables: TypeAlias = Mapping[Name, tuple[Column, ...]]
+Tables: TypeAlias = Mapping[Name, tuple[TableColumn, ...]]
 """The tables of a dataset, with their columns."""
 Form: TypeAlias = tuple[CellKind, tuple[int, ...]]
 """Type and shape of a column's cells."""
 
 
-def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[Column, ...]:
+def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[TableColumn, ...]:
     """Return the columns of a row class in a dataset with some groups of columns.
 
     A group's size is the length that has its name in the shape of an array; a length that is free
     is the number of fingers.
     """
-    found: list[Column] = []
+    found: list[TableColumn] = []
     for each in entries(kind):
         marks = rules(each.kind)
-        if any(isinstance(mark, Asked) and mark.group not in groups for mark in marks):
+        if any(isinstance(mark, InGroup) and mark.group not in groups for mark in marks):
             continue
         if each.flat is not None:
             found += columns_of(each.flat, groups)
@@ -95,7 +95,9 @@ def columns_of(kind: type, groups: Mapping[str, int]) -> tuple[Column, ...]:
             form, meaning = _form(each.kind, groups), meanings(kind).get(each.name, "")
             assert form is not None, each.key  # noqa: S101 - all fields of row classes are cells
             unit = (unit_of(each.key) or "1") if form[0] == "float" else ""
-            found.append(Column(each.key, form[0], meaning.replace("None", "null"), unit, form[1]))
+            found.append(
+                TableColumn(each.key, form[0], meaning.replace("None", "null"), unit, form[1])
+            )
     return tuple(found)
 
 
@@ -146,13 +148,13 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def cells_of(row: object, columns: tuple[Column, ...]) -> dict[str, Any]:
+def cells_of(row: object, columns: tuple[TableColumn, ...]) -> dict[str, Any]:
     """Return the cells of a row; where it has fewer fingers than a column, the last are null."""
     found = record_of(row)
     return {each.name: _filled(found.get(each.name), each) for each in columns}
 
 
-def _filled(value: Any, column: Column) -> Any:
+def _filled(value: Any, column: TableColumn) -> Any:
     if value is None or not column.shape:
         return _plain(value)
     missing = np.full(column.shape[1:], None).tolist()
@@ -181,10 +183,10 @@ MISSING: Mapping[str, float] = {"float": math.nan, "int": -1}
 """Value that stands for null in arrays, by type of column."""
 GROUP_ROWS = 20_000
 """Number of rows that are written or read at a time, some tens of megabytes in memory."""
-MOST_ROWS, MOST_GROUP_BYTES = 10_000_000, 2**30
+MOST_FILE_ROWS, MOST_GROUP_BYTES = 10_000_000, 2**30
 """Largest number of rows of a file, and of bytes in a row group, that are read: twenty times what
 is written."""
-PAGES: Mapping[str, Any] = {
+PARQUET_OPTIONS: Mapping[str, Any] = {
     "compression": "zstd",
     "write_page_checksum": True,
     "write_page_index": True,
@@ -205,14 +207,14 @@ def pyarrow() -> Any:
         ) from error
 
 
-def parquet_bytes(name: Name, rows: Sequence[Cells], tables: Tables) -> bytes:
+def parquet_bytes(name: Name, rows: Sequence[RowCells], tables: Tables) -> bytes:
     """Encode the cells of one table's rows as the bytes of a file, sorted by their keys."""
     arrow, held = pyarrow(), io.BytesIO()
     try:
         table = arrow.Table.from_pylist(list(rows), schema=schema_of(tables[name]))
     except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
         raise InputError(f"table {name}: a cell does not fit its column: {error}") from error
-    arrow.parquet.write_table(_in_order(table, name), held, **PAGES)
+    arrow.parquet.write_table(_in_order(table, name), held, **PARQUET_OPTIONS)
     return held.getvalue()
 
 
@@ -273,10 +275,10 @@ def _check_size(path: Path, claimed: Any) -> None:
     """Refuse a file that would not fit into memory, before anything is read."""
     groups = [claimed.row_group(i) for i in range(claimed.num_row_groups)]
     rows, largest = claimed.num_rows, max((each.total_byte_size for each in groups), default=0)
-    if not 0 <= rows <= MOST_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
+    if not 0 <= rows <= MOST_FILE_ROWS or not 0 <= largest <= MOST_GROUP_BYTES:
         raise InputError(
             f"{path}: the file claims {rows} rows, and {largest} bytes in one group of rows; the "
-            f"limits are {MOST_ROWS} and {MOST_GROUP_BYTES}, so the file is not read"
+            f"limits are {MOST_FILE_ROWS} and {MOST_GROUP_BYTES}, so the file is not read"
         )
 
 
@@ -296,7 +298,7 @@ def read_columns(paths: Sequence[Path], name: Name, tables: Tables) -> Columns:
     }
 
 
-def _as_array(column: Column, values: Sequence[Any]) -> NDArray[Any]:
+def _as_array(column: TableColumn, values: Sequence[Any]) -> NDArray[Any]:
     if column.kind == "text":
         return np.array(values, dtype=object)
     if column.kind == "bool":
@@ -312,7 +314,7 @@ def _as_array(column: Column, values: Sequence[Any]) -> NDArray[Any]:
 
 
 @cache
-def schema_of(columns: tuple[Column, ...]) -> Any:
+def schema_of(columns: tuple[TableColumn, ...]) -> Any:
     """Return columns of a table as an Arrow schema, with units and meanings as metadata."""
     arrow = pyarrow()
     found = list[Any]()
@@ -361,7 +363,7 @@ def _write_file(path: Path, groups: Iterable[Any], schema: Any) -> int:
     """Write groups of rows until the file is full, and return the number of rows."""
     rows = 0
     writer = pyarrow().parquet.ParquetWriter
-    with path.open("wb") as stream, writer(stream, schema, **PAGES) as to:
+    with path.open("wb") as stream, writer(stream, schema, **PARQUET_OPTIONS) as to:
         for group in groups:
             to.write_table(group, row_group_size=group.num_rows)
             rows += group.num_rows

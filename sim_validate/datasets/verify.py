@@ -31,6 +31,7 @@ from grasp_core.errors import GraspError, InputError, UndecidedError
 from grasp_core.execution.grips import grip
 from grasp_core.execution.loads import any_direction
 from grasp_core.execution.squeeze_certificate import Survival
+from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
 from grasp_core.files.text_files import read_text
 from grasp_core.frames import POSE
 from grasp_core.hands.collisions import clearances, tip_distances
@@ -39,26 +40,35 @@ from grasp_core.objects.on_faces import Surface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import arithmetic
 from grasp_core.values import FINGERS
-from sim_validate.datasets.build import CONTACTS, TWIN
-from sim_validate.datasets.columns import GIVEN, ROUNDING, VARIED, GraspRow, ObjectRow, Rows
-from sim_validate.datasets.config import KEYS, NAMES, REFERENCES, SPLITS, Name
-from sim_validate.datasets.learning import RATIOS, contact_cells, hand_named, ratio_of, trial_cells
-from sim_validate.datasets.open_dataset import (
-    CONFIG,
-    MANIFEST,
-    QUARANTINE,
-    Dataset,
-    read_left_out,
-    select,
+from sim_validate.datasets.columns import (
+    FROM_TOOL,
+    ROUNDOFF,
+    VARIED,
+    DatasetRows,
+    GraspRow,
+    ObjectRow,
 )
-from sim_validate.datasets.parquet import Cells, agrees, pyarrow
-from sim_validate.datasets.work_units import PLANNED, WorkUnit, made_of, provenance, read_given
+from sim_validate.datasets.config import KEYS, REFERENCES, SPLITS, TABLE_NAMES, Name
+from sim_validate.datasets.given_grasps import read_given
+from sim_validate.datasets.learning import (
+    VARIED_RATIOS,
+    contact_cells,
+    hand_named,
+    ratio_of,
+    trial_cells,
+)
+from sim_validate.datasets.making_rows import PLANNED_KIND, made_of
+from sim_validate.datasets.manifest import read_left_out
+from sim_validate.datasets.open_dataset import CONFIG, Dataset, select
+from sim_validate.datasets.parquet import RowCells, agrees, pyarrow
+from sim_validate.datasets.work_units import WorkUnit, provenance
+from sim_validate.datasets.writing import GIVEN_CONTACTS, TWIN
 from sim_validate.engine.traces import Outcome
 from sim_validate.execution.execute import tip_radius
 from sim_validate.execution.verdict import ExecutionTrial, may_slip
-from sim_validate.kit.locks import LOCK
+from sim_validate.files.locks import LOCK
 
-MOST_NAMED = 20
+MOST_UNIT_FAULTS = 20
 """Largest number of faults that are listed for one object at one friction."""
 
 
@@ -86,7 +96,7 @@ def verify(folder: Path, share: float = 0.0, seed: int = 0) -> list[str]:
     return faults
 
 
-def _parts(dataset: Dataset) -> Iterator[tuple[Dataset, Rows]]:
+def _parts(dataset: Dataset) -> Iterator[tuple[Dataset, DatasetRows]]:
     """Yield the rows of each object, with the split whose files they are in."""
     for split, _ in SPLITS:
         part = replace(dataset, split=split)
@@ -148,7 +158,7 @@ class _Redoing:
         self._dataset, self._config, manifest = dataset, dataset.config, dataset.manifest
         same = (dict(provenance()), arithmetic())
         self._exact = (manifest.versions, manifest.arithmetic) == same
-        self._given = read_given(dataset.folder / CONTACTS) if self._config.contacts else ()
+        self._given = read_given(dataset.folder / GIVEN_CONTACTS) if self._config.contacts else ()
         self._left_out: dict[tuple[str, float], set[str]] = {}
         """Given grasps without rows, by source and friction; none where grasps are planned."""
         for each in read_left_out(dataset.folder / QUARANTINE):
@@ -160,7 +170,9 @@ class _Redoing:
         """List the frictions at which an object has rows, perhaps without a grasp."""
         return [f for f in self._config.frictions if not self._all_left_out(row, f)]
 
-    def faults(self, row: ObjectRow, rows: Rows, chosen: Set[tuple[str, float]]) -> Iterator[str]:
+    def faults(
+        self, row: ObjectRow, rows: DatasetRows, chosen: Set[tuple[str, float]]
+    ) -> Iterator[str]:
         """Yield sentences on what is wrong with an object at the chosen frictions."""
         for friction in self._config.frictions:
             stored = rows.of_unit(row, friction)
@@ -169,14 +181,14 @@ class _Redoing:
                 if stored.grasps:
                     yield f"{where}: {QUARANTINE} lists this object as left out, but it has rows"
             elif (row.object_id, friction) in chosen:
-                found = islice(self._unit_faults(row, friction, stored), MOST_NAMED)
+                found = islice(self._unit_faults(row, friction, stored), MOST_UNIT_FAULTS)
                 yield from (f"{where}: {fault}" for fault in found)
 
     def _all_left_out(self, row: ObjectRow, friction: float) -> bool:
         gone = self._left_out.get((row.source_sha256, friction))
         return gone is not None and len(gone) == len(self._given)
 
-    def _unit_faults(self, row: ObjectRow, friction: float, stored: Rows) -> Iterator[str]:
+    def _unit_faults(self, row: ObjectRow, friction: float, stored: DatasetRows) -> Iterator[str]:
         name, source = row.source_name, row.source_sha256
         gone = self._left_out.get((source, friction), set())
         given = tuple(each for each in self._given if each.id not in gone)
@@ -208,7 +220,7 @@ def drawn(
     return sorted(units, key=place)[: math.ceil(share * len(units))]
 
 
-def _differences(name: Name, stored: Sequence[Cells], made: Sequence[Cells]) -> Iterator[str]:
+def _differences(name: Name, stored: Sequence[RowCells], made: Sequence[RowCells]) -> Iterator[str]:
     before = {tuple(row[key] for key in KEYS[name]): row for row in stored}
     after = {tuple(row[key] for key in KEYS[name]): row for row in made}
     yield from (
@@ -225,7 +237,7 @@ def _differences(name: Name, stored: Sequence[Cells], made: Sequence[Cells]) -> 
                 yield f"{name}: {key}: {column} is {one}, but {other} when computed again"
 
 
-def _loose_differences(stored: Rows, made: Rows) -> Iterator[str]:
+def _loose_differences(stored: DatasetRows, made: DatasetRows) -> Iterator[str]:
     """Yield differences beyond rounding, which may choose other, equally good grasps."""
     before, after = (
         {row.grasp_id: row for row in rows.grasps if row.control_of is None}
@@ -246,7 +258,7 @@ def loose_differences(one: GraspRow, other: GraspRow) -> Iterator[str]:
     A grasp whose contacts slip may be kept or lost by a hair, so its survival does not count.
     """
     same = one.contacts == other.contacts
-    if not same or not np.allclose(one.points, other.points, rtol=ROUNDING, atol=0.0):
+    if not same or not np.allclose(one.points, other.points, rtol=ROUNDOFF, atol=0.0):
         return  # the best contacts are not unique
     slips = any(map(may_slip, (one.predicted_first_slip, other.predicted_first_slip)))
     names = ("held", "force_closed", "critical_friction", *(() if slips else ("survived",)))
@@ -254,25 +266,25 @@ def loose_differences(one: GraspRow, other: GraspRow) -> Iterator[str]:
     yield from _disagreements(one, again, "computing it again")
 
 
-ON_SURFACE, NEAR_SURFACE = 1e-5, 0.05
+ON_MESH, NEAR_MESH = 1e-5, 0.05
 """Largest distance of contacts from the mesh, for grasps and negative controls, relative to the
 object's radius. Planar faces are as flat as six digits show. Negative controls are moved in
 the planes of patches, from which a curved surface departs."""
-BAND = 1e-3
+RATIO_TOLERANCE = 1e-3
 """Share by which a ratio may leave its band: frictions and masses are rounded to four digits."""
-NAMED: Mapping[tuple[Name, str], tuple[Name, str]] = {
+NAMING_COLUMNS: Mapping[tuple[Name, str], tuple[Name, str]] = {
     **REFERENCES, ("grasps", "control_of"): ("grasps", "grasp_id"),
 }  # fmt: skip
 """Columns that name a row of another table or, where they are not null, of their own."""
-LABELS = {"grasp": PLANNED, GIVEN: GIVEN}
+LABELS = {"grasp": PLANNED_KIND, FROM_TOOL: FROM_TOOL}
 """Kind of the rows of a label; other labels but `varied` are kinds themselves."""
-OFF = 1e-9
+UNBALANCED = 1e-9
 """Wrench that balanced forces leave, relative to the forces, at object radius one."""
 TOUCHES_M = 2e-5
 """Largest distance of a fingertip from its contact [m]: twice what the search allows."""
 APART_M = 4e-4
 """Least distance of the hand's links from each other [m]; the search keeps 0.5 mm."""
-ROUNDED = 1e-9
+POSE_ROUNDING = 1e-9
 """How far rounding may move an angle beyond its range [rad], a link into the object [m], a pose
 from a rigid motion, or a direction from unit length."""
 
@@ -288,7 +300,7 @@ def _disagreements(row: GraspRow, wanted: Mapping[str, Any], source: str) -> Ite
 class _Checking:
     """Checks the rows of one object, and its mesh."""
 
-    def __init__(self, part: Dataset, rows: Rows) -> None:
+    def __init__(self, part: Dataset, rows: DatasetRows) -> None:
         self.part, self.config, self.rows = part, part.config, rows
         self.by_name = {row.grasp_id: row for row in rows.grasps}
         self.outcomes = defaultdict[str, list[Outcome]](list)
@@ -317,12 +329,12 @@ class _Checking:
         split = self.part.split
         if any(row.split != split for row in (*self.rows.objects, *self.rows.grasps)):
             yield f"objects or grasps: files of the split {split} have rows of another split"
-        for name in NAMES:
+        for name in TABLE_NAMES:
             rows = self.rows.of(name)
             keys = Counter(tuple(getattr(row, key) for key in KEYS[name]) for row in rows)
             if any(count > 1 for count in keys.values()):
                 yield f"{name}: two rows have the same {' and '.join(KEYS[name])}"
-        for (name, column), (other, key) in NAMED.items():
+        for (name, column), (other, key) in NAMING_COLUMNS.items():
             there = {getattr(row, key) for row in self.rows.of(other)}
             named = {getattr(row, column) for row in self.rows.of(name)} - {None}
             yield from (
@@ -398,7 +410,7 @@ class _Checking:
         if (row.kind == "moved_out") == (not stated.any()):
             yield f"contacts of the kind {row.kind} are not where they must be"
         # where a contact did not move, its exit is NaN, which nothing is below
-        if body.patches is None and (stated <= exits * (1.0 - ROUNDING)).any():
+        if body.patches is None and (stated <= exits * (1.0 - ROUNDOFF)).any():
             yield "a contact was moved, but is still in its region"
         try:
             critical = critical_friction(row.points, row.normals)
@@ -406,10 +418,12 @@ class _Checking:
             yield f"the critical friction cannot be computed ({error})"
             return
         yield from _disagreements(row, {"critical_friction": critical}, "the contacts")
-        if row.kind in RATIOS:
-            least, most = RATIOS[row.kind]
+        if row.kind in VARIED_RATIOS:
+            least, most = VARIED_RATIOS[row.kind]
             ratio = row.mass_ratio if row.kind == "mass_near" else row.friction_ratio
-            if ratio is None or not least * (1.0 - BAND) <= ratio <= most * (1.0 + BAND):
+            if ratio is None or not least * (1.0 - RATIO_TOLERANCE) <= ratio <= most * (
+                1.0 + RATIO_TOLERANCE
+            ):
                 yield f"the ratio {ratio} is none of the kind {row.kind}"
 
     def _trials(self, row: GraspRow) -> Iterator[str]:
@@ -459,10 +473,10 @@ class _Checking:
             return
         survival = Survival.of(held, any_direction(settings.object_kg))
         reactions = survival.reactions(held.local_squeeze)
-        multiple = load * (1.0 - ROUNDING)
+        multiple = load * (1.0 - ROUNDOFF)
         pushes = reactions.start[:, 0] + multiple * reactions.swing
         most_n = settings.push_n if push_n is None else push_n
-        limited = bool((pushes <= most_n * (1.0 + ROUNDING)).all())
+        limited = bool((pushes <= most_n * (1.0 + ROUNDOFF)).all())
         if not (limited and reactions.survives(multiple, reactions.multipliers(multiple))):
             stated = getattr(row, claim)
             yield f"{claim} is {stated:.9g}, but the squeeze is not proved to carry as much"
@@ -472,9 +486,9 @@ def _on_surface(surface: Surface, row: GraspRow, radius_m: float) -> Iterator[bo
     """Yield for each contact whether it is on the object, with its normal if it is no control's."""
     for point, normal in zip(row.points, row.normals, strict=True):
         if row.control_of is None:
-            yield surface.holds(point, normal, ON_SURFACE * radius_m)
+            yield surface.holds(point, normal, ON_MESH * radius_m)
         else:
-            yield surface.holds(point, None, NEAR_SURFACE * radius_m)
+            yield surface.holds(point, None, NEAR_MESH * radius_m)
 
 
 def _contact_faults(row: GraspRow) -> Iterator[str]:
@@ -497,8 +511,8 @@ def _witness_faults(row: GraspRow, forces: Array, body: Polyhedron) -> Iterator[
     pushes = np.einsum("ki,ki->k", forces, row.normals)
     across = np.linalg.norm(forces - pushes[:, None] * row.normals, axis=1)
     left = np.concatenate([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
-    in_cones = (across <= row.friction * pushes * (1.0 + ROUNDING) + OFF).all()
-    if not in_cones or np.abs(left).max() > ROUNDING or abs(pushes.sum() - 1.0) > ROUNDING:
+    in_cones = (across <= row.friction * pushes * (1.0 + ROUNDOFF) + UNBALANCED).all()
+    if not in_cones or np.abs(left).max() > ROUNDOFF or abs(pushes.sum() - 1.0) > ROUNDOFF:
         yield "witness_forces_n are no balanced forces in the friction cones"
 
 
@@ -525,11 +539,11 @@ def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
             row.hand_open_joints_rad is None or _in_ranges(row.hand_open_joints_rad, hand)
         ),
         "T_object_palm_m is not a rigid motion": (
-            np.abs(turn @ turn.T - np.eye(3)).max() <= ROUNDED and np.linalg.det(turn) > 0.0
+            np.abs(turn @ turn.T - np.eye(3)).max() <= POSE_ROUNDING and np.linalg.det(turn) > 0.0
             and pose[3].tolist() == np.eye(POSE)[3].tolist()
         ),
         "hand_approach is not of unit length": (
-            way is None or abs(np.linalg.norm(way) - 1.0) <= ROUNDED
+            way is None or abs(np.linalg.norm(way) - 1.0) <= POSE_ROUNDING
         ),
         "hand_points_m are not on the object, or hand_normals not its normals there": all(
             surface.holds(point, normal, TOUCHES_M)
@@ -540,7 +554,7 @@ def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
         ),
         # a link whose tip touches the object may come as near to it as it likes
         "the hand of hand_joints_rad overlaps the object or itself": (
-            found.itself >= APART_M and found.object >= -ROUNDED and found.tips >= -TOUCHES_M
+            found.itself >= APART_M and found.object >= -POSE_ROUNDING and found.tips >= -TOUCHES_M
         ),
         "hand_points_m are not proved to be in force closure": (
             _is_proved(points, normals, row.friction)
@@ -551,7 +565,7 @@ def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
 
 def _in_ranges(angles: Array, hand: Hand) -> bool:
     low, high = hand.ranges.T
-    return bool(((angles >= low - ROUNDED) & (angles <= high + ROUNDED)).all())
+    return bool(((angles >= low - POSE_ROUNDING) & (angles <= high + POSE_ROUNDING)).all())
 
 
 def _is_proved(points: Array, normals: Array, friction: float) -> bool:

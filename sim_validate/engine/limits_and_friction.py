@@ -55,7 +55,7 @@ from grasp_core.quality.wrench_limits import (
 )
 from grasp_core.values import Contact
 from scenes.mujoco.closure_scene import SQUEEZE, Layout, Scene
-from scenes.settings import HARD, Softness
+from scenes.settings import HARD_CONTACTS, Softness
 from sim_validate.engine.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 from sim_validate.engine.simulate import Bench, Load, Motion, Schedule, samples, smooth
 from sim_validate.engine.traces import EarlyEnds, Thresholds, Trace, holds, traces
@@ -422,7 +422,7 @@ def bisected(
 
 
 def forces_just_above(
-    positions: Array, normals: Array, critical: float, physics: Softness = HARD
+    positions: Array, normals: Array, critical: float, physics: Softness = HARD_CONTACTS
 ) -> Array:
     """Find balanced forces that need almost the critical friction, (k, 3), largest push 1 N.
 

@@ -24,6 +24,10 @@ from grasp_core.stopping import never
 from grasp_core.values import Grasp
 from scenes import exports
 from scenes.settings import ScaledScene
+from sim_validate.commands import simulation_flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter, warn_of
+from sim_validate.commands.exit_codes import Exit, FlagsError
+from sim_validate.commands.simulation_flags import RunFlags
 from sim_validate.engine.setup import Setup, physics_from_file, with_planned_radius
 from sim_validate.execution.execute import ExecutionJob, Fingertips, executed
 from sim_validate.execution.verdict import (
@@ -36,11 +40,9 @@ from sim_validate.execution.verdict import (
     multiple_in_words,
     totals_in_words,
 )
-from sim_validate.kit import simulation_flags
-from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
-from sim_validate.kit.exit_codes import Exit, FlagsError
-from sim_validate.kit.files import AboutObject, alone_in, remove_results
-from sim_validate.kit.simulation_flags import Run
+from sim_validate.files.output_folders import alone_in
+from sim_validate.files.result_files import AboutObject
+from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_finger, asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
@@ -57,7 +59,7 @@ SLIPS_MEAN = (
 )
 
 
-def execute_file(command: simulation_flags.Execute, reporter: Reporter) -> int:
+def execute_file(command: simulation_flags.ExecuteFlags, reporter: Reporter) -> int:
     """Execute the grasps of a file in simulation and report which of them survive."""
     chosen = asked_grasps(
         command.grasps, reporter, grasp=command.grasp, friction=command.friction,
@@ -176,7 +178,7 @@ def execution_settings(
     return extended(ExecutionSettings, holding(given, body, finger), seed=seed)
 
 
-def check_executing(command: Run) -> None:
+def check_executing(command: RunFlags) -> None:
     """Refuse flags about executions where none are asked for, before any file is read."""
     if not command.execute and command.executing != ChosenExecution():
         raise FlagsError(
@@ -184,7 +186,7 @@ def check_executing(command: Run) -> None:
         )
 
 
-def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None:
+def execution_of_run(command: RunFlags, body: Polyhedron) -> ExecutionSettings | None:
     """Build the settings of the executions that `run` is asked for; None if it is not."""
     if not command.execute:
         return None
@@ -195,7 +197,7 @@ def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None
 TextOf = Callable[[Grasp], str]
 
 
-def write_scenes(command: simulation_flags.Scene, reporter: Reporter) -> int:
+def write_scenes(command: simulation_flags.SceneFlags, reporter: Reporter) -> int:
     """Write a MuJoCo scene for each grasp of a file, or print a single one."""
     _check(command)
     saved = load_grasps(command.grasps)
@@ -238,7 +240,7 @@ def _written(grasp: Grasp, text_of: TextOf, folder: Path | None, reporter: Repor
     return path
 
 
-def _check(command: simulation_flags.Scene) -> None:
+def _check(command: simulation_flags.SceneFlags) -> None:
     """Refuse flags that the scene asked for does not use, before any file is read."""
     if command.holding.weighed:
         if command.scaled != ScaledScene():
@@ -254,14 +256,14 @@ def _check(command: simulation_flags.Scene) -> None:
         )
 
 
-def _scaled(command: simulation_flags.Scene, saved: Plan, friction: float) -> TextOf:
+def _scaled(command: simulation_flags.SceneFlags, saved: Plan, friction: float) -> TextOf:
     setup = extended(Setup, command.scaled)
     setup = replace(setup, fingers=with_planned_radius(setup.fingers, saved.finger))
     return lambda grasp: setup.scene(saved.body, grasp, friction).xml
 
 
 def _held(
-    command: simulation_flags.Scene, saved: Plan, friction: float, reporter: Reporter
+    command: simulation_flags.SceneFlags, saved: Plan, friction: float, reporter: Reporter
 ) -> TextOf:
     own = holding(command.holding, saved.body, saved.finger)
     settings = extended(ExecutionSettings, own)
@@ -279,9 +281,9 @@ def _held(
     return text_of
 
 
-def export_grasps(command: simulation_flags.Export, reporter: Reporter) -> int:
+def export_grasps(command: simulation_flags.ExportFlags, reporter: Reporter) -> int:
     """Write the grasps of a file as one file of another program's format."""
-    endings = exports.ENDINGS[command.to]
+    endings = exports.EXPORT_ENDINGS[command.to]
     if command.out.suffix.lower() not in endings:
         raise FlagsError(
             f"--out must end in {' or '.join(endings)} with --to {command.to}, got {command.out}"

@@ -32,12 +32,7 @@ from grasp_core.errors import GraspError, InputError, NoForcesError
 from grasp_core.execution.grips import Grip, unsqueezed
 from grasp_core.execution.squeeze_certificate import BestSqueeze
 from grasp_core.kinds import instance, one_of, value_of
-from grasp_core.objects.on_faces import (
-    check_body,
-    check_on_faces,
-    edge_distance,
-    face_under,
-)
+from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distance, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
@@ -61,8 +56,8 @@ from sim_validate.execution.simulate import (
 )
 from sim_validate.execution.trials import Trial, run_controls
 from sim_validate.execution.verdict import ExecutedGrasp, Execution, ExecutionTrial
-from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.kit.workers import each, processes
+from sim_validate.processes.own_faults import OWN_FAULTS
+from sim_validate.processes.workers import each, processes
 from sim_validate.settings import ExecutionSettings
 
 FINE_S = 1.25e-4

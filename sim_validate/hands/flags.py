@@ -12,16 +12,16 @@ from tyro.conf import Positional, UseAppendAction, arg
 from grasp_core.declared import declared
 from grasp_core.kinds import Direction, HandClearance, Quantity, Seed, Starts, TorqueLimit
 from grasp_core.names import HANDS
-from sim_validate.kit.command_flags import (
+from sim_validate.commands.flags import (
     AtFriction,
     FirstOnly,
     GraspId,
-    GraspsFile,
+    GraspsPath,
     Jobs,
     ProtocolName,
     Spoken,
 )
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 
 HandName = Annotated[str, arg(help=f"The hand: {', '.join(HANDS)}, or an MJCF or URDF file.")]
 Fingertips = Annotated[str, arg(metavar="NAME,NAME,...", help=(
@@ -42,7 +42,7 @@ class Hand(Spoken):
 class Reach(Spoken):
     """Flags of the command `reach`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     hand: HandName = "allegro"
     fingertips: Fingertips = ""
     grasp: GraspId = None

@@ -8,19 +8,21 @@ from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach
 from grasp_core.planning.result import Plan
 from sim_validate.closure.command import validate_file
+from sim_validate.commands import simulation_flags
+from sim_validate.commands.console import TABLE_ROWS, Reporter
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine.setup import Setup
+from sim_validate.files.result_files import AboutObject
+from sim_validate.files.results_folder import remove_results
 from sim_validate.hands import flags as hand_flags
 from sim_validate.hands.command import reach_file
-from sim_validate.kit import simulation_flags, workers
-from sim_validate.kit.console import TABLE_ROWS, Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import AboutObject, remove_results
+from sim_validate.processes import workers
 from sim_validate.protocols.judging import attempted, judge_hand_by
 from sim_validate.protocols.published import protocol
 from sim_validate.protocols.verdict import Judgement, Judgements
 
 
-def judge_file(command: simulation_flags.Validate, reporter: Reporter) -> int:
+def judge_file(command: simulation_flags.ValidateFlags, reporter: Reporter) -> int:
     """Judge the grasps of a file by the published tests that are named, or else by our own."""
 
     def judge(saved: Plan, setup: Setup) -> tuple[Exit, Judgements]:
@@ -49,7 +51,7 @@ def judge_reach(command: hand_flags.Reach, reporter: Reporter) -> int:
 
 
 def _judged(
-    command: simulation_flags.Validate | hand_flags.Reach, saved: Plan,
+    command: simulation_flags.ValidateFlags | hand_flags.Reach, saved: Plan,
     cases: Sequence[Callable[[], Judgement]], jobs: int, reporter: Reporter,
 ) -> tuple[Exit, Judgements]:  # fmt: skip
     folder = command.out

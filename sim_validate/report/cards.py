@@ -21,7 +21,7 @@ from sim_validate.closure.replaying import Wanted, of_verdict, replayed
 from sim_validate.closure.verdict import Verdict, Verdicts
 from sim_validate.execution.execute import ExecutionJob, film, worth_seeing
 from sim_validate.execution.verdict import Executions
-from sim_validate.kit.files import CLIPS, GRASP_PAGES, PICTURES
+from sim_validate.files.results_folder import CLIP_FOLDER, GRASP_PAGES, PICTURE_FOLDER
 from sim_validate.report.charts import margin_panels, motion_panels, wrench_panels
 from sim_validate.report.run_folder import Findings, RunFolder, said_of_execution
 from sim_validate.report.sections import said_of_reach
@@ -147,13 +147,13 @@ def draw(folder: Path, card: Card) -> Drawn:
 
 
 def _picture(folder: Path, name: str, sheet: Sheet) -> str:
-    path = f"{PICTURES}/{name}.svg"
+    path = f"{PICTURE_FOLDER}/{name}.svg"
     write_text(folder / path, svg_of(sheet, alone=True))
     return path
 
 
 def _clip(card: Card, suffix: str = "") -> str:
-    return f"{CLIPS}/{card.name}{suffix}.webp"
+    return f"{CLIP_FOLDER}/{card.name}{suffix}.webp"
 
 
 @contextmanager
@@ -176,7 +176,7 @@ def _add_motion(drawn: Drawn, found: Findings, verdict: Verdict, clip: Path | No
         with _if_graphics(drawn):
             name = f"{trial.name}: {drawn.outcome}"
             write_trial_clip(trial.scene, trial.watched.joints, clip, name)
-            drawn.clip = f"{CLIPS}/{clip.name}"
+            drawn.clip = f"{CLIP_FOLDER}/{clip.name}"
 
 
 def _add_executed(drawn: Drawn, card: Card, executions: Executions, folder: Path) -> None:

@@ -33,22 +33,14 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.quality.wrench_limits import wrench_limits
 from grasp_core.values import Grasp
-from scenes.drawing.painting import View
-from scenes.drawing.panels import (
-    ROW,
-    SMALL,
-    Entry,
-    Panel,
-    Scale,
-    marker,
-    thinned,
-)
+from scenes.drawing.painting import Camera
+from scenes.drawing.panels import ROW, SMALL_TYPE, Axis, KeyLine, Panel, marker, thinned
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import (
-    BAD,
-    FINGERS,
-    GOOD,
-    INK,
+    BAD_HEX,
+    FINGER_COLOURS,
+    GOOD_HEX,
+    INK_HEX,
     LEVELS,
     NEUTRAL,
     PAPER,
@@ -73,24 +65,24 @@ from sim_validate.engine.traces import LET_GO, Outcome
 
 LONGITUDES, LATITUDES = 21, 11
 """Numbers of a map's nodes: around, where the first is also the last, and from pole to pole."""
-WIDTH, HEIGHT = 440.0, 300.0
-EDGE = 12.0
+CHART_WIDTH, CHART_HEIGHT = 440.0, 300.0
+SCALE_MARGIN = 12.0
 """Width of the margins beside the scale of colours [pixels]."""
-MIDDLE, HALF = np.array([220.0, 130.0]), 100.0
+MIDDLE, MAP_HALF = np.array([220.0, 130.0]), 100.0
 """Middle of a map on its panel, and half of its height [pixels]."""
-APART = 0.15
+NUMBERS_APART = 0.15
 """Least distance of a number below the scale from its ends, as a share of its length."""
-BOX = np.array([(-12.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-12.0, 8.0)])
+NAME_GROUND = np.array([(-12.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-12.0, 8.0)])
 """Ground of the name of a direction, around its middle [pixels]."""
 LABEL = 18.0
 """Distance from the circle of the least value within which a label gives way [pixels]."""
-ROWS = 60
+MAP_ROWS = 60
 """Height of the image of a map [its own pixels]; the map is twice as wide."""
 MILLI = 1e3
 USUAL_PUSH_N = FingerSettings().max_normal_force_n
-SAME = 12
+DIRECTION_DECIMALS = 12
 """Number of decimals to which two directions must agree to count as equal."""
-NAMED = {
+MAP_DIRECTIONS = {
     "+x": (0.0, 0.0), "+y": (90.0, 0.0), "-y": (-90.0, 0.0), "+z": (0.0, 80.0), "-z": (0.0, -80.0),
     "-x": (172.0, 0.0),
 }  # fmt: skip
@@ -104,9 +96,9 @@ HATCHES = 7
 """Number of lines that hatch the disc."""
 CROSS = (((-1.0, 0.0), (1.0, 0.0)), ((0.0, -1.0), (0.0, 1.0)))
 """The lines of the cross at zero."""
-TURNS = 181
+SHADOW_ENDS = 181
 """Number of points on the border of a shadow; the first is also the last."""
-SMALLEST_NORMAL = np.finfo(np.float64).tiny
+LEAST_DIVISOR = np.finfo(np.float64).tiny
 """Least number that is divided by: the smallest of full precision."""
 
 
@@ -147,7 +139,7 @@ def margins(drawing: Drawing, max_normal_force_n: float) -> tuple[Array, Array]:
         )
     ways, still = directions_of_map().reshape(-1, 3), np.zeros((LATITUDES * LONGITUDES, 3))
     wrenches = np.vstack([np.hstack([ways, still]), np.hstack([still, body.radius * ways])])
-    different, same = np.unique(np.round(wrenches, SAME), axis=0, return_inverse=True)
+    different, same = np.unique(np.round(wrenches, DIRECTION_DECIMALS), axis=0, return_inverse=True)
     found = wrench_limits(
         grasp, None, friction, different, max_normal_force=largest, center=body.center_of_mass
     )
@@ -180,51 +172,57 @@ def on_map(longitudes: Array, latitudes: Array) -> tuple[Array, Array]:
 def _map(values: Array, kind: str, unit: str) -> Sheet:
     low, high = float(values.min()), float(values.max())
     title = f"largest {kind} resisted [{unit}]"
-    rim = MIDDLE + HALF * circle(np.zeros(2), 1.0) * np.array([2.0, 1.0])
+    rim = MIDDLE + MAP_HALF * circle(np.zeros(2), 1.0) * np.array([2.0, 1.0])
     marks: list[Mark] = [
         Words(8.0, 14.0, title, bold=True),
-        Image(MIDDLE[0] - 2.0 * HALF, MIDDLE[1] - HALF, 4.0 * HALF, 2.0 * HALF,
+        Image(MIDDLE[0] - 2.0 * MAP_HALF, MIDDLE[1] - MAP_HALF, 4.0 * MAP_HALF, 2.0 * MAP_HALF,
               pixels(values, low, high)),
         outlined([rim], NEUTRAL, 2.5),
     ]  # fmt: skip
     row, column = np.unravel_index(int(values.argmin()), values.shape)
-    least = MIDDLE + HALF * np.array([1.0, -1.0]) * [
+    least = MIDDLE + MAP_HALF * np.array([1.0, -1.0]) * [
         part[row, column] for part in on_map(*_nodes())
     ]
-    for name, angles in NAMED.items():
+    for name, angles in MAP_DIRECTIONS.items():
         place = np.array(on_map(*(np.array(math.radians(angle)) for angle in angles)))
-        middle = MIDDLE + HALF * place * np.array([1.0, -1.0])
+        middle = MIDDLE + MAP_HALF * place * np.array([1.0, -1.0])
         aside = np.array([0.0, LABEL if np.hypot(*(middle - least)) < LABEL else 0.0])
         middle = middle + aside
         x, y = middle.tolist()
-        marks += [Area((BOX + middle,), PAPER, 0.85), Words(x, y, name, "middle", SMALL)]
-    marks += [outlined([circle(least, 6.0)], PAPER, 5.0), outlined([circle(least, 6.0)], BAD, 2.5)]
-    return Sheet(WIDTH, HEIGHT, title, (*marks, *_scale(low, high)))
+        marks += [
+            Area((NAME_GROUND + middle,), PAPER, 0.85),
+            Words(x, y, name, "middle", SMALL_TYPE),
+        ]
+    marks += [
+        outlined([circle(least, 6.0)], PAPER, 5.0),
+        outlined([circle(least, 6.0)], BAD_HEX, 2.5),
+    ]
+    return Sheet(CHART_WIDTH, CHART_HEIGHT, title, (*marks, *_scale(low, high)))
 
 
 def _scale(low: float, high: float) -> Iterator[Mark]:
     """Draw the colours of a map from its least to its largest value, and what its circle marks."""
-    top, long = MIDDLE[1] + HALF + 12.0, WIDTH - 2.0 * EDGE
-    yield Image(EDGE, top, long, 10.0, np.arange(LEVELS)[None])
+    top, long = MIDDLE[1] + MAP_HALF + 12.0, CHART_WIDTH - 2.0 * SCALE_MARGIN
+    yield Image(SCALE_MARGIN, top, long, 10.0, np.arange(LEVELS)[None])
     ends = f"{low:.3g}", f"{high:.3g}"
-    yield Words(EDGE, top + 20.0, ends[0], "start", SMALL)
-    yield Words(WIDTH - EDGE, top + 20.0, ends[1], "end", SMALL)
-    for tick in Scale(low, high).ticks() if high > low else ():
+    yield Words(SCALE_MARGIN, top + 20.0, ends[0], "start", SMALL_TYPE)
+    yield Words(CHART_WIDTH - SCALE_MARGIN, top + 20.0, ends[1], "end", SMALL_TYPE)
+    for tick in Axis(low, high).ticks() if high > low else ():
         share = (tick - low) / (high - low)
-        if APART < share < 1.0 - APART:
-            x = EDGE + long * share
+        if NUMBERS_APART < share < 1.0 - NUMBERS_APART:
+            x = SCALE_MARGIN + long * share
             yield ink_line([(x, top + 10.0), (x, top + 13.0)])
-            yield Words(x, top + 20.0, f"{tick:g}", "middle", SMALL)
+            yield Words(x, top + 20.0, f"{tick:g}", "middle", SMALL_TYPE)
     y = top + 40.0
-    yield outlined([circle(np.array([EDGE + 6.0, y]), 5.0)], BAD, 2.5)
-    yield Words(EDGE + 18.0, y, f"least: {low:.3g}", size=SMALL)
+    yield outlined([circle(np.array([SCALE_MARGIN + 6.0, y]), 5.0)], BAD_HEX, 2.5)
+    yield Words(SCALE_MARGIN + 18.0, y, f"least: {low:.3g}", size=SMALL_TYPE)
 
 
 def pixels(values: Array, low: float, high: float) -> Indices:
-    """Find the level of each pixel of a map, from the top, (ROWS, 2 ROWS); -1 outside of it."""
+    """Find the level of each pixel of a map, from the top; -1 outside of it."""
     up, right = np.meshgrid(
-        1.0 - (2.0 * np.arange(ROWS) + 1.0) / ROWS,
-        2.0 * ((2.0 * np.arange(2 * ROWS) + 1.0) / (2 * ROWS) - 1.0), indexing="ij",
+        1.0 - (2.0 * np.arange(MAP_ROWS) + 1.0) / MAP_ROWS,
+        2.0 * ((2.0 * np.arange(2 * MAP_ROWS) + 1.0) / (2 * MAP_ROWS) - 1.0), indexing="ij",
     )  # fmt: skip
     inside = 0.25 * right**2 + up**2 < 1.0
     # the inverse of `on_map`, with x and y in the common parametrisation by a half-angle
@@ -247,7 +245,7 @@ def _between(values: Array, rows: Array, columns: Array) -> Array:
 
 
 def wrench_figure(
-    body: Polyhedron, grasp: Grasp, friction: float, *, view: View | None = None
+    body: Polyhedron, grasp: Grasp, friction: float, *, view: Camera | None = None
 ) -> Sheet:
     """Draw projections of the wrench set: on its weakest direction, on forces and on torques.
 
@@ -266,10 +264,10 @@ def wrench_figure(
     return beside(wrench_panels(Drawing(body, grasp, friction), view))
 
 
-def wrench_panels(drawing: Drawing, view: View | None = None) -> tuple[Sheet, Sheet, Sheet]:
+def wrench_panels(drawing: Drawing, view: Camera | None = None) -> tuple[Sheet, Sheet, Sheet]:
     """Draw the panels of `wrench_figure` as sheets of their own."""
     if view is not None:
-        instance(view, View, "view", "View.of_angles makes one")
+        instance(view, Camera, "view", "Camera.of_angles makes one")
     body, (right, up, _) = drawing.body, (view or drawing.view()).axes
     quality = ferrari_canny(
         drawing.grasp, friction=drawing.friction, center=body.center_of_mass,
@@ -304,21 +302,21 @@ def _weakest_plane(wrenches: WrenchSet, direction: Array) -> Array:
 
 
 def shadow_of(wrenches: WrenchSet, plane: Array) -> Array:
-    """Compute the border of an `l1` wrench set's projection onto a plane (2, 6), (TURNS, 2).
+    """Compute the border of an `l1` wrench set's projection onto a plane (2, 6), (SHADOW_ENDS, 2).
 
     Each point of it is the wrench of one contact alone, whose force is at the rim of its cone.
     """
-    angles = np.linspace(0.0, 2.0 * np.pi, TURNS)
+    angles = np.linspace(0.0, 2.0 * np.pi, SHADOW_ENDS)
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    slopes = (ways @ plane @ wrenches.G).reshape(TURNS, -1, 3)
+    slopes = (ways @ plane @ wrenches.G).reshape(SHADOW_ENDS, -1, 3)
     across = np.hypot(slopes[..., 1], slopes[..., 2])
     farthest = np.argmax(slopes[..., 0] + wrenches.friction * across, axis=1)
-    rows = np.arange(TURNS)
+    rows = np.arange(SHADOW_ENDS)
     forces = np.zeros_like(slopes)
     forces[rows, farthest, 0] = 1.0
-    sliding = wrenches.friction[farthest] / np.maximum(across[rows, farthest], SMALLEST_NORMAL)
+    sliding = wrenches.friction[farthest] / np.maximum(across[rows, farthest], LEAST_DIVISOR)
     forces[rows, farthest, 1:] = slopes[rows, farthest, 1:] * sliding[:, None]
-    return forces.reshape(TURNS, -1) @ (plane @ wrenches.G).T
+    return forces.reshape(SHADOW_ENDS, -1) @ (plane @ wrenches.G).T
 
 
 def _shadow(
@@ -330,19 +328,19 @@ def _shadow(
     points = np.vstack([border, [[0.0, 0.0], [ball, ball], [-ball, -ball]]])
     low, high = points.min(axis=0), points.max(axis=0)
     middle = 0.5 * (low + high)
-    half = max(AROUND * float((high - low).max()), SMALLEST_NORMAL)
-    x, y = (Scale(float(each - half), float(each + half)) for each in middle)
+    half = max(AROUND * float((high - low).max()), LEAST_DIVISOR)
+    x, y = (Axis(float(each - half), float(each + half)) for each in middle)
     panel = Panel(PLACE[0], PLACE[1], PLACE[2], PLACE[2], x, y)
     disc = circle(np.zeros(2), ball)
     marks = [*panel.frame(x.ticks(), y.ticks())]
     area = thinned(panel.at(*border.T))
-    marks += [Area((area,), GOOD, 0.25), outlined([area], GOOD), *_hatched(panel, ball)]
-    marks += [outlined([panel.at(*disc.T)], INK, 1.2)]
-    marks += [panel.upright(radius, BAD)] if facet else []
+    marks += [Area((area,), GOOD_HEX, 0.25), outlined([area], GOOD_HEX), *_hatched(panel, ball)]
+    marks += [outlined([panel.at(*disc.T)], INK_HEX, 1.2)]
+    marks += [panel.upright(radius, BAD_HEX)] if facet else []
     center = panel.at(np.zeros(1), np.zeros(1))
-    marks.append(Line(tuple(center + 4.0 * np.array(arm) for arm in CROSS), INK, 1.4))
-    entries = [Entry("can be applied", GOOD, "area"), Entry("largest ball", INK)]
-    entries += [Entry("limiting facet", BAD)] if facet else []
+    marks.append(Line(tuple(center + 4.0 * np.array(arm) for arm in CROSS), INK_HEX, 1.4))
+    entries = [KeyLine("can be applied", GOOD_HEX, "area"), KeyLine("largest ball", INK_HEX)]
+    entries += [KeyLine("limiting facet", BAD_HEX)] if facet else []
     return panel.sheet(SHADOW_SIZE, names, marks, entries)
 
 
@@ -352,7 +350,7 @@ def _hatched(panel: Panel, radius: float) -> list[Mark]:
     ends = np.stack([
         np.stack([end - heights, end + heights], axis=1) for end in (-long, long)
     ], axis=1) / math.sqrt(2.0)  # fmt: skip
-    return [Line(tuple(panel.at(*line.T) for line in ends), INK, 0.7)] if radius else []
+    return [Line(tuple(panel.at(*line.T) for line in ends), INK_HEX, 0.7)] if radius else []
 
 
 MOTION_SIZE = 300.0, 316.0
@@ -362,7 +360,7 @@ MOTION_PLACE = (50.0, 28.0, 236.0, 180.0)
 """Left and upper border of what a panel draws in, its width and its height [pixels]."""
 KEY = 3.0 * ROW + 6.0
 """Height of the key below a panel [pixels]."""
-SLIPS = (1.0, "slips")
+SLIP_NAME = (1.0, "slips")
 """Share of its friction that a finger uses when it slips, and its name."""
 MOST_SHARE = 1.15
 """Upper end of an axis, relative to the limit on it."""
@@ -385,7 +383,7 @@ def motion_panels(found: Replayed, threshold_m: float) -> tuple[Sheet, Sheet, Sh
     return (
         _moved(found, threshold_m),
         _of_fingers("normal force [N]", watched.times_s, watched.pushes_n[..., 0], None),
-        _of_fingers("share of friction used", watched.times_s, share, SLIPS),
+        _of_fingers("share of friction used", watched.times_s, share, SLIP_NAME),
     )
 
 
@@ -393,18 +391,18 @@ def _moved(found: Replayed, threshold_m: float) -> Sheet:
     trace = found.watched.trace
     finite = trace.displacements_m[np.isfinite(trace.displacements_m)]
     highest = 2.0 * MICRO * max(threshold_m, float(finite.max(initial=0.0)))
-    panel = _panel(trace.times_s, Scale(LEAST_UM, highest, log=True))
+    panel = _panel(trace.times_s, Axis(LEAST_UM, highest, log=True))
     steps = 10.0 ** np.arange(-4, math.log10(highest), 2)
-    slips = list(zip(FINGERS, trace.slips_m.T, strict=False))
+    slips = list(zip(FINGER_COLOURS, trace.slips_m.T, strict=False))
     marks = [
         *panel.frame(panel.x.ticks(4), steps.tolist()),
         *(panel.curve(trace.times_s, MICRO * slip, colour) for colour, slip in slips),
-        panel.curve(trace.times_s, MICRO * trace.displacements_m, INK, 1.8),
-        panel.level(MICRO * threshold_m, BAD),
+        panel.curve(trace.times_s, MICRO * trace.displacements_m, INK_HEX, 1.8),
+        panel.level(MICRO * threshold_m, BAD_HEX),
     ]
     key = [
-        Entry("object", INK), Entry("counts as moved", BAD, "dashes"),
-        *(Entry(f"{place} slid", colour) for place, (colour, _) in enumerate(slips)),
+        KeyLine("object", INK_HEX), KeyLine("counts as moved", BAD_HEX, "dashes"),
+        *(KeyLine(f"{place} slid", colour) for place, (colour, _) in enumerate(slips)),
     ]  # fmt: skip
     return panel.sheet(MOTION_SIZE, ("displacement [µm]", TIME, ""), marks, key, key_height=KEY)
 
@@ -413,24 +411,24 @@ def _of_fingers(title: str, times: Array, values: Array, limit: tuple[float, str
     finite = values[np.isfinite(values)]
     top = max(1.1 * float(finite.max(initial=0.0)), 1e-9)
     low = min(0.0, float(finite.min(initial=0.0)))
-    panel = _panel(times, Scale(low, top if limit is None else MOST_SHARE * limit[0]))
-    curves = list(zip(FINGERS, values.T, strict=False))
+    panel = _panel(times, Axis(low, top if limit is None else MOST_SHARE * limit[0]))
+    curves = list(zip(FINGER_COLOURS, values.T, strict=False))
     marks = [
         *panel.frame(panel.x.ticks(4), panel.y.ticks()),
         *(panel.curve(times, np.where(np.isfinite(each), each, np.nan), colour)
           for colour, each in curves),
         panel.upright(0.0, NEUTRAL, dashed=True),
     ]  # fmt: skip
-    key = [Entry(f"finger {place}", colour) for place, (colour, _) in enumerate(curves)]
+    key = [KeyLine(f"finger {place}", colour) for place, (colour, _) in enumerate(curves)]
     if limit is not None:
-        marks.append(panel.level(limit[0], BAD))
-        key.append(Entry(limit[1], BAD, "dashes"))
+        marks.append(panel.level(limit[0], BAD_HEX))
+        key.append(KeyLine(limit[1], BAD_HEX, "dashes"))
     return panel.sheet(MOTION_SIZE, (title, TIME, ""), marks, key, key_height=KEY)
 
 
-def _panel(times: Array, y: Scale) -> Panel:
+def _panel(times: Array, y: Axis) -> Panel:
     low, high = float(times.min(initial=0.0)), float(times.max(initial=0.0))
-    return Panel(*MOTION_PLACE, Scale(low, high if high > low else low + 1.0), y)
+    return Panel(*MOTION_PLACE, Axis(low, high if high > low else low + 1.0), y)
 
 
 def friction_used(pushes: Array, friction: Array) -> Array:
@@ -528,26 +526,28 @@ def fidelity_panel(agreement: Agreement) -> Sheet:
     names = agreement.quantity, "predicted", "simulated"
     pairs = np.array(agreement.pairs).reshape(-1, 2)
     if not (pairs > 0.0).any():
-        panel = Panel(*PAIRS_PLACE, Scale(0.0, 1.0), Scale(0.0, 1.0))
+        panel = Panel(*PAIRS_PLACE, Axis(0.0, 1.0), Axis(0.0, 1.0))
         left, top, wide, high = PAIRS_PLACE
         nothing = Words(left + 0.5 * wide, top + 0.5 * high, "none measured", "middle")
         return Sheet(*PAIRS_SIZE, name, (*panel.frame([], []), *panel.named(*names), nothing))
     pairs = np.maximum(pairs, LEAST_SHOWN * pairs[pairs > 0.0].min())
     ends = np.array([0.7 * pairs.min(), 1.4 * pairs.max()])
-    scale = Scale(float(ends[0]), float(ends[1]), log=True)
+    scale = Axis(float(ends[0]), float(ends[1]), log=True)
     panel = Panel(*PAIRS_PLACE, scale, scale)
     low, high = (1.0 - AGREEMENT) * ends, (1.0 + AGREEMENT) * ends
     band = np.vstack([panel.at(ends, low), panel.at(ends, high)[::-1]])
     marks: list[Mark] = [*panel.frame(scale.ticks(), scale.ticks()), Area((band,), NEUTRAL, 0.3)]
     marks.append(Line((panel.at(ends, ends),), NEUTRAL, 1.0))
-    key = [Entry("identity", NEUTRAL), Entry(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
+    key = [KeyLine("identity", NEUTRAL), KeyLine(f"within {AGREEMENT:.0%}", NEUTRAL, "area")]
     off = np.array(agreement.differ())
     if (~off).any():
-        marks.append(Dots(_pairs_on_sheet(panel, pairs[~off]), GOOD, 3.0))
-        key.append(Entry(f"{int((~off).sum())} agree", GOOD, "disc"))
+        marks.append(Dots(_pairs_on_sheet(panel, pairs[~off]), GOOD_HEX, 3.0))
+        key.append(KeyLine(f"{int((~off).sum())} agree", GOOD_HEX, "disc"))
     if off.any():
-        marks += [marker("cross", place, 5.0, BAD) for place in _pairs_on_sheet(panel, pairs[off])]
-        key.append(Entry(f"{int(off.sum())} differ", BAD, "cross"))
+        marks += [
+            marker("cross", place, 5.0, BAD_HEX) for place in _pairs_on_sheet(panel, pairs[off])
+        ]
+        key.append(KeyLine(f"{int(off.sum())} differ", BAD_HEX, "cross"))
     return panel.sheet(PAIRS_SIZE, names, marks, key, name=name)
 
 

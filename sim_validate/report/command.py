@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from grasp_core.errors import InputError
-from grasp_core.files.file_kinds import GRASPS
+from grasp_core.files.file_kinds import GRASPS, MANIFEST
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
 from grasp_core.planning.result import Plan
@@ -26,24 +26,24 @@ from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
-from sim_validate.datasets.open_dataset import MANIFEST, recorded_in_dataset
+from sim_validate.commands import flags
+from sim_validate.commands.console import Reporter
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.datasets.open_dataset import recorded_in_dataset
 from sim_validate.engine.setup import with_planned_radius
-from sim_validate.kit import command_flags
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import alone_in
+from sim_validate.files.output_folders import alone_in
 from sim_validate.planning.asked_objects import grasp_with_id
 from sim_validate.report.report import Report, write_report
 from sim_validate.report.run_folder import RunFolder, folder_of, reaches_beside
 from sim_validate.report.sections import why_not_held
 
-COMING, RESTING = 60, 20
+COMING, FRAMES_RESTING = 60, 20
 """Number of clip frames in which fingers come in, and in which they then stay."""
-SWING_DEG, ELEVATION_DEG = 120.0, 25.0
+SWING_DEG, CLIP_ELEVATION_DEG = 120.0, 25.0
 """Angle by which the camera moves around during a clip, and its elevation [deg]."""
 
 
-def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
+def view_grasp(command: flags.ViewFlags, reporter: Reporter) -> int:
     """Show a grasp in MuJoCo's viewer, or write it to the files that are asked for."""
     path = command.grasps / GRASPS if command.grasps.is_dir() else command.grasps
     saved = load_grasps(path)
@@ -78,7 +78,7 @@ def view_grasp(command: command_flags.View, reporter: Reporter) -> int:
         scene = _scene(saved, grasp, friction)
         joints = closing(scene)
         azimuths = np.linspace(0.0, SWING_DEG, len(joints))
-        angles = np.column_stack([azimuths, np.full(len(joints), ELEVATION_DEG)])
+        angles = np.column_stack([azimuths, np.full(len(joints), CLIP_ELEVATION_DEG)])
         keep(write_clip(scene, joints, command.clip, grasp.id, angles_deg=angles))
     reporter.document({"id": grasp.id, "files": files})
     return Exit.GOOD
@@ -114,12 +114,12 @@ def closing(scene: Scene) -> Array:
     layout = scene.layout
     away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     left = np.linspace(1.0, 0.0, COMING) ** 2
-    slides = np.vstack([left[:, None] * away, np.zeros((RESTING, len(away)))])
+    slides = np.vstack([left[:, None] * away, np.zeros((FRAMES_RESTING, len(away)))])
     home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     return np.column_stack([np.tile(home, (len(slides), 1)), slides])
 
 
-def report_folder(command: command_flags.Report, reporter: Reporter) -> int:
+def report_folder(command: flags.ReportFlags, reporter: Reporter) -> int:
     """Write the results of a run as pages, and print where they are."""
     at = command.out or folder_of(command.folder)
     with alone_in(at if command.out or at.is_dir() else None):
@@ -128,7 +128,7 @@ def report_folder(command: command_flags.Report, reporter: Reporter) -> int:
     return Exit.GOOD
 
 
-def shown_report(asked: command_flags.Report, reporter: Reporter) -> Report:
+def shown_report(asked: flags.ReportFlags, reporter: Reporter) -> Report:
     """Write the pages of a run, and say where they are."""
 
     def say_ready(index: Path, drawn: int, total: int) -> None:
@@ -153,12 +153,12 @@ def shown_report(asked: command_flags.Report, reporter: Reporter) -> Report:
     return report
 
 
-SHOWN = 12
+SHOWN_ROWS = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
 MICRO = 1e6
 
 
-def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
+def replay_trial(command: flags.ReplayFlags, reporter: Reporter) -> int:
     """Simulate a recorded trial again and compare its outcome with that in the file."""
     if command.trial is not None and command.control is not None:
         raise InputError(
@@ -179,7 +179,7 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
 
 def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Reporter) -> None:
     trace, hold = found.watched.trace, found.hold
-    step = max(1, len(trace.times_s) // SHOWN)
+    step = max(1, len(trace.times_s) // SHOWN_ROWS)
     rows = [
         (f"{trace.times_s[row]:.3f}",
          *(f"{MICRO * value[row]:.3g}" for value in (trace.displacements_m, trace.rotations_rad)),
@@ -204,7 +204,7 @@ def _show(recorded: Recorded, found: Replayed, said: str | None, reporter: Repor
     reporter.say(f"outcome: {ended} (the file says {said or 'nothing'}{by})")
 
 
-def _written(found: Replayed, command: command_flags.Replay, reporter: Reporter) -> Iterator[Path]:
+def _written(found: Replayed, command: flags.ReplayFlags, reporter: Reporter) -> Iterator[Path]:
     folder = command.out or Path()
     folder.mkdir(parents=True, exist_ok=True)
     yield write_scene(found.scene, folder / "scene.xml")

@@ -21,7 +21,7 @@ from grasp_core.kinds import Count, Number, function, path_of, value_of
 from grasp_core.provenance import versions
 from grasp_core.values import Grasp
 from scenes.drawing.pages import (
-    NOTHING,
+    NO_VALUE,
     Fact,
     as_text,
     filled,
@@ -34,9 +34,9 @@ from scenes.drawing.pages import (
 from scenes.drawing.pictures import Drawing
 from scenes.drawing.sheets import night_style, svg_of
 from sim_validate.closure.verdict import Verdict, WrenchVerdict
-from sim_validate.kit import files
-from sim_validate.kit.workers import available_cores, each
+from sim_validate.files import results_folder
 from sim_validate.planning.best import MEASURES, Best, Rated
+from sim_validate.processes.workers import available_cores, each
 from sim_validate.protocols.verdict import Totals
 from sim_validate.report import sections
 from sim_validate.report.cards import Card, Paged, cards_to_draw, draw, largest_push
@@ -48,12 +48,19 @@ from sim_validate.report.charts import (
     quadrants_in,
     wrench_size,
 )
-from sim_validate.report.run_folder import BAD, GOOD, Findings, RunFolder, folder_of, runs_in
-from sim_validate.report.sections import Record
+from sim_validate.report.run_folder import (
+    BAD_TONE,
+    GOOD_TONE,
+    Findings,
+    RunFolder,
+    folder_of,
+    runs_in,
+)
+from sim_validate.report.sections import TemplateData
 
 ASSETS = Path(__file__).parent / "assets"
 MILLI, PERCENT = 1e3, 100.0
-FAMILIES = {
+FAMILY_MEANINGS = {
     "concurrent": "the lines of force meet in one point",
     "pencil": "two pairs of lines, which meet in points of a common line",
     "regulus": "the lines of force are skew and lie on one ruled surface",
@@ -64,12 +71,12 @@ SPAN = (
 )
 TRIAL_FIGURES = tuple(each for each in figures(WrenchVerdict) if each.name != "outcome")
 """Figures of a trial in the columns behind its outcome."""
-SAID_ABOVE = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
+TITLE_FIGURES = ("id", "outcome", "predicted_critical_friction", "simulated_critical_friction")
 """Figures of a verdict that the page says in other places."""
-FOCUS = "where lines of force meet, in the object's frame"
-ROWS = 20
+FOCUS_MEANING = "where lines of force meet, in the object's frame"
+POSSIBLE_ROWS = 20
 """Largest number of grasps in the table of what is possible."""
-FIRST = 4
+FIRST_CARDS = 4
 """Number of cards that are drawn before the first page is written for the first time; it is written
 again whenever twice as many are drawn, and at the end."""
 
@@ -123,7 +130,7 @@ def write_report(
             holds other files.
     """
     folder = folder_of(path_of(folder, "folder"))
-    out = folder / files.REPORT if out is None else path_of(out, "out")
+    out = folder / results_folder.REPORT if out is None else path_of(out, "out")
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None:
             value_of(Count, value, name)
@@ -131,20 +138,22 @@ def write_report(
     function(progress, "progress")
     function(ready, "ready")
     runs = tuple(run.first(limit) for run in runs_in(folder))
-    files.require_report_folder(out)
-    with files.new_pages(out) as place:
+    results_folder.require_report_folder(out)
+    with results_folder.new_pages(out) as place:
         cards = list(cards_to_draw(runs, clips))
         ready = ready if place == out else _nothing
         report = _written(cards, runs, place, jobs or available_cores(), progress, ready)
-    return replace(report, index=out / files.INDEX)
+    return replace(report, index=out / results_folder.INDEX)
 
 
 def _written(
     cards: Sequence[Card], runs: Sequence[RunFolder], out: Path, jobs: int,
     progress: Callable[[int, int], object], ready: Callable[[Path, int, int], object],
 ) -> Report:  # fmt: skip
-    for name in files.STATIC:
-        rules = f"{night_style()}\n" if name == files.STYLE else ""  # of charts on dark screens
+    for name in results_folder.STATIC:
+        rules = (
+            f"{night_style()}\n" if name == results_folder.STYLE else ""
+        )  # of charts on dark screens
         write_text(out / name, f"{text_of(name, ASSETS)}{rules}")
     for place, run in enumerate(runs):
         data = as_text(object_data(run.saved.body))
@@ -152,9 +161,11 @@ def _written(
     tasks = [replace(card, copies=()) for card in cards]
     names = [None, *(f"{card.name}.html" for card in cards), None]
     shown = list[Card]()
-    no_clip, next_index = "", min(FIRST, len(cards))
+    no_clip, next_index = "", min(FIRST_CARDS, len(cards))
     drawing = partial(draw, out)
-    results = chain(each(drawing, tasks[:FIRST], jobs=1), each(drawing, tasks[FIRST:], jobs=jobs))
+    results = chain(
+        each(drawing, tasks[:FIRST_CARDS], jobs=1), each(drawing, tasks[FIRST_CARDS:], jobs=jobs)
+    )
     for card, drawn in zip(cards, results, strict=True):
         around = names[len(shown)], names[len(shown) + 2]
         shown.append(replace(card, drawn=drawn))
@@ -164,13 +175,13 @@ def _written(
         no_clip = no_clip or drawn.no_clip
         if len(shown) == next_index:
             waiting = len(cards) - len(shown)
-            index = write_text(out / files.INDEX, index_page(runs, shown, waiting))
-            if next_index == FIRST and waiting:
+            index = write_text(out / results_folder.INDEX, index_page(runs, shown, waiting))
+            if next_index == FIRST_CARDS and waiting:
                 ready(index, len(shown), len(cards))
             next_index = min(2 * next_index, len(cards))
         progress(len(shown), len(cards))
     grasps = sum(1 + len(card.copies) for card in shown)
-    return Report(out / files.INDEX, grasps, no_clip, len(cards))
+    return Report(out / results_folder.INDEX, grasps, no_clip, len(cards))
 
 
 def grasp_page(
@@ -198,7 +209,7 @@ def grasp_page(
         contacts=list(_contacts(found.shown)),
         sizes={  # by which torques are divided: the object's radius, the grasp's size
             "object": f"{number(MILLI * run.saved.body.radius, 3)} mm",
-            "grasp": NOTHING if size is None else f"{number(MILLI * size, 3)} mm",
+            "grasp": NO_VALUE if size is None else f"{number(MILLI * size, 3)} mm",
         },
         trial_columns=[(each.shown.heading, each.explained) for each in TRIAL_FIGURES],
         trials=[] if verdict is None else [_trial(verdict, each) for each in verdict.wrenches],
@@ -211,7 +222,7 @@ def _facts(found: Findings) -> Iterable[Fact]:
     run, grasp, verdict = found.run, found.grasp, found.verdict
     planned = run.saved.friction
     at_plan = "" if planned == run.friction else f", at friction {planned:g} as planned"
-    yield "Family", grasp.family, FAMILIES[grasp.family]
+    yield "Family", grasp.family, FAMILY_MEANINGS[grasp.family]
     simulated = None if verdict is None else verdict.simulated_critical_friction
     in_simulation = "" if simulated is None else f", in simulation {number(simulated)}"
     yield from grasp_facts(run.saved.body, grasp, at_plan=at_plan, in_simulation=in_simulation)
@@ -219,9 +230,9 @@ def _facts(found: Findings) -> Iterable[Fact]:
     yield "Normals span up to", f"{number(math.degrees(grasp.span_angle))}°", SPAN
     for place, focus in enumerate(grasp.focus_points):
         name = "Point between the lines of pair" if grasp.family == "regulus" else "Focus"
-        yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS if place == 0 else ""
+        yield f"{name} {place}", f"({millimetres(focus)}) mm", FOCUS_MEANING if place == 0 else ""
     if verdict is not None:
-        yield from sections.facts_of(verdict, SAID_ABOVE)
+        yield from sections.facts_of(verdict, TITLE_FIGURES)
         if (repeats := verdict.robustness) is not None:
             low, high = repeats.interval
             said = f"held {repeats.held} of {len(repeats.trials)} times"
@@ -242,7 +253,7 @@ def possible_facts(best: Best | None, grasp: str) -> Iterable[Fact]:
     )  # fmt: skip
 
 
-def _contacts(grasp: Grasp) -> Iterable[Record]:
+def _contacts(grasp: Grasp) -> Iterable[TemplateData]:
     for face, contact, cone, region in zip(
         grasp.faces, grasp.contacts, grasp.force_cones, grasp.regions, strict=True
     ):
@@ -254,11 +265,11 @@ def _contacts(grasp: Grasp) -> Iterable[Record]:
             "normal": ", ".join(f"{part + 0.0:.3f}" for part in np.round(contact.normal, 3)),
             "cone": f"{half:.1f}°, leans {lean:.1f}°",
             "region": region.kind,
-            "disc": NOTHING if region.kind == "point" else number(MILLI * region.inscribed_radius),
+            "disc": NO_VALUE if region.kind == "point" else number(MILLI * region.inscribed_radius),
         }
 
 
-def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
+def _trial(verdict: Verdict, trial: WrenchVerdict) -> TemplateData:
     size, limit, found = wrench_size(verdict, trial), trial.predicted_limit, trial.simulated_limit
     return {
         "name": trial.name,
@@ -268,7 +279,7 @@ def _trial(verdict: Verdict, trial: WrenchVerdict) -> Record:
         "simulated": number(None if found is None else size * found),
         "friction": number(trial.required_friction, 3),
         "outcome": trial.hold.outcome.value.replace("_", " "),
-        "tone": GOOD if as_predicted(trial) else BAD,
+        "tone": GOOD_TONE if as_predicted(trial) else BAD_TONE,
         "figures": [each.cell(trial) for each in TRIAL_FIGURES],
     }
 
@@ -334,7 +345,7 @@ def index_page(runs: Sequence[RunFolder], shown: Sequence[Card], waiting: int = 
     )  # fmt: skip
 
 
-def _judged(runs: Sequence[RunFolder]) -> Record | None:
+def _judged(runs: Sequence[RunFolder]) -> TemplateData | None:
     """Return a table of how many grasps each published test accepts, for each object."""
     judged = [(run.saved.body.name, run.judgements) for run in runs if run.judgements is not None]
     totals = [(name, each) for name, found in judged for each in found.summary.values()]
@@ -343,12 +354,12 @@ def _judged(runs: Sequence[RunFolder]) -> Record | None:
     return {"columns": (*columns[:1], "object", *columns[1:]), "rows": named} if totals else None
 
 
-def _described_possible(best: Best) -> Record:
+def _described_possible(best: Best) -> TemplateData:
     (_, what, unit), name = MEASURES[best.measure], best.grasp.id
     proved = f"by the proof in {best.proof}" if best.proof else "whose proof was not kept"
     distinct = {each.id: each for each in reversed(best.rated)}
     ranked = sorted(distinct.values(), key=lambda each: (-each.quality[0], each.id))
-    columns, rows = table(ranked[:ROWS], Rated)
+    columns, rows = table(ranked[:POSSIBLE_ROWS], Rated)
     return {
         "said": (
             f"Best is {name}: {number(best.quality[0])}{unit} of {what}. No four contacts at "
@@ -358,7 +369,7 @@ def _described_possible(best: Best) -> Record:
         ),
         "columns": columns,
         "rows": rows,
-        "more": max(0, len(ranked) - ROWS),
+        "more": max(0, len(ranked) - POSSIBLE_ROWS),
     }
 
 

@@ -24,9 +24,7 @@ from sim_validate.protocols.verdict import Judgements
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-GOOD, BAD, QUIET = "good", "bad", "quiet"
-FAILED, LOST = "failed", "lost"
-"""Word that begins how many trials were not survived, and the one word for it."""
+GOOD_TONE, BAD_TONE, QUIET_TONE = "good", "bad", "quiet"
 File = TypeVar("File", bound=RecordFile)
 Item = TypeVar("Item", bound=Named)
 
@@ -108,7 +106,7 @@ class Findings:
     @property
     def alarming(self) -> bool:
         """Whether its verdict is a problem, or its execution lost the object."""
-        return self.said[1] == BAD
+        return self.said[1] == BAD_TONE
 
     @property
     def shown(self) -> Grasp:
@@ -129,32 +127,33 @@ class Findings:
 def said_of(verdict: Verdict | None) -> tuple[str, str]:
     """Say in words what the verdict on a grasp is, and of which kind: good, bad or quiet."""
     if verdict is None:
-        return "not validated", QUIET
+        return "not validated", QUIET_TONE
     outcome = verdict.outcome.value.replace("_", " ")
     if verdict.outcome not in (Outcome.HELD, *LET_GO):
-        return outcome, BAD
+        return outcome, BAD_TONE
     if verdict.mismatches:
-        return "contradicts the analysis", BAD
+        return "contradicts the analysis", BAD_TONE
     if any(control.held for control in verdict.controls):
-        return "a negative control held", BAD
+        return "a negative control held", BAD_TONE
     if not verdict.controls_let_go:
-        return "a negative control is undecided", BAD
-    return outcome, GOOD if verdict.held else BAD
+        return "a negative control is undecided", BAD_TONE
+    return outcome, GOOD_TONE if verdict.held else BAD_TONE
 
 
-def said_of_execution(found: ExecutedGrasp | None) -> tuple[str, str]:
+def said_of_execution(found: ExecutedGrasp | None, *, brief: bool = False) -> tuple[str, str]:
     """Say in words how the execution of a grasp ended, with the tone: good, bad or neither."""
     if found is None:
-        return "not executed", QUIET
+        return "not executed", QUIET_TONE
     if found.execution is None:
-        return "no squeeze", BAD
+        return "no squeeze", BAD_TONE
     if not found.controls_let_go:
-        return "a negative control held", BAD
+        return "a negative control held", BAD_TONE
     if not found.execution.trials:
-        return "no trial is possible", BAD
+        return "no trial is possible", BAD_TONE
     if lost := found.execution.lost:
-        return f"{FAILED} {len(lost)} of {len(found.execution.trials)} trials", BAD
-    return "survived", GOOD
+        trials = found.execution.trials
+        return "lost" if brief else f"failed {len(lost)} of {len(trials)} trials", BAD_TONE
+    return "survived", GOOD_TONE
 
 
 def said_of_both(
@@ -167,10 +166,10 @@ def said_of_both(
     closure, tone = said_of(verdict)
     if executions is None:
         return closure, tone
-    ended, other = said_of_execution(found)
+    ended, other = said_of_execution(found, brief=True)
     tones = {tone, other}
-    worst = next(each for each in (BAD, GOOD, QUIET) if each in tones)
-    return f"closure: {closure}; execution: {LOST if ended.startswith(FAILED) else ended}", worst
+    worst = next(each for each in (BAD_TONE, GOOD_TONE, QUIET_TONE) if each in tones)
+    return f"closure: {closure}; execution: {ended}", worst
 
 
 def folder_of(path: Path) -> Path:

@@ -13,6 +13,8 @@ from grasp_core.figures import NONE, Figure, figures
 from grasp_core.files.records import record_of
 from grasp_core.names import HANDS
 from scenes.drawing.pages import Fact, number
+from sim_validate.commands.config_file import flags_from
+from sim_validate.commands.simulation_flags import ExecuteFlags
 from sim_validate.execution.verdict import (
     ExecutedGrasp,
     ExecutionControl,
@@ -22,15 +24,19 @@ from sim_validate.execution.verdict import (
     totals_in_words,
 )
 from sim_validate.hands.flags import Reach
-from sim_validate.kit.flag_values import flags_from
-from sim_validate.kit.simulation_flags import Execute
-from sim_validate.report.run_folder import BAD, GOOD, QUIET, Findings, said_of_execution
+from sim_validate.report.run_folder import (
+    BAD_TONE,
+    GOOD_TONE,
+    QUIET_TONE,
+    Findings,
+    said_of_execution,
+)
 from sim_validate.settings import ExecutionSettings
 
 if TYPE_CHECKING:
     from sim_validate.hands.reaches import ReachedGrasp, Reaches
 
-Record: TypeAlias = Mapping[str, Any]
+TemplateData: TypeAlias = Mapping[str, Any]
 """What a template fills in, by name."""
 REASONS = {
     "collision": "a collision",
@@ -41,8 +47,8 @@ REASONS = {
 """Words for what was in the way."""
 EXECUTION_FIGURES: Sequence[Figure] = figures(ExecutedGrasp)[1:]
 """Figures of executed grasps, but for the id, which leads to a grasp's page."""
-FINGERS = "that touch at the grasp's contacts, by finger of the grasp"
-SAID_ABOVE = ("grasp", "id")
+FINGERS_MEANING = "that touch at the grasp's contacts, by finger of the grasp"
+HAND_TITLE_FIGURES = ("grasp", "id")
 """Figures that the page has in its title."""
 MILLI = 1e3
 ALWAYS = ("mass_kg", "seed")
@@ -59,18 +65,22 @@ def why_not_held(found: Findings) -> str:
 
 def said_of_reach(found: Findings) -> tuple[str, str]:
     """Say in words whether the hand reaches a grasp, with the tone; nothing without a hand."""
-    reached, reaches = found.reached, found.run.reaches
+    reaches = found.run.reaches
     if reaches is None:
-        return "", QUIET
-    name = reaches.hand.name
+        return "", QUIET_TONE
+    said, tone = _reach_in_words(found.reached)
+    return f"{reaches.hand.name}: {said}", tone
+
+
+def _reach_in_words(reached: "ReachedGrasp | None") -> tuple[str, str]:
     if reached is None:
-        return f"{name}: not asked", QUIET
+        return "not asked", QUIET_TONE
     reach, held, executed = reached.reach, reached.simulated, reached.executed
     if not reach.reached:
-        return f"{name}: not reached, {REASONS[reach.reason]}", QUIET
+        return f"not reached, {REASONS[reach.reason]}", QUIET_TONE
     within = reach.within_regions or ()
     inside = f"{sum(within)} of {len(within)} contacts "
-    said = [f"{name}: reached, {'' if all(within) else inside}within regions"]
+    said = [f"reached, {'' if all(within) else inside}within regions"]
     if held is not None:
         strength = f"held: {number(held.weakest_n)} N with its motors"
         said.append(strength if held.held else "not held in simulation")
@@ -80,7 +90,7 @@ def said_of_reach(found: Findings) -> tuple[str, str]:
         kept = sum(trial.survived for trial in executed.trials)
         said.append(f"survived {kept} of {len(executed.trials)} trials")
     lost = executed is not None and not all(trial.survived for trial in executed.trials)
-    return ", ".join(said), BAD if lost or (held is not None and not held.held) else GOOD
+    return ", ".join(said), BAD_TONE if lost or (held is not None and not held.held) else GOOD_TONE
 
 
 def described_reaches(reaches: "Reaches | None") -> str:
@@ -103,15 +113,15 @@ def reach_settings(reaches: "Reaches") -> Iterable[tuple[str, str]]:
         yield "hand.torque_limits_n_m", ", ".join(f"{limit:g}" for limit in stated)
 
 
-def reach_section(found: Findings) -> Record | None:
+def reach_section(found: Findings) -> TemplateData | None:
     """Build the section about the hand in a grasp; None where no hand was asked for."""
     reached, reaches = found.reached, found.run.reaches
     if reaches is None or reached is None:
         return None
-    said, tone = said_of_reach(found)
+    said, tone = _reach_in_words(reached)
     return {
         "hand": reaches.hand.name,
-        "said": said.partition(": ")[2],
+        "said": said,
         "tone": tone,
         "facts": list(_reach_facts(reaches, reached)),
         "explanation": reached.reach.explanation,
@@ -121,7 +131,11 @@ def reach_section(found: Findings) -> Record | None:
 def _reach_facts(reaches: "Reaches", found: "ReachedGrasp") -> Iterable[Fact]:
     if found.reach.reached:
         names = reaches.finger_names(found.reach)
-        yield "Fingers used", ", ".join(f"{k}: {name}" for k, name in enumerate(names)), FINGERS
+        yield (
+            "Fingers used",
+            ", ".join(f"{k}: {name}" for k, name in enumerate(names)),
+            FINGERS_MEANING,
+        )
     yield from _of_hand(found)
     if found.simulated is not None:
         yield from _of_hand(found.simulated, "With its motors: ")
@@ -145,7 +159,7 @@ def facts_of(record: object, but: Sequence[str]) -> Iterable[Fact]:
 
 
 def _of_hand(record: object, part: str = "") -> Iterable[Fact]:
-    for heading, cell, meaning in facts_of(record, SAID_ABOVE):
+    for heading, cell, meaning in facts_of(record, HAND_TITLE_FIGURES):
         said = f"{part}{heading}"
         yield f"{said[0].upper()}{said[1:]}", cell, meaning
 
@@ -165,7 +179,7 @@ def reach_commands(found: Findings, path: str) -> Sequence[str]:
     return [shlex.join(words)]
 
 
-def execution_row(found: ExecutedGrasp | None) -> Record:
+def execution_row(found: ExecutedGrasp | None) -> TemplateData:
     """Build the cells about one grasp in the table of the first page, and on its card."""
     said, tone = said_of_execution(found)
     least = 0.0 if found is None else found.least_predicted_loss
@@ -184,7 +198,7 @@ def described_executions(executions: Executions) -> str:
     return " ".join(f"{line[0].upper()}{line[1:]}." for line in totals_in_words(executions) + ended)
 
 
-def execution_section(found: Findings) -> Record | None:
+def execution_section(found: Findings) -> TemplateData | None:
     """Build the section about the execution of a grasp; None where no grasp was executed."""
     executed, executions = found.executed, found.run.executions
     if executions is None:
@@ -209,10 +223,10 @@ def execute_command(executions: Executions, path: str, grasp_id: str) -> str:
     words += ["--friction", repr(executions.friction)]
     usual = ExecutionSettings(executions.settings.object_kg).used
     changed = _changed(executions.settings, usual, ALWAYS)
-    return shlex.join([*words, *flags_from(changed, Execute)])
+    return shlex.join([*words, *flags_from(changed, ExecuteFlags)])
 
 
-def _changed(settings: Any, usual: Any, always: Sequence[str] = ()) -> Record:
+def _changed(settings: Any, usual: Any, always: Sequence[str] = ()) -> TemplateData:
     """Return the settings that are not the usual ones, and some others."""
     return {name: value for name, value in asdict(settings).items()
             if name in always or value != getattr(usual, name)}  # fmt: skip
@@ -236,14 +250,14 @@ def _execution_facts(executions: Executions, found: ExecutedGrasp | None) -> Ite
     yield from _enough(found)
 
 
-def records_table(records: Sequence[object], kind: type) -> Record:
+def records_table(records: Sequence[object], kind: type) -> TemplateData:
     """Build a table of the figures of records, for the template `records.html`.
 
     A figure that is true is good, and one that is false is bad. Those that no record has are left
     out.
     """
     listed = [each for each in figures(kind) if any(each.of(one) is not None for one in records)]
-    tones = {True: GOOD, False: BAD}
+    tones = {True: GOOD_TONE, False: BAD_TONE}
     return {
         "columns": [(figure.shown.heading, figure.explained) for figure in listed],
         "rows": [

@@ -21,7 +21,6 @@ ON_GRASPS = {
     "replay full --out made": "full",
     "dataset verify full": "full",
     "dataset verify nowhere": "nowhere",
-    "dataset export full --out made": "full",
     "dataset build tetrahedron --out full": "full",
     "dataset build nobody.stl --frictions 0.5 --out made": "nobody.stl",
     "baseline check nowhere.json": "nowhere.json",

@@ -34,7 +34,7 @@ from sim_validate.engine.limits_and_friction import (
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulate import Bench, Load
 from sim_validate.engine.traces import Outcome, judge
-from sim_validate.kit.workers import available_cores, each
+from sim_validate.processes.workers import available_cores, each
 from tests.benchmarks.objects import FAMILIES
 from tests.grasp_core.long_shapes import MM, with_holes
 

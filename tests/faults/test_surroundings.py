@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 
-from sim_validate.kit import workers as engines
 from sim_validate.main import main
+from sim_validate.processes import workers as engines
 from tests.faults.conftest import CLI, KEPT, ROOT, contents
 
 RUN = ["run", "tetrahedron", "--limit", "1", "--jobs", "1", "-q"]
@@ -73,7 +73,7 @@ def test_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch, capsys):
 
 def test_cores_are_those_that_the_process_may_use(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(64)), raising=False)
-    monkeypatch.setattr(engines, "SHARE", tmp_path / "cpu.max")
+    monkeypatch.setattr(engines, "CPU_SHARE", tmp_path / "cpu.max")
     counted = {"": 64, "max 100000\n": 64, "250000 100000\n": 2, "20000 100000\n": 1}
     for text, cores in counted.items():
         if text:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import grasp_core as gc
-from sim_validate.datasets.work_units import GivenGrasp, given_from_json, given_text
+from sim_validate.datasets.given_grasps import GraspToJudge, given_from_json, given_text
 from tests.damaged import places, value_at
 from tests.fuzzing.targets import targets
 
@@ -77,6 +77,6 @@ NORMALS = ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.6, 0.8), (-1.0, 0.0, 0.0))
 @FEW
 @given(st.lists(POINTS, min_size=1, max_size=3))
 def test_given_contacts_survive_their_text(listed):
-    grasps = [GivenGrasp(f"given-{i:06}", f"n{i}", tuple(points), NORMALS)
+    grasps = [GraspToJudge(f"given-{i:06}", f"n{i}", tuple(points), NORMALS)
               for i, points in enumerate(listed)]  # fmt: skip
     assert list(given_from_json(given_text(grasps))) == grasps

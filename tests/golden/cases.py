@@ -84,7 +84,6 @@ CASES = (
         (
             "dataset build wedge --limit 1 --random-wrenches 2 --limits ramp --friction-below 1"
             " --friction-near 1 --moved-out 1 --figures closure --scenes --jobs 1 --out ds",
-            "dataset export ds --to isaac --out isaac",
         ),
     ),
     Case("executed", ("run box --limit 2 --execute --jobs 1 --out .",)),
@@ -113,7 +112,6 @@ CASES = (
             "transfer grasps.json changed.obj --out carried",
             "analyze contacts.json --wrench 0 0 -3 0 0 0 --json > analysis.json",
             "export grasps.json --to gltf -o grasps.glb",
-            "export grasps.json --to moveit -o grasps.yaml",
         ),
     ),
     Case(

@@ -8,8 +8,8 @@ import grasp_core as gc
 import scenes
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.datasets.build import UnitRecord
-from sim_validate.datasets.open_dataset import Manifest
+from sim_validate.datasets.manifest import Manifest
+from sim_validate.datasets.resuming import UnitRecord
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches
 from sim_validate.main import main

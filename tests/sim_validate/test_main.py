@@ -16,17 +16,17 @@ from grasp_core.names import HANDS, RANKINGS, RankBy
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import FAMILIES
 from grasp_core.provenance import versions
-from scenes.drawing.painting import View
-from scenes.drawing.pictures import AZIMUTH_DEG, ELEVATION_DEG
+from scenes.drawing.painting import Camera
+from scenes.drawing.pictures import AZIMUTH_DEG, OBJECT_ELEVATION_DEG
 from scenes.example_objects import example_object
-from scenes.settings import ENDINGS, GraspFormat
-from sim_validate.datasets.config import HandName
+from scenes.settings import EXPORT_ENDINGS, GraspFormat
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.commands.flags import CLIP_TYPES, PAGE_TYPES, PICTURE_TYPES, ProtocolName
+from sim_validate.commands.table import EXAMPLES, GROUPS
+from sim_validate.datasets.config import BuiltInHand
 from sim_validate.engine.traces import HoldVerdict, Outcome
-from sim_validate.kit import workers
-from sim_validate.kit.command_flags import CLIPS, PAGES, PICTURES, ProtocolName
-from sim_validate.kit.commands import EXAMPLES, GROUPS
-from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
+from sim_validate.processes import workers
 from sim_validate.protocols.published import PROTOCOLS
 from tests.grasp_core.curved import bumpy_ellipsoid
 from tests.patience import HANGING_S
@@ -121,7 +121,7 @@ def test_a_scale_multiplies_what_a_mesh_file_says(here, answer, capsys):
         (["wedge"], Exit.USAGE, "the commands are run, plan, validate"),
         (["dataset", "biuld"], Exit.USAGE, "no command 'dataset biuld'; did you mean build"),
         (["baseline", "check-it"], Exit.USAGE, "did you mean check"),
-        (["dataset", "wedge"], Exit.USAGE, "the commands are build, import, verify, export"),
+        (["dataset", "wedge"], Exit.USAGE, "the commands are build, import, verify"),
         (["plan"], Exit.USAGE, "Required options"),
         (["plan", "wedge", "--config"], Exit.USAGE, "--config"),
         (["plan", "box", "--ceiling", "10"], Exit.INPUT, "--ceiling needs --optimize"),
@@ -209,7 +209,7 @@ def test_graphics_that_are_not_here_are_named():
 def test_an_interrupted_run_keeps_what_is_done(here):
     """SIGINT while simulating: exit code 130, a whole grasps.json, verdicts marked incomplete."""
     code = (
-        "from sim_validate.kit import console; console.PLAIN_EVERY_S = 0.2;"
+        "from sim_validate.commands import console; console.PLAIN_EVERY_S = 0.2;"
         "from sim_validate.main import run_and_exit; run_and_exit()"
     )
     command = [sys.executable, "-c", code, "run", "icosahedron", "--limit", "150"]
@@ -274,7 +274,7 @@ def test_an_object_is_drawn(here, answer):
     assert text.startswith("<svg ")
     numbers = [int(each) for each in re.findall(r">(\d+)</text>", text)]
     assert text.count("<text") == len(numbers)
-    view = View.of_angles(AZIMUTH_DEG, ELEVATION_DEG, wedge := example_object("wedge"))
+    view = Camera.of_angles(AZIMUTH_DEG, OBJECT_ELEVATION_DEG, wedge := example_object("wedge"))
     assert numbers == [
         number
         for number, face in enumerate(wedge.faces)
@@ -325,11 +325,12 @@ def test_help_on_a_command_shows_examples_that_can_be_typed(asked, capsys, words
         ("plan", "--rank-by", get_args(RankBy)), ("run", "--rank-by", get_args(RankBy)),
         ("plan", "{ferrari-canny,weight,task}", ("Ferrari-Canny", "weight", "task")),
         ("plan", "STR", FORMATS),
-        ("inspect", "--picture", PICTURES), ("view", "--picture", PICTURES),
-        ("view", "--page", PAGES), ("view", "--clip", CLIPS), ("transfer", "part,", FORMATS),
+        ("inspect", "--picture", PICTURE_TYPES), ("view", "--picture", PICTURE_TYPES),
+        ("view", "--page", PAGE_TYPES), ("view", "--clip", CLIP_TYPES),
+        ("transfer", "part,", FORMATS),
         ("hand", "STR", HANDS), ("reach", "--hand", HANDS),
         ("export", "--to", get_args(GraspFormat)),
-        ("export", "--out", [ends[0] for ends in ENDINGS.values()]),
+        ("export", "--out", [ends[0] for ends in EXPORT_ENDINGS.values()]),
     ],
 )  # fmt: skip
 def test_the_help_of_a_flag_names_every_value(capsys, words, flag, values):
@@ -346,7 +347,7 @@ def test_every_ranking_is_described_wherever_rankings_are():
     assert set(RANKINGS) == set(get_args(RankBy))
     assert all(f"`{name}`" in (plan.__doc__ or "") for name in RANKINGS)
     assert get_args(ProtocolName) == tuple(PROTOCOLS)
-    assert get_args(HandName) == ("", *HANDS)
+    assert get_args(BuiltInHand) == ("", *HANDS)
 
 
 def test_the_version_is_that_of_graspproof_mujoco_and_python(capsys):

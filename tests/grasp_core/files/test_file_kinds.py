@@ -14,8 +14,8 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import ContactsFile, contact_sets_from_json
 from sim_validate.baselines.baseline import Baseline
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.datasets.build import UnitRecord
-from sim_validate.datasets.open_dataset import Manifest
+from sim_validate.datasets.manifest import Manifest
+from sim_validate.datasets.resuming import UnitRecord
 from sim_validate.engine.setup import WrenchFile
 from sim_validate.execution.verdict import Executions
 from sim_validate.hands.reaches import Reaches

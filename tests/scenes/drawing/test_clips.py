@@ -11,7 +11,7 @@ import scenes
 from grasp_core.forces.contact_forces import even_forces
 from scenes.drawing import clips
 from scenes.drawing.clips import (
-    MOST,
+    MOST_ENLARGED,
     VISIBLE,
     GraphicsError,
     magnified,
@@ -40,7 +40,7 @@ def test_every_motion_is_multiplied_by_one_factor(scene):
     shifts, turns, slides = (1e-8 * rng.normal(size=(5, n)) for n in (3, 3, 12))
     shifts[0] = turns[0] = slides[0] = 0.0
     larger, factor = magnified(joints_of(scene, shifts, turns, slides), scene)
-    assert factor == MOST
+    assert factor == MOST_ENLARGED
     wanted = joints_of(scene, factor * shifts, factor * turns, factor * slides)
     np.testing.assert_allclose(larger, wanted, atol=1e-12)
 
@@ -53,7 +53,7 @@ def test_motions_become_visible_and_no_larger(scene, share):
     if share > VISIBLE:
         assert factor == 1.0
         return
-    assert VISIBLE / 2.0 < factor * share <= VISIBLE * (1.0 + 1e-9) or factor == MOST
+    assert VISIBLE / 2.0 < factor * share <= VISIBLE * (1.0 + 1e-9) or factor == MOST_ENLARGED
     assert factor == float(f"{factor:.0e}")
 
 

@@ -5,14 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scenes.drawing.pictures import (
-    BALL_RADIUS,
-    BAR_LENGTH,
-    Drawing,
-    finger_size,
-    glass,
-    rulings,
-)
+from scenes.drawing.pictures import BALL_RADIUS, BAR_LENGTH, Drawing, finger_size, glass, rulings
 from tests.sim_validate.rigs import grasps
 
 FAMILIES = [

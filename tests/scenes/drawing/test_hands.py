@@ -9,7 +9,7 @@ import pytest
 import scenes
 from grasp_core.errors import InputError
 from grasp_core.hands.hand_arrays import places
-from scenes.drawing.hands import STEPS, hand_shapes
+from scenes.drawing.hands import QUARTER_SIDES, hand_shapes
 from scenes.drawing.pictures import write_picture
 from tests.scenes.drawing.standing import ROUNDING, held, standing
 
@@ -19,7 +19,7 @@ def test_fingertips_touch_their_contacts():
     one = held()
     gaps = np.linalg.norm(one.tips - one.positions, axis=1) - one.tip_radii
     np.testing.assert_allclose(gaps, 0.0, atol=ROUNDING)
-    coarse = 1.0 - math.cos(0.25 * math.pi / STEPS) ** 2
+    coarse = 1.0 - math.cos(0.25 * math.pi / QUARTER_SIDES) ** 2
     shapes = [shape for shape in hand_shapes(one) if shape.role == "fingertip"]
     assert [shape.finger for shape in shapes] == [2, 3, 1, 0]  # first, middle, ring, thumb
     for shape in shapes:

@@ -73,7 +73,7 @@ def test_what_cannot_be_drawn_is_shown_as_text_and_never_raises(plan, monkeypatc
     elsewhere = replace(plan, body=scenes.example_object("dodecahedron"))
     assert elsewhere._repr_html_() is None
     assert repr(elsewhere).startswith("Plan(")
-    monkeypatch.setattr(pages, "MOST_CORNERS", 10)
+    monkeypatch.setattr(pages, "MOST_DRAWN_CORNERS", 10)
     found, cells = read(plan.body)
     assert found.find(f".//{SVG}path") is None
     assert "67.74 mm" in cells

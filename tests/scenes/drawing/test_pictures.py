@@ -14,8 +14,8 @@ from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import convex_hull, signed_area
 from scenes.drawing.painting import (
     FORESHORTENED,
-    Surface,
-    View,
+    Camera,
+    DrawnSurface,
     Window,
     best_view,
     outline,
@@ -23,7 +23,7 @@ from scenes.drawing.painting import (
 )
 from scenes.drawing.panels import width_of
 from scenes.drawing.pictures import BAR_RADIUS, Drawing, glass, grasp_figure, write_picture
-from scenes.drawing.sheets import ASSETS, FONT_FILES, FORMATS, Area, Sheet, Words, png_of
+from scenes.drawing.sheets import ASSETS, FONT_FILES, PICTURE_FORMATS, Area, Sheet, Words, png_of
 from tests.scenes.drawing.whole import assert_whole
 from tests.sim_validate.rigs import grasps
 
@@ -102,8 +102,8 @@ def test_a_curved_body_has_an_outline_and_no_seams(monkeypatch):
     assert 50 < len(coarser.polygons) < len(surface.polygons)
     far = np.linalg.norm(coarser.vertices() - body.center_of_mass, axis=1)
     assert 0.85 * body.radius < far.min() <= far.max() <= (1.0 + 1e-9) * body.radius
-    view = View.of_angles(20.0, 30.0, body)
-    lines = outline(Surface.of(surface.polygons), view.camera)
+    view = Camera.of_angles(20.0, 30.0, body)
+    lines = outline(DrawnSurface.of(surface.polygons), view.camera)
     assert len(lines) > 30
     heights = (lines.reshape(-1, 3) - body.center_of_mass) @ view.axes[2] / body.radius
     # the camera is nine radii away: the tangents touch at a ninth, here to an edge's length
@@ -116,7 +116,7 @@ def test_a_curved_body_has_an_outline_and_no_seams(monkeypatch):
     assert covered == pytest.approx(2.0 * abs(signed_area(convex_hull(flat))), rel=0.35)
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", PICTURE_FORMATS)
 def test_a_picture_is_the_same_each_time(wedge, tmp_path, form):
     one, two = (write_picture(*wedge, tmp_path / place / f"a.{form}").read_bytes()
                 for place in ("one", "two"))  # fmt: skip

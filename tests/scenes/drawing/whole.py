@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from PIL import Image
 
-from scenes.drawing.pages import UNITS
+from scenes.drawing.pages import PER_RADIUS
 from scenes.drawing.panels import width_of
 
 
@@ -38,8 +38,8 @@ def assert_whole(sheet):
 def assert_contacts(shapes, body, positions):
     """That a page's drawing has its contacts where they are said to be, to a whole unit."""
     (drawn,) = (shape["points"] for shape in shapes if shape["role"] == "contact")
-    points = body.center_of_mass + np.array(drawn) * body.radius / UNITS
-    np.testing.assert_allclose(points, positions, atol=body.radius / UNITS)
+    points = body.center_of_mass + np.array(drawn) * body.radius / PER_RADIUS
+    np.testing.assert_allclose(points, positions, atol=body.radius / PER_RADIUS)
 
 
 def frames_of(path, *places):

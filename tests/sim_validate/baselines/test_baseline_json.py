@@ -7,12 +7,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from grasp_core.files.text_files import write_text
-from sim_validate.baselines.baseline import (
-    Baseline,
-    Entry,
-    read_baseline,
-    write_baseline,
-)
+from sim_validate.baselines.baseline import Baseline, KeptGrasp, read_baseline, write_baseline
 from sim_validate.engine.traces import Outcome
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, entry
 from tests.sim_validate.changing import at, changed
@@ -73,8 +68,8 @@ def test_a_motion_that_diverged_has_no_size():
             for trial, value in zip((first, second), order, strict=True)
         ]
         found = dataclasses.replace(verdict, wrenches=(*spoilt, *rest))
-        assert math.isnan(Entry.of(found).verdict.displacement_m)
-    assert Entry.of(verdict).verdict.displacement_m > 0.0
+        assert math.isnan(KeptGrasp.of(found).verdict.displacement_m)
+    assert KeptGrasp.of(verdict).verdict.displacement_m > 0.0
 
 
 def test_controls_that_were_not_let_go_are_counted():
@@ -86,5 +81,5 @@ def test_controls_that_were_not_let_go_are_counted():
     found = dataclasses.replace(
         verdict, controls=(dataclasses.replace(control, tried=tried), *verdict.controls[1:])
     )
-    kept = Entry.of(found).verdict
+    kept = KeptGrasp.of(found).verdict
     assert (kept.controls, kept.controls_held) == (len(verdict.controls), 1)

@@ -5,11 +5,11 @@ import math
 
 import pytest
 
-from sim_validate.baselines.baseline import Baseline, Entry, How, VerdictFigures
+from sim_validate.baselines.baseline import Baseline, How, KeptGrasp, VerdictFigures
 from sim_validate.baselines.compare import OTHER_VERSIONS, Carried, Status, compare, failing
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit.files import AboutObject
+from sim_validate.files.result_files import AboutObject
 from sim_validate.settings import HoldProtocol
 
 FIGURES = VerdictFigures(
@@ -18,7 +18,7 @@ FIGURES = VerdictFigures(
     limit_n=3.0, simulated_limit_n=2.99, displacement_m=1e-5, rotation_rad=1e-4,
     noisy_trials=100, noisy_not_held=(3, 50), noisy_close=(7, 50),
 )  # fmt: skip
-ENTRY = Entry("c-0-1-2-3", "1f", FIGURES)
+ENTRY = KeptGrasp("c-0-1-2-3", "1f", FIGURES)
 BEFORE = Baseline(
     grasps_file="grasps.json", limit=None, object=AboutObject("wedge", "", "ab"), friction=0.5,
     planned_radius_m=None, settings=How(), arithmetic="as here", entries=(ENTRY,),
@@ -30,7 +30,7 @@ SLIPPED = {"outcome": Outcome.SLIPPED, "not_held": ("weakest",)}
 
 
 def entry(name=ENTRY.id, contacts_sha256=ENTRY.contacts_sha256, **changed):
-    return Entry(name, contacts_sha256, dataclasses.replace(FIGURES, **changed))
+    return KeptGrasp(name, contacts_sha256, dataclasses.replace(FIGURES, **changed))
 
 
 def now(header=None, **changed):

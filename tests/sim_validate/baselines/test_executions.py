@@ -8,13 +8,10 @@ import pytest
 
 import grasp_core as gc
 from sim_validate.baselines.baseline import Baseline, ExecutedFigures, How
-from sim_validate.baselines.check import Checked, demanded
+from sim_validate.baselines.check import CheckedBaseline, demanded
 from sim_validate.baselines.compare import Status, compare
 from sim_validate.baselines.suite import suite_from_tables
-from sim_validate.execution.verdict import (
-    ExecutedGrasp,
-    ExecutionControl,
-)
+from sim_validate.execution.verdict import ExecutedGrasp, ExecutionControl
 from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.baselines.test_compare import BEFORE, ENTRY, OTHER_ARITHMETIC, OTHERS
 from tests.sim_validate.execution.executed import execution, trial
@@ -117,10 +114,10 @@ def test_how_far_contacts_slide_counts_only_where_numbers_round_alike(other, fir
 
 def test_what_must_survive_fails_although_the_baseline_did_not_survive_either():
     same = compare(executed(**LOST), executed(**LOST))
-    done = demanded(Checked(same, None, "exactly"))
+    done = demanded(CheckedBaseline(same, None, "exactly"))
     assert [each.status for each in done.findings] == [Status.REGRESSED]
     assert "must survive" in done.findings[0].reasons[0]
-    kept = Checked(compare(executed(), executed()), None, "exactly")
+    kept = CheckedBaseline(compare(executed(), executed()), None, "exactly")
     assert demanded(kept).findings == kept.findings
 
 

@@ -14,12 +14,12 @@ from scenes.settings import FingerSettings
 from sim_validate.closure.controls import negative_controls
 from sim_validate.closure.validate import Job
 from sim_validate.closure.verdict import Verdicts, trace_arrays
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.engine import gate as gate_module
 from sim_validate.engine.gate import measured_gate
 from sim_validate.engine.limits_and_friction import Rig
 from sim_validate.engine.setup import Agenda, NamedWrench, Setup
 from sim_validate.engine.traces import Outcome
-from sim_validate.kit.exit_codes import Exit
 from tests.sim_validate.rigs import grasps, plan_with_a_bad_grasp
 
 WITHOUT_CONTROLS = Agenda(controls=False)
@@ -224,7 +224,7 @@ def test_a_worker_takes_over_how_the_simulator_did(monkeypatch):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_fingertip_that_meets_nothing_is_the_outcome_of_its_grasp_alone(jobs, monkeypatch):
-    monkeypatch.setattr("sim_validate.kit.workers.UNITS_PER_PROCESS", 1)
+    monkeypatch.setattr("sim_validate.processes.workers.UNITS_PER_PROCESS", 1)
     plan, agenda = plan_with_a_bad_grasp(), replace(WITHOUT_CONTROLS, limits="ramp", repeats=1)
     first, bad, last = sv.validate_all(plan.body, plan, 1.0, agenda=agenda, jobs=jobs)
     assert (first.held, bad.outcome, last.held) == (True, Outcome.INVALID_START, True)

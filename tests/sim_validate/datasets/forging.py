@@ -3,7 +3,7 @@
 import dataclasses
 import hashlib
 
-from sim_validate.datasets.open_dataset import listed, read_manifest, write_manifest
+from sim_validate.datasets.manifest import listed, read_manifest, write_manifest
 from sim_validate.datasets.parquet import parquet_bytes, read_table
 
 

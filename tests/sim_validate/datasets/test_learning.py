@@ -16,15 +16,16 @@ from scenes.example_objects import example_object
 from sim_validate.closure.validate import validate
 from sim_validate.datasets import learning as varied_figures
 from sim_validate.datasets.config import Learning
-from sim_validate.datasets.learning import RATIOS, execution_cells, region_exit, variants
+from sim_validate.datasets.learning import VARIED_RATIOS, execution_cells, region_exit, variants
+from sim_validate.datasets.making_rows import Making
 from sim_validate.datasets.verify import verify
-from sim_validate.datasets.work_units import Making, units_of
+from sim_validate.datasets.work_units import units_of
 from sim_validate.engine.setup import Agenda
 from tests.sim_validate.datasets.configs import BODIES, LEARNED, rows_of
 from tests.sim_validate.datasets.forging import first, forged
 
 WEDGE = example_object("wedge")
-KINDS = {*RATIOS, "moved_out"}
+KINDS = {*VARIED_RATIOS, "moved_out"}
 
 
 @pytest.fixture(scope="module")
@@ -191,7 +192,7 @@ def test_frictions_are_below_near_and_above_the_critical_one_of_the_contacts(by_
         for row in varied(by_id, kind):
             critical = gc.critical_friction(row["contact_points_m"], row["contact_normals"])
             assert row["friction_ratio"] == pytest.approx(row["friction"] / critical, rel=1e-6)
-            least, most = RATIOS[kind]
+            least, most = VARIED_RATIOS[kind]
             assert least - 1e-3 <= row["friction_ratio"] <= most + 1e-3
             assert row["force_closed"] == (row["friction"] > critical)
             assert row["contact_points_m"] == by_id[row["made_from"]]["contact_points_m"]
@@ -224,7 +225,7 @@ def test_masses_are_near_the_one_that_is_predicted_to_be_lost(by_id, learned):
     for row in varied(by_id, "mass_near"):
         source = by_id[row["made_from"]]
         assert row["contact_points_m"] == source["contact_points_m"]
-        least, most = RATIOS["mass_near"]
+        least, most = VARIED_RATIOS["mass_near"]
         assert least <= row["mass_ratio"] <= most
         assert row["grasp_id"] in losses
         assert row["mass_kg"] > 0.0

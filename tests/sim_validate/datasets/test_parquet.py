@@ -11,14 +11,9 @@ from sim_validate.closure.verdict import Verdict, WrenchVerdict
 from sim_validate.datasets import parquet
 from sim_validate.datasets.columns import TABLES, GraspRow
 from sim_validate.datasets.config import KEYS, DatasetConfig
-from sim_validate.datasets.parquet import (
-    Column,
-    agrees,
-    each_batch,
-    parquet_bytes,
-    read_table,
-)
-from sim_validate.datasets.work_units import body_of, made_of, split_of, units_of
+from sim_validate.datasets.making_rows import made_of, split_of
+from sim_validate.datasets.parquet import TableColumn, agrees, each_batch, parquet_bytes, read_table
+from sim_validate.datasets.work_units import body_of, units_of
 from sim_validate.engine.traces import HoldVerdict
 
 pytest.importorskip("pyarrow")
@@ -47,7 +42,7 @@ def written(rows, tmp_path):
 
 
 def test_a_file_of_another_version_is_refused(written):
-    more = {**TABLES, "objects": (*TABLES["objects"], Column("taste", "text", "new"))}
+    more = {**TABLES, "objects": (*TABLES["objects"], TableColumn("taste", "text", "new"))}
     for read in (read_table, lambda *of: list(each_batch(*of))):
         with pytest.raises(gc.InputError, match="expected the columns of"):
             read(written["objects"], "objects", more)
@@ -104,7 +99,7 @@ def test_columns_of_other_types_and_another_table_are_refused(written, tmp_path)
 
 
 def test_files_that_claim_too_much_are_refused_before_they_are_read(written, monkeypatch):
-    monkeypatch.setattr(parquet, "MOST_ROWS", 1)
+    monkeypatch.setattr(parquet, "MOST_FILE_ROWS", 1)
     with pytest.raises(gc.InputError, match=r"claims [0-9]+ rows, .* limits are 1 and"):
         read_table(written["trials"], "trials", TABLES)
 

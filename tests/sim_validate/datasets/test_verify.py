@@ -11,7 +11,7 @@ import trimesh
 import grasp_core as gc
 from sim_validate import load_dataset
 from sim_validate.datasets.build import build
-from sim_validate.datasets.open_dataset import read_manifest, write_manifest
+from sim_validate.datasets.manifest import read_manifest, write_manifest
 from sim_validate.datasets.verify import verify
 from tests.sim_validate.changing import changed
 from tests.sim_validate.datasets.configs import CONFIG, rows_of

@@ -7,9 +7,11 @@ import pytest
 import trimesh
 
 from grasp_core.processes import local_processes
-from sim_validate.datasets import build as workers
-from sim_validate.datasets.build import Staging, Task, build, do_task, do_unit, drive
+from sim_validate.datasets import computing as workers
+from sim_validate.datasets.build import build
+from sim_validate.datasets.computing import UnitJob, compute_all, do_task, do_unit
 from sim_validate.datasets.config import DatasetConfig
+from sim_validate.datasets.resuming import Staging
 from sim_validate.datasets.work_units import WorkerError, provenance, units_of
 from tests.patience import HANGING_S
 from tests.sim_validate.datasets.engines import Here, silent
@@ -26,7 +28,7 @@ def staging(tmp_path):
 
 
 def task(staging, work, timeout_s=HANGING_S):
-    return Task(units_of(CONFIG)[0], staging, dict(provenance()), timeout_s, work)
+    return UnitJob(units_of(CONFIG)[0], staging, dict(provenance()), timeout_s, work)
 
 
 def sleep(*_):
@@ -68,7 +70,7 @@ def test_rows_that_do_not_arrive_end_the_run(staging):
             return super().submit(function, dataclasses.replace(given, work=lambda *_: None))
 
     with pytest.raises(WorkerError, match="rows that do not appear"):
-        drive(units_of(CONFIG), staging, Elsewhere(), silent)
+        compute_all(units_of(CONFIG), staging, Elsewhere(), silent)
 
 
 def test_a_full_disk_ends_the_run_and_later_it_goes_on(tmp_path):

@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from sim_validate.engine.setup import (
-    Agenda,
-    NamedWrench,
-    Setup,
-    setup_from_file,
-    weights,
-)
+from sim_validate.engine.setup import Agenda, NamedWrench, Setup, setup_from_file, weights
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,7 @@ import pytest
 
 from scenes.mujoco.mjcf_text import quaternion
 from sim_validate.engine.simulate import Health, Motion
-from sim_validate.engine.traces import (
-    rotation_angles,
-    traces,
-)
+from sim_validate.engine.traces import rotation_angles, traces
 from tests.judges import random_rotation
 
 

@@ -10,12 +10,7 @@ import pytest
 import grasp_core as gc
 import sim_validate as sv
 from sim_validate.execution.trials import Skipped
-from sim_validate.execution.verdict import (
-    ExecutedGrasp,
-    ExecutionControl,
-    best_executed,
-    ended,
-)
+from sim_validate.execution.verdict import ExecutedGrasp, ExecutionControl, best_executed, ended
 from sim_validate.settings import ExecutionSettings
 from tests.sim_validate.changing import at
 from tests.sim_validate.execution.executed import (

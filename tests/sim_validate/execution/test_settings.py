@@ -14,10 +14,10 @@ import sim_validate as sv
 from grasp_core.settings import as_table
 from scenes.example_objects import example_object
 from scenes.settings import SAMPLE_S
+from sim_validate.commands.config_file import flags_from
+from sim_validate.commands.simulation_flags import ExecuteFlags
 from sim_validate.execution.paths import stop
 from sim_validate.hands.trials import hand_execution_settings
-from sim_validate.kit.flag_values import flags_from
-from sim_validate.kit.simulation_flags import Execute
 from sim_validate.settings import KINDS, TrialKind
 
 TABLE = {
@@ -108,4 +108,6 @@ def test_numbers_that_are_given_stay_as_they_are():
     assert as_given.for_body(tiny) == as_given
     assert numbers(hand_execution_settings(0.0003).for_body(tiny)) == {**USUAL, "push_n": 100.0}
     changed = {"keep_defaults": as_given.keep_defaults}
-    assert flags_from(changed, Execute) == ["--keep-defaults"]  # commands that repeat executions
+    assert flags_from(changed, ExecuteFlags) == [
+        "--keep-defaults"
+    ]  # commands that repeat executions

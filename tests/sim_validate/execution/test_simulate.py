@@ -12,13 +12,7 @@ from sim_validate.execution import paths
 from sim_validate.execution.paths import Table
 from sim_validate.execution.simulate import HeldBench
 from tests.grasp_core.execution.held import box
-from tests.sim_validate.execution.held_rigs import (
-    MASS,
-    G,
-    box_bench,
-    box_grip,
-    box_scene,
-)
+from tests.sim_validate.execution.held_rigs import MASS, G, box_bench, box_grip, box_scene
 
 DOWN = np.array([0.0, 0.0, -G])
 UP = np.array([0.0, 0.0, 1.0])

@@ -13,9 +13,9 @@ from grasp_core.files.text_files import write_text
 from grasp_core.records.grasps_json import grasps_from_json, plan_to_json
 from scenes.example_objects import example_object
 from sim_validate.baselines.compare import Status
-from sim_validate.baselines.part import ChangedPartError, Source, source_of
+from sim_validate.baselines.part import ChangedPartError, SourceMesh, source_of
 from sim_validate.baselines.suite import grasp_cases, suite_from_toml
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from tests.bad_input.mesh_texts import obj
 from tests.bad_input.of_threemf import mesh, model, object_, threemf
@@ -345,7 +345,7 @@ def test_comments_line_ends_and_the_order_of_vertices_are_no_change(project):
         turned,
     ):
         part.write_text(text, newline="")
-        assert source_of(saved, project / "grasps.json", []) == Source(file=part, unit="mm")
+        assert source_of(saved, project / "grasps.json", []) == SourceMesh(file=part, unit="mm")
 
 
 def test_the_same_part_in_another_format_and_unit_is_no_change(project):
@@ -354,7 +354,7 @@ def test_the_same_part_in_another_format_and_unit_is_no_change(project):
     (project / "part.obj").unlink()
     solid = object_(mesh(box.vertices / 0.0254, box.triangles))
     part.write_bytes(threemf(model(solid, more='unit="inch"')))
-    assert source_of(saved, project / "grasps.json", []) == Source(file=part, unit="in")
+    assert source_of(saved, project / "grasps.json", []) == SourceMesh(file=part, unit="in")
 
 
 def test_a_part_elsewhere_is_named_in_the_file(project):
@@ -376,7 +376,7 @@ def test_grasps_of_a_built_in_object_have_no_file(tmp_path):
     grasps = saved_plan(tmp_path)
     write_text(tmp_path / "wedge.obj", "another wedge")
     saved = grasps_from_json(grasps.read_text())
-    assert source_of(saved, grasps, []) == Source()
+    assert source_of(saved, grasps, []) == SourceMesh()
     with pytest.raises(gc.InputError, match="not planned from a mesh file"):
         source_of(saved, grasps, [], tmp_path / "wedge.obj")
 

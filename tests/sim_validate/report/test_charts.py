@@ -11,7 +11,7 @@ import sim_validate as sv
 from grasp_core.closure.wrench_sets import WrenchSet
 from scenes.drawing.panels import thinned
 from scenes.drawing.pictures import Drawing
-from scenes.drawing.sheets import BAD, GOOD, LEVELS, Area, Dots, Image, png_of, svg_of
+from scenes.drawing.sheets import BAD_HEX, GOOD_HEX, LEVELS, Area, Dots, Image, png_of, svg_of
 from sim_validate.closure.controls import ControlTrial
 from sim_validate.closure.replaying import Recorded, replayed
 from sim_validate.closure.verdict import WrenchVerdict
@@ -206,9 +206,9 @@ def test_what_differs_stands_out(unit):
     assert agreements[0].differ() == (False, True, True)
     one, two = map(fidelity_panel, agreements)
     assert {"identity", "1 agree", "2 differ"} <= {words.text for words in one.words()}
-    assert {mark.colour for mark in one.marks if isinstance(mark, Dots)} == {GOOD}
+    assert {mark.colour for mark in one.marks if isinstance(mark, Dots)} == {GOOD_HEX}
     assert [mark.fill for mark in one.marks if isinstance(mark, Area)].count(
-        BAD
+        BAD_HEX
     ) == 3  # one in the key
     assert {"b", "none measured"} <= {words.text for words in two.words()}
     assert not [mark for mark in two.marks if isinstance(mark, Dots)]

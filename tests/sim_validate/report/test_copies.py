@@ -8,10 +8,10 @@ import pytest
 import sim_validate as sv
 from grasp_core.records.grasps_json import load_grasps
 from sim_validate.closure.verdict import Verdicts
-from sim_validate.kit.exit_codes import Exit
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.cards import cards_of
-from sim_validate.report.report import FIRST, write_report
+from sim_validate.report.report import FIRST_CARDS, write_report
 from sim_validate.report.run_folder import runs_in
 from tests.scenes.drawing.whole import assert_contacts
 from tests.sim_validate.changing import slipped
@@ -86,10 +86,10 @@ def test_the_page_of_a_copy_has_its_own_numbers_and_leads_to_the_pictures(planne
 def test_the_first_page_is_ready_before_the_others_are_drawn(drawn):
     report, early = drawn
     ((text, done, total, found),) = early
-    assert (done, total) == (FIRST, report.drawn)
-    assert len(cards_in(text)) == FIRST < report.drawn
+    assert (done, total) == (FIRST_CARDS, report.drawn)
+    assert len(cards_in(text)) == FIRST_CARDS < report.drawn
     assert f"{total - done} more cards are being drawn: reload this page" in text
-    assert len(found) > FIRST
+    assert len(found) > FIRST_CARDS
     assert all(found)
     assert "are being drawn" not in report.index.read_text()
 

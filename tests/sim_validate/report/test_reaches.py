@@ -6,8 +6,8 @@ import shlex
 import pytest
 
 from grasp_core.errors import InputError
-from scenes.drawing.sheets import FINGERS, HAND
-from sim_validate.kit.exit_codes import Exit
+from scenes.drawing.sheets import FINGER_COLOURS, HAND
+from sim_validate.commands.exit_codes import Exit
 from sim_validate.main import main
 from sim_validate.report.report import write_report
 from tests.scenes.drawing.standing import (
@@ -48,7 +48,7 @@ def test_cards_show_the_hand_where_it_stands(report):
     assert "allegro: not reached, a collision" in said
     text = (report / "pictures" / f"{GRASP}-hand.svg").read_text()
     assert "with the hand allegro" in text
-    for finger in FINGERS:
+    for finger in FINGER_COLOURS:
         assert finger.lower() in text.lower()
 
 

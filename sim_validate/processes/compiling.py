@@ -22,12 +22,12 @@ from grasp_core.planning.planner import plan
 from grasp_core.quality.ferrari_canny import ferrari_canny
 from grasp_core.solvers.qp import least_distance
 from scenes.example_objects import example_object
-from sim_validate.kit.workers import each
+from sim_validate.processes.workers import each
 
-OUTWARD = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+FOUR_WAYS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Outward directions of a tetrahedron's faces, (4, 3); a third of each is its face's middle [m]."""
-CONTACTS = OUTWARD / 3.0, -OUTWARD / np.sqrt(3.0)
-FRICTION = 0.5
+FOUR_CONTACTS = FOUR_WAYS / 3.0, -FOUR_WAYS / np.sqrt(3.0)
+SPOT_FRICTION = 0.5
 
 
 class Loops(NamedTuple):
@@ -38,20 +38,20 @@ class Loops(NamedTuple):
 
 
 def _planned(*families: Family) -> None:
-    plan(example_object("tetrahedron"), FRICTION, families=families)
+    plan(example_object("tetrahedron"), SPOT_FRICTION, families=families)
 
 
 def _regions() -> None:
     from grasp_core.regions.certify_regions import certify_regions
 
     body = example_object("tetrahedron")
-    certify_regions(body, plan(body, FRICTION, limit=1).grasps[0], FRICTION)
+    certify_regions(body, plan(body, SPOT_FRICTION, limit=1).grasps[0], SPOT_FRICTION)
 
 
 def _best() -> None:
     from grasp_core.optimizing.best_grasp import best_grasp
 
-    best_grasp(example_object("tetrahedron"), FRICTION, gap=0.5).verify()
+    best_grasp(example_object("tetrahedron"), SPOT_FRICTION, gap=0.5).verify()
 
 
 def _clearance() -> None:
@@ -66,8 +66,8 @@ def _hand_reach() -> None:
     from grasp_core.hands.reach import reach_with
 
     body = example_object("tetrahedron")
-    grasp = plan(body, FRICTION, limit=1).grasps[0]
-    reach_with(load_hand("allegro"), body, grasp, FRICTION, table_down=(0.0, 0.0, -1.0))
+    grasp = plan(body, SPOT_FRICTION, limit=1).grasps[0]
+    reach_with(load_hand("allegro"), body, grasp, SPOT_FRICTION, table_down=(0.0, 0.0, -1.0))
 
 
 PLANNING = Loops(
@@ -75,10 +75,13 @@ PLANNING = Loops(
      "quality.ferrari_canny"),
     (
         partial(_planned, "concurrent", "pencil"),
-        partial(least_distance, CONTACTS[0][:3], -np.ones(3)),
-        partial(force_closure, *CONTACTS, FRICTION), partial(critical_friction, *CONTACTS),
-        partial(_planned, "regulus"), partial(ferrari_canny, *CONTACTS, FRICTION, torque_scale=1.0),
-        partial(toward, np.zeros((1, 3)), *np.array(CONTACTS)[:, None], np.full((1, 4), FRICTION)),
+        partial(least_distance, FOUR_CONTACTS[0][:3], -np.ones(3)),
+        partial(force_closure, *FOUR_CONTACTS, SPOT_FRICTION),
+        partial(critical_friction, *FOUR_CONTACTS),
+        partial(_planned, "regulus"),
+        partial(ferrari_canny, *FOUR_CONTACTS, SPOT_FRICTION, torque_scale=1.0),
+        partial(toward, np.zeros((1, 3)), *np.array(FOUR_CONTACTS)[:, None],
+                np.full((1, 4), SPOT_FRICTION)),
     ),
 )  # fmt: skip
 """What compiles the loops that plans need."""

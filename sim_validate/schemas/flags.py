@@ -3,11 +3,11 @@
 from tyro.conf import Positional
 
 from grasp_core.declared import declared
-from sim_validate.kit.command_flags import Spoken
+from sim_validate.commands.flags import Spoken
 
 
 @declared
-class Schema(Spoken):
+class SchemaFlags(Spoken):
     """Flags of the command `schema`."""
 
     kind: Positional[str | None] = None

@@ -13,12 +13,12 @@ from grasp_core.figures import meanings
 from grasp_core.files import file_kinds
 from grasp_core.records.grasps_json import ContactSet
 from sim_validate.baselines.suite import suite_from_tables
+from sim_validate.commands.console import Reporter
 from sim_validate.datasets.config import DatasetConfig, config_from_toml, config_to_toml
-from sim_validate.kit.command import show_schema
-from sim_validate.kit.console import Reporter
-from sim_validate.kit.flags import Schema
-from sim_validate.kit.schemas import DRAFT, KINDS, address, named, schema_of
 from sim_validate.main import main
+from sim_validate.schemas.command import show_schema
+from sim_validate.schemas.file_schemas import DRAFT, FILE_KINDS, address, named, schema_of
+from sim_validate.schemas.flags import SchemaFlags
 from tests.bad_input.mesh_texts import obj
 from tests.damaged import damaged
 from tests.fuzzing.data_files import TARGETS
@@ -26,7 +26,7 @@ from tests.schemas import faults_of, faults_of_file
 
 CALLED = {"given": "contacts", "staged": "unit", "dataset-config": "dataset"}
 """Kinds whose targets have other names."""
-SCHEMED = [each for each in TARGETS if CALLED.get(each.name, each.name) in KINDS]
+SCHEMED = [each for each in TARGETS if CALLED.get(each.name, each.name) in FILE_KINDS]
 BY_NAME = {"summary", "rows", "versions", "verified", "undecided", "bands"}
 """Tables with keys of their own."""
 
@@ -67,7 +67,7 @@ def check_damaged(name, document, count=150):
     assert tried
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", FILE_KINDS)
 def test_every_kind_of_files_has_a_schema_with_meanings(name):
     schema = schema_of(name)
     Draft202012Validator.check_schema(schema)
@@ -79,7 +79,7 @@ def test_every_kind_of_files_has_a_schema_with_meanings(name):
 
 
 def test_every_kind_that_is_told_apart_has_a_schema():
-    called = {each.called for each in KINDS.values()}
+    called = {each.called for each in FILE_KINDS.values()}
     assert {*file_kinds.WRITTEN, *file_kinds.GIVEN.values()} <= called
 
 
@@ -162,7 +162,7 @@ def test_keys_of_flat_parts_stand_among_the_others():
 )  # fmt: skip
 def test_kinds_are_found_by_their_names(text, name, capsys):
     assert named(text) == name
-    assert show_schema(Schema(text), Reporter()) == 0
+    assert show_schema(SchemaFlags(text), Reporter()) == 0
     assert json.loads(capsys.readouterr().out) == schema_of(name)
 
 
@@ -171,15 +171,15 @@ def test_kinds_are_found_by_their_names(text, name, capsys):
 )
 def test_an_unknown_kind_is_refused_with_names_like_it(text, hint):
     with pytest.raises(InputError, match=hint):
-        show_schema(Schema(text), Reporter())
+        show_schema(SchemaFlags(text), Reporter())
 
 
 def test_all_kinds_are_listed(capsys):
-    assert show_schema(Schema(), Reporter(json_only=True)) == 0
-    assert json.loads(capsys.readouterr().out).keys() == KINDS.keys()
-    assert show_schema(Schema(), Reporter()) == 0
+    assert show_schema(SchemaFlags(), Reporter(json_only=True)) == 0
+    assert json.loads(capsys.readouterr().out).keys() == FILE_KINDS.keys()
+    assert show_schema(SchemaFlags(), Reporter()) == 0
     said = capsys.readouterr().out
-    assert all(name in said for name in KINDS)
+    assert all(name in said for name in FILE_KINDS)
 
 
 def test_a_configuration_names_its_schema_which_changes_no_hash(tmp_path):

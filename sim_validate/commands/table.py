@@ -4,10 +4,7 @@ Modules are named as text, so that neither help nor any command waits for what o
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import NamedTuple
-
-from sim_validate.kit.exit_codes import FlagsError
 
 
 class Command(NamedTuple):
@@ -20,56 +17,56 @@ class Command(NamedTuple):
 
 COMMANDS: Mapping[str, Command] = {
     "run": Command(
-        "kit.simulation_flags:Run", "run:run_object",
+        "commands.simulation_flags:RunFlags", "run:run_object",
         "Plan grasps, simulate them and negative controls (contacts that must fail); write all.",
     ),
     "plan": Command(
-        "kit.command_flags:Plan", "planning.plan:plan_file",
+        "commands.flags:PlanFlags", "planning.plan:plan_file",
         "Find force-closure grasps of an object, each with a checked certificate of force "
         "closure.",
     ),
     "validate": Command(
-        "kit.simulation_flags:Validate", "protocols.command:judge_file",
+        "commands.simulation_flags:ValidateFlags", "protocols.command:judge_file",
         "Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must "
         "fail.",
     ),
     "execute": Command(
-        "kit.simulation_flags:Execute", "execution.command:execute_file",
+        "commands.simulation_flags:ExecuteFlags", "execution.command:execute_file",
         "Simulate grasps as a robot executes them: true mass, springy fingers, one fixed squeeze.",
     ),
     "scene": Command(
-        "kit.simulation_flags:Scene", "execution.command:write_scenes",
+        "commands.simulation_flags:SceneFlags", "execution.command:write_scenes",
         "Write grasps as MuJoCo scenes, which MuJoCo's own viewer can open.\n\n"
         "Without a mass, the scenes are those of `validate`: masses are scaled to suit the grasp, "
         "and there is no gravity. With a mass or a density, objects have their true mass and are "
         "held under gravity, as in the command `execute`.",
     ),
     "export": Command(
-        "kit.simulation_flags:Export", "execution.command:export_grasps",
-        "Write grasps for other programs: MoveIt, or viewers and editors of 3D scenes.",
+        "commands.simulation_flags:ExportFlags", "execution.command:export_grasps",
+        "Write grasps as a scene for viewers and editors of 3D scenes.",
     ),
     "view": Command(
-        "kit.command_flags:View", "report.command:view_grasp",
+        "commands.flags:ViewFlags", "report.command:view_grasp",
         "Look at a grasp: in MuJoCo's viewer if there is a display, or in a file.",
     ),
     "report": Command(
-        "kit.command_flags:Report", "report.command:report_folder",
+        "commands.flags:ReportFlags", "report.command:report_folder",
         "Write the results of a run as pages that open in a browser, without any network.",
     ),
     "regions": Command(
-        "kit.simulation_flags:Regions", "planning.regions:certify_file",
+        "commands.simulation_flags:RegionFlags", "planning.regions:certify_file",
         "Prove regions in which each finger may stand anywhere, whatever the others do.",
     ),
     "replay": Command(
-        "kit.command_flags:Replay", "report.command:replay_trial",
+        "commands.flags:ReplayFlags", "report.command:replay_trial",
         "Simulate one recorded trial again, and write its motion, sample by sample, and a clip.",
     ),
     "analyze": Command(
-        "kit.command_flags:Analyze", "planning.analyze:analyze_file",
+        "commands.flags:AnalyzeFlags", "planning.analyze:analyze_file",
         "Judge contacts of any origin: force closure with a certificate, quality, wrench limits.",
     ),
     "transfer": Command(
-        "kit.command_flags:Transfer", "planning.transfer:transfer_file",
+        "commands.flags:TransferFlags", "planning.transfer:transfer_file",
         "Carry grasps over to a part that has changed since they were planned, and judge them "
         "anew.",
     ),
@@ -82,70 +79,49 @@ COMMANDS: Mapping[str, Command] = {
         "Show what a hand was read as: fingers, joints with ranges and torque limits, fingertips.",
     ),
     "dataset build": Command(
-        "datasets.flags:Build", "datasets.command:build_dataset",
+        "datasets.flags:BuildFlags", "datasets.command:build_dataset",
         "Plan and simulate grasps of many objects and write tables; run it again to resume.",
     ),
     "dataset import": Command(
-        "datasets.flags:Import", "datasets.command:import_dataset",
+        "datasets.flags:ImportFlags", "datasets.command:import_dataset",
         "Judge grasps made by another tool, simulate them, and write them as a dataset.",
     ),
     "dataset verify": Command(
-        "datasets.flags:Verify", "datasets.command:verify_dataset",
+        "datasets.flags:VerifyFlags", "datasets.command:verify_dataset",
         "Check files and rows of a dataset, prove force closure again, and redo a sample.",
     ),
-    "dataset export": Command(
-        "datasets.flags:Export", "datasets.command:export_dataset",
-        "Write the grasps of a dataset that are in force closure for another program.",
-    ),
     "baseline record": Command(
-        "baselines.flags:Record", "baselines.command:record_baseline",
+        "baselines.flags:RecordFlags", "baselines.command:record_baseline",
         "Simulate grasps and write a baseline: a file that records how stable each grasp is.",
     ),
     "baseline check": Command(
-        "baselines.flags:Check", "baselines.command:check_baseline",
+        "baselines.flags:CheckFlags", "baselines.command:check_baseline",
         "Simulate the grasps of a baseline again, and report how each result has changed.",
     ),
     "inspect": Command(
-        "kit.command_flags:Inspect", "planning.objects:inspect_object",
+        "commands.flags:InspectFlags", "planning.objects:inspect_object",
         "Show a mesh as a polyhedron: faces, mass properties, face quadruples to grasp by.",
     ),
     "objects": Command(
-        "kit.command_flags:Objects", "planning.objects:list_objects",
+        "commands.flags:ObjectsFlags", "planning.objects:list_objects",
         "List the names of the built-in objects.",
     ),
     "schema": Command(
-        "kit.flags:Schema", "kit.command:show_schema",
+        "schemas.flags:SchemaFlags", "schemas.command:show_schema",
         "Print the JSON Schema of a kind of files, or list the kinds of files.",
     ),
     "doctor": Command(
-        "kit.command_flags:Doctor", "closure.command:check_installation",
+        "commands.flags:DoctorFlags", "closure.command:check_installation",
         "Check this installation: versions, solvers and simulator.",
     ),
 }  # fmt: skip
 GROUPS: Mapping[str, str] = {
-    "dataset": "Build a dataset of grasps of many objects; check or export datasets.",
+    "dataset": "Build a dataset of grasps of many objects; check datasets.",
     "baseline": (
         "Record simulation results of grasps, and notice later when their stability changes."
     ),
 }
 """What commands have in common whose names begin with one word."""
-
-
-def config_of(arguments: list[str]) -> tuple[Path | None, list[str]]:
-    """Return the path after `--config`, if it is given, and the other words."""
-    words = [
-        part
-        for word in arguments
-        for part in (word.split("=", 1) if word.startswith("--config=") else [word])
-    ]
-    if "--config" not in words:
-        return None, arguments
-    at = words.index("--config")
-    if at + 1 >= len(words):
-        raise FlagsError("--config needs the path of a TOML file after it")
-    return Path(words[at + 1]), words[:at] + words[at + 2 :]
-
-
 EXAMPLES = """\
 run wedge
 run part.stl --unit mm --friction 0.3 --limit 20 --limits ramp --out results
@@ -162,8 +138,7 @@ execute plan/grasps.json --density-kg-m3 2700 --trials lift,shake --shake-g 2
 scene plan/grasps.json --out scenes
 scene plan/grasps.json --grasp c-0-1-2-7
 scene plan/grasps.json --mass-kg 0.3 --out held
-export plan/grasps.json --to gltf -o grasps.glb
-export plan/grasps.json --to moveit --limit 5 -o grasps.yaml
+export plan/grasps.json -o grasps.glb
 regions plan/grasps.json --out plan
 regions plan/grasps.json --reserve 0.1 --recenter --limit 5 --out smaller
 replay graspproof-out/wedge --grasp c-0-1-2-7 --out replay
@@ -193,7 +168,6 @@ dataset build meshes/ wedge --frictions 0.3,0.5 --limit 20 --out ds
 dataset build ds/config.toml --out again
 dataset import contacts.json mug.obj --out judged
 dataset verify ds
-dataset export ds --to isaac --out isaac
 baseline record grasps.json -o wedge.baseline.json
 baseline check wedge.baseline.json --strict
 """.splitlines()

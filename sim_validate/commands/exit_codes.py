@@ -12,13 +12,7 @@ from contextlib import suppress
 from enum import IntEnum
 from typing import TextIO
 
-from grasp_core.errors import (
-    GraspError,
-    InputError,
-    SolverError,
-    UndecidedError,
-    UnfaithfulError,
-)
+from grasp_core.errors import GraspError, InputError, SolverError, UndecidedError, UnfaithfulError
 
 
 class FlagsError(InputError):

@@ -10,19 +10,14 @@ import numpy as np
 import pytest
 
 import grasp_core as gc
-from grasp_core.files.file_kinds import BESIDE, GRASPS
+from grasp_core.files.file_kinds import BESIDE, GIVEN, GRASPS, VERDICTS, WRITTEN
 from grasp_core.files.json_text import object_of
 from grasp_core.files.text_files import read_bytes, read_text
-from sim_validate.kit import files
-from sim_validate.kit.exit_codes import Exit
-from sim_validate.kit.files import (
-    MOST_LETTERS,
-    arrays_of,
-    path_inside,
-    read_tables,
-    require_inside,
-    tables_of_toml,
-)
+from sim_validate.commands.exit_codes import Exit
+from sim_validate.datasets.manifest import path_inside, require_inside
+from sim_validate.files import array_files
+from sim_validate.files.array_files import arrays_of
+from sim_validate.files.toml_files import MOST_LETTERS, read_tables, tables_of_toml
 from sim_validate.main import main
 
 
@@ -148,7 +143,7 @@ def test_archives_that_lie_are_refused(case):
 
 
 def test_a_bomb_is_refused_by_what_it_claims_before_it_is_inflated(monkeypatch):
-    monkeypatch.setattr(files, "MOST_BYTES", 2**22)
+    monkeypatch.setattr(array_files, "MOST_ARRAY_BYTES", 2**22)
     bomb = _archive(*((f"{i}.npy", b"\0" * 2**20) for i in range(5)))
     assert len(bomb) < 2**14
     with pytest.raises(gc.InputError, match="the arrays of the npz file take"):
@@ -196,15 +191,9 @@ def test_links_that_lead_out_are_not_followed(tmp_path):
 
 
 KINDS = {
-    "verdicts.json": {"schema": 2, "verdicts": []},
-    "regions.json": {"schema": 3, "edge_clearance_m": 0, "reserve": 0, "grasps": []},
-    "executions.json": {"schema": 1, "executions": []},
-    "reaches.json": {"schema": 2, "hand": {}, "reaches": []},
-    "judgements.json": {"schema": 2, "protocols": {}, "judgements": []},
-    "baseline": {"schema": 1, "grasps_file": "a"},
-    "manifest.json": {"schema": 1, "units_sha256": "", "files": []},
-    "wrench file": {"wrenches": []},
-}  # fmt: skip
+    **{kind: {"schema": 1, key: []} for kind, key in WRITTEN.items()},
+    **{kind: {key: []} for key, kind in GIVEN.items()},
+}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -212,7 +201,7 @@ def test_another_file_of_ours_is_called_by_its_name(tmp_path, capsys, kind):
     path = tmp_path / "x.json"
     path.write_text(json.dumps(KINDS[kind]))
     article = "an" if kind.startswith("e") else "a"
-    for command, wanted in (("view", GRASPS), ("validate", GRASPS), ("replay", "verdicts.json")):
+    for command, wanted in (("view", GRASPS), ("validate", GRASPS), ("replay", VERDICTS)):
         if kind == wanted:
             continue
         assert main([command, str(path)]) == Exit.INPUT

@@ -32,14 +32,14 @@ from grasp_core.names import RANKINGS, MeasureName, RankBy
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.settings import Settings
 from grasp_core.transferring.settings import Carrying
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 
 Positive = Annotated[float, Interval(gt=0.0)]
 Jobs = Annotated[Count, arg(help="Largest number of processes; results do not depend on it.")]
 ObjectName = Annotated[
     str, arg(help=f"A mesh file ({', '.join(FORMATS)}) or the name of a built-in object.")
 ]
-GraspsFile = Annotated[Path, arg(help="A grasps.json, as `plan` writes it.")]
+GraspsPath = Annotated[Path, arg(help="A grasps.json, as `plan` writes it.")]
 GraspId = Annotated[
     str | None, arg(help="Id of the only grasp to take; if not given, all grasps are taken.")
 ]
@@ -47,7 +47,7 @@ AtFriction = Annotated[
     Friction | None, arg(help="Coulomb coefficient; if not given, the one planned for.")
 ]
 FirstOnly = Annotated[Count | None, arg(help="Take only this many grasps, from the first.")]
-Wrench = Annotated[tuple[float, float, float, float, float, float], AfterValidator(nonzero)]
+SixNumbers = Annotated[tuple[float, float, float, float, float, float], AfterValidator(nonzero)]
 ProtocolName = Literal[
     "dexgraspbench",
     "dexgraspbench-paper",
@@ -56,7 +56,7 @@ ProtocolName = Literal[
     "molmospaces",
 ]
 """Names of the published tests, which `sim_validate/protocols` holds."""
-PLAIN = arg(name="", help="")
+BARE = arg(name="", help="")
 """Mark of a group whose flags have no prefix; groups inside it keep theirs."""
 
 
@@ -77,15 +77,15 @@ class Spoken(Settings):
     """The flags that every command has."""
 
     _: KW_ONLY
-    speech: Annotated[Speech, PLAIN] = field(default_factory=Speech)
+    speech: Annotated[Speech, BARE] = field(default_factory=Speech)
 
 
 @declared
-class Mesh(Settings):
+class MeshFlags(Settings):
     """How a mesh file is read."""
 
-    lengths: Annotated[Lengths, PLAIN] = field(default_factory=Lengths)
-    choices: Annotated[MeshChoices, PLAIN] = field(default_factory=MeshChoices)
+    lengths: Annotated[Lengths, BARE] = field(default_factory=Lengths)
+    choices: Annotated[MeshChoices, BARE] = field(default_factory=MeshChoices)
     center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass in the file's frame, in metres. If not given, it is that of uniform density,
     or of the convex hull where the surface has large holes."""
@@ -103,7 +103,7 @@ class Planning(PlanSettings):
         "What the best grasps have. "
         f"{'; '.join(f'{name}: {what}' for name, what in RANKINGS.items())}."
     ))] = "radius"  # fmt: skip
-    mesh: Annotated[Mesh, PLAIN] = field(default_factory=Mesh)
+    mesh: Annotated[MeshFlags, BARE] = field(default_factory=MeshFlags)
     approach_m: Positive | None = None
     """With --finger-radius-m: keep only grasps that fingers of that radius reach along straight
     paths of this length that do not meet the object [m]. Take about the object's size where fingers
@@ -127,15 +127,15 @@ class Planning(PlanSettings):
     than this number; 100000 are enough for most grasps."""
 
 
-PICTURES, CLIPS, PAGES = (".svg", ".png"), (".gif", ".webp"), (".html", ".htm")
+PICTURE_TYPES, CLIP_TYPES, PAGE_TYPES = (".svg", ".png"), (".gif", ".webp"), (".html", ".htm")
 
 
 @declared
-class Plan(Spoken):
+class PlanFlags(Spoken):
     """Flags of the command `plan`."""
 
     object: Positional[ObjectName]
-    planning: Annotated[Planning, PLAIN] = field(default_factory=Planning)
+    planning: Annotated[Planning, BARE] = field(default_factory=Planning)
     best: bool = False
     """Also search for the grasp of the largest --measure on any faces, and prove how much better
     any other can be. It comes first; best.json and best-proof.npz hold the proof. Its
@@ -154,7 +154,7 @@ class Plan(Spoken):
 
 
 @declared
-class View(Spoken):
+class ViewFlags(Spoken):
     """Flags of the command `view`."""
 
     grasps: Positional[Path]
@@ -162,14 +162,14 @@ class View(Spoken):
     grasp: str | None = None
     """Id of the grasp to show; if not given, the first one."""
     friction: AtFriction = None
-    picture: Annotated[Annotated[Path, ending(*PICTURES)] | None, arg(help=(
-        f"Write the grasp as a picture like the paper's ({', '.join(PICTURES)})."
+    picture: Annotated[Annotated[Path, ending(*PICTURE_TYPES)] | None, arg(help=(
+        f"Write the grasp as a picture like the paper's ({', '.join(PICTURE_TYPES)})."
     ))] = None  # fmt: skip
-    page: Annotated[Annotated[Path, ending(*PAGES)] | None, arg(help=(
-        f"Write a page ({', '.join(PAGES)}) on which the grasp can be turned."
+    page: Annotated[Annotated[Path, ending(*PAGE_TYPES)] | None, arg(help=(
+        f"Write a page ({', '.join(PAGE_TYPES)}) on which the grasp can be turned."
     ))] = None  # fmt: skip
-    clip: Annotated[Annotated[Path, ending(*CLIPS)] | None, arg(help=(
-        f"Write a clip ({', '.join(CLIPS)}) of the fingers closing, which MuJoCo renders where "
+    clip: Annotated[Annotated[Path, ending(*CLIP_TYPES)] | None, arg(help=(
+        f"Write a clip ({', '.join(CLIP_TYPES)}) of fingers that close, which MuJoCo renders where "
         "there are graphics."
     ))] = None  # fmt: skip
     hand: bool = True
@@ -178,7 +178,7 @@ class View(Spoken):
 
 
 @declared
-class Report(Spoken):
+class ReportFlags(Spoken):
     """Flags of the command `report`."""
 
     folder: Positional[Path]
@@ -195,7 +195,7 @@ class Report(Spoken):
 
 
 @declared
-class Replay(Spoken):
+class ReplayFlags(Spoken):
     """Flags of the command `replay`."""
 
     source: Positional[Path]
@@ -217,7 +217,7 @@ class Replay(Spoken):
 
 
 @declared
-class Analyze(Spoken):
+class AnalyzeFlags(Spoken):
     """Flags of the command `analyze`."""
 
     contacts: Positional[Path]
@@ -233,7 +233,9 @@ class Analyze(Spoken):
     """Torsional coefficient of soft fingertips [m]: the largest torque about the normal of a
     contact over its normal force. Figures that are defined for hard fingertips only are then left
     out."""
-    wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = ()
+    wrench: Annotated[
+        UseAppendAction[tuple[SixNumbers, ...]], arg(metavar="FX FY FZ TX TY TZ")
+    ] = ()
     """An external wrench whose largest resisted multiple is wanted [N, N m], torque about the
     center; may be repeated."""
     outward: bool = False
@@ -245,44 +247,44 @@ class Analyze(Spoken):
 
 
 @declared
-class Transfer(Spoken):
+class TransferFlags(Spoken):
     """Flags of the command `transfer`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     part: Annotated[Positional[str], arg(help=(
         f"The changed part, in the same frame: a mesh file ({', '.join(FORMATS)}) or the name of a "
         "built-in object."
     ))]  # fmt: skip
-    carrying: Annotated[Carrying, PLAIN] = field(default_factory=Carrying)
+    carrying: Annotated[Carrying, BARE] = field(default_factory=Carrying)
     friction: AtFriction = None
-    lengths: Annotated[Lengths, PLAIN] = field(default_factory=Lengths)
+    lengths: Annotated[Lengths, BARE] = field(default_factory=Lengths)
     center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
     uniform density, or the old part's if that was given."""
-    limits: Annotated[MeshLimits, PLAIN] = field(default_factory=MeshLimits)
+    limits: Annotated[MeshLimits, BARE] = field(default_factory=MeshLimits)
     out: Path | None = None
     """Folder for transfer.json and the grasps.json of the changed part; if not given, no file is
     written."""
 
 
 @declared
-class Inspect(Spoken):
+class InspectFlags(Spoken):
     """Flags of the command `inspect`."""
 
     object: Positional[ObjectName]
-    picture: Annotated[Annotated[Path, ending(*PICTURES)] | None, arg(help=(
-        f"Write the object as a picture ({', '.join(PICTURES)})."
+    picture: Annotated[Annotated[Path, ending(*PICTURE_TYPES)] | None, arg(help=(
+        f"Write the object as a picture ({', '.join(PICTURE_TYPES)})."
     ))] = None  # fmt: skip
-    mesh: Annotated[Mesh, PLAIN] = field(default_factory=Mesh)
+    mesh: Annotated[MeshFlags, BARE] = field(default_factory=MeshFlags)
 
 
 @declared
-class Objects(Spoken):
+class ObjectsFlags(Spoken):
     """Flags of the command `objects`."""
 
 
 @declared
-class Doctor(Spoken):
+class DoctorFlags(Spoken):
     """Flags of the command `doctor`."""
 
     compile: bool = False

@@ -27,6 +27,7 @@ from grasp_core.files.file_kinds import (
     GRASPS,
     JUDGEMENTS,
     MANIFEST,
+    QUARANTINE,
     REACHES,
     REGIONS,
     TRANSFER,
@@ -38,11 +39,11 @@ from grasp_core.files.records import entries
 from grasp_core.kinds import adapter, rules
 from grasp_core.messages import near, shown
 from grasp_core.settings import CHOSEN
-from sim_validate.kit.command_flags import Spoken
-from sim_validate.kit.commands import COMMANDS
-from sim_validate.kit.flag_values import flags_of
+from sim_validate.commands.flag_values import flags_of
+from sim_validate.commands.flags import Spoken
+from sim_validate.commands.table import COMMANDS
 
-HOME = "https://example.org/graspproof"
+REPOSITORY = "https://example.org/graspproof"
 """Address of the repository, which .github/workflows/release.yml puts here."""
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 IN_FILES = re.compile(r"\b(None|NaN)\b")
@@ -58,7 +59,7 @@ class FileKind(NamedTuple):
     """Whether settings that the program chooses have no place in it."""
 
 
-KINDS: Mapping[str, FileKind] = {
+FILE_KINDS: Mapping[str, FileKind] = {
     "grasps": FileKind(GRASPS, "grasp_core.records.grasps_json:GraspsFile"),
     "best": FileKind(BEST, "sim_validate.planning.best:Best"),
     "transfer": FileKind(TRANSFER, "sim_validate.planning.transfer:TransferFile"),
@@ -67,10 +68,10 @@ KINDS: Mapping[str, FileKind] = {
     "judgements": FileKind(JUDGEMENTS, "sim_validate.protocols.verdict:Judgements"),
     "regions": FileKind(REGIONS, "sim_validate.planning.regions:Regions"),
     "reaches": FileKind(REACHES, "sim_validate.hands.reaches:Reaches"),
-    "manifest": FileKind(MANIFEST, "sim_validate.datasets.open_dataset:Manifest"),
-    "unit": FileKind(UNIT, "sim_validate.datasets.build:UnitRecord"),
-    "quarantine": FileKind("line of quarantine.jsonl",
-                           "sim_validate.datasets.open_dataset:LeftOut"),
+    "manifest": FileKind(MANIFEST, "sim_validate.datasets.manifest:Manifest"),
+    "unit": FileKind(UNIT, "sim_validate.datasets.resuming:UnitRecord"),
+    "quarantine": FileKind(f"line of {QUARANTINE}",
+                           "sim_validate.datasets.manifest:LeftOut"),
     "baseline": FileKind(BASELINE, "sim_validate.baselines.baseline:Baseline"),
     "analyses": FileKind(ANALYSES, "sim_validate.planning.analyze:Analyses"),
     "wrenches": FileKind(WRENCH_FILE, "sim_validate.engine.setup:WrenchFile"),
@@ -90,16 +91,18 @@ KINDS: Mapping[str, FileKind] = {
 
 def address(name: str) -> str:
     """Return where the schema of a kind of files is published."""
-    return f"{HOME}/releases/latest/download/{name}.json"
+    return f"{REPOSITORY}/releases/latest/download/{name}.json"
 
 
 def named(text: str) -> str:
     """Return the short name of the kind of files that a text names, with or without its ending."""
-    names = {each.called: name for name, each in KINDS.items()} | {name: name for name in KINDS}
+    names = {each.called: name for name, each in FILE_KINDS.items()} | {
+        name: name for name in FILE_KINDS
+    }
     word = text.lower().removesuffix(".json").removesuffix(".toml")
     found = names.get(word) or names.get(f"{word}.json")
     if found is None:
-        hint = near(word, KINDS) or f"choose from {', '.join(KINDS)}"
+        hint = near(word, FILE_KINDS) or f"choose from {', '.join(FILE_KINDS)}"
         raise InputError(f"no kind of files is named {shown(text)}; {hint}")
     return found
 
@@ -107,7 +110,7 @@ def named(text: str) -> str:
 @cache
 def schema_of(name: str) -> Mapping[str, Any]:
     """Return the JSON Schema of the kind of files with a short name."""
-    called, place, by_users = KINDS[name]
+    called, place, by_users = FILE_KINDS[name]
     kind = resolve_name(place)
     if issubclass(kind, Spoken):
         made = _of_flags(kind)

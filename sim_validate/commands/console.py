@@ -22,7 +22,7 @@ from grasp_core.files.json_text import text_of
 from grasp_core.files.records import RecordFile
 from grasp_core.files.text_files import write_text
 from grasp_core.stopping import never, until
-from sim_validate.kit.workers import check_interrupted
+from sim_validate.processes.interrupts import check_interrupted
 
 Result = TypeVar("Result")
 File = TypeVar("File", bound=RecordFile)
@@ -30,10 +30,10 @@ PLAIN_EVERY_S = 5.0
 """Time between two lines of progress if the output is no terminal [s]."""
 RECENT = 7
 """Number of lines of progress over which the rate is taken: half a minute, as that of bars."""
-EARLIEST, ENOUGH = 0.02, 20
+ENOUGH_SHARE, ENOUGH_STEPS = 0.02, 20
 """Share of the work, or number of steps, that must be done before the remaining time is estimated.
 """
-UNITS = ((172_800.0, 86_400.0, "days"), (7200.0, 3600.0, "h"), (120.0, 60.0, "min"))
+TIME_UNITS = ((172_800.0, 86_400.0, "days"), (7200.0, 3600.0, "h"), (120.0, 60.0, "min"))
 """Times from which on a longer unit is used, the unit [s], and its name."""
 
 
@@ -44,13 +44,13 @@ def printable(text: str) -> str:
 
 def duration(seconds: float) -> str:
     """Write a time in the unit that people would use for it."""
-    for least, unit, name in UNITS:
+    for least, unit, name in TIME_UNITS:
         if seconds >= least:
             return f"{seconds / unit:.1f} {name}"
     return f"{seconds:.0f} s"
 
 
-GAP, MARGIN = 2, 1
+COLUMN_GAP, TABLE_MARGIN = 2, 1
 """Widths of the space behind a column of a table, and before the first one, in characters."""
 TABLE_ROWS = 20
 """Largest number of rows shown in a table; files and JSON documents have all of them."""
@@ -171,12 +171,12 @@ def _parts(
     The last column may break its lines between words, so it needs as much as its longest word.
     """
     texts = [[name, *(row[place] for row in rows)] for place, name in enumerate(columns)]
-    needed = [max(map(len, each)) + GAP for each in texts]
-    needed[-1] = max(len(word) for text in texts[-1] for word in text.split() or [""]) + GAP
+    needed = [max(map(len, each)) + COLUMN_GAP for each in texts]
+    needed[-1] = max(len(word) for text in texts[-1] for word in text.split() or [""]) + COLUMN_GAP
     parts = [[0]]
     for place in range(1, len(columns)):
         used = sum(needed[each] for each in parts[-1])
-        if len(parts[-1]) > 1 and MARGIN + used + needed[place] > width:
+        if len(parts[-1]) > 1 and TABLE_MARGIN + used + needed[place] > width:
             parts.append([0])
         parts[-1].append(place)
     return parts
@@ -252,7 +252,7 @@ class Steps:
             parts.append(f"{rate:.3g}/s")
         parts.append(f"after {duration(now - self._begun)}")
         line = " ".join(filter(None, parts))
-        if total is not None and rate > 0.0 and done > min(EARLIEST * total, ENOUGH):
+        if total is not None and rate > 0.0 and done > min(ENOUGH_SHARE * total, ENOUGH_STEPS):
             line += f", some {duration((total - done) / rate)} left"
         return line
 

@@ -1,6 +1,6 @@
 """The flags of commands that simulate grasps, prove regions around contacts, or write scenes.
 
-They are apart from `command_flags`, so that other commands need not import the settings of all
+They are apart from `flags`, so that other commands need not import the settings of all
 this. This module imports nothing that is slow to load, so that help and usage errors answer at
 once.
 """
@@ -15,13 +15,13 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 from grasp_core.declared import declared
 from grasp_core.kinds import Direction, Quantity, Seed, TimeLimit
 from grasp_core.settings import Settings
-from scenes.settings import ENDINGS, GraspFormat, ScaledScene
-from sim_validate.kit.command_flags import (
-    PLAIN,
+from scenes.settings import EXPORT_ENDINGS, GraspFormat, ScaledScene
+from sim_validate.commands.flags import (
+    BARE,
     AtFriction,
     FirstOnly,
     GraspId,
-    GraspsFile,
+    GraspsPath,
     Jobs,
     ObjectName,
     Planning,
@@ -29,7 +29,7 @@ from sim_validate.kit.command_flags import (
     ProtocolName,
     Spoken,
 )
-from sim_validate.kit.workers import available_cores
+from sim_validate.processes.workers import available_cores
 from sim_validate.settings import Certifying, ChosenExecution, ChosenTrials, Holding
 
 RUN_LIMIT = 100
@@ -41,7 +41,7 @@ class Testing(Settings):
     """Which trials to simulate, and how they are simulated."""
 
     scene: OmitArgPrefixes[ScaledScene] = field(default_factory=ScaledScene)
-    more: Annotated[ChosenTrials, PLAIN] = field(default_factory=ChosenTrials)
+    more: Annotated[ChosenTrials, BARE] = field(default_factory=ChosenTrials)
     wrenches: Path | None = None
     """A file of wrenches that each grasp must hold in full (see docs/files.md)."""
     weight_n: Quantity | None = None
@@ -58,12 +58,12 @@ class Testing(Settings):
 
 
 @declared
-class Run(Spoken):
+class RunFlags(Spoken):
     """Flags of the command `run`."""
 
     object: Positional[ObjectName]
-    planning: Annotated[Planning, PLAIN] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
-    testing: Annotated[Testing, PLAIN] = field(default_factory=Testing)
+    planning: Annotated[Planning, BARE] = field(default_factory=partial(Planning, limit=RUN_LIMIT))
+    testing: Annotated[Testing, BARE] = field(default_factory=Testing)
     out: Path | None = None
     """Folder for the results; if not given, graspproof-out/OBJECT."""
     no_report: bool = False
@@ -71,14 +71,14 @@ class Run(Spoken):
     execute: bool = False
     """Also simulate the grasps as a robot executes them, with the object's true mass, springy
     fingers and one fixed squeeze, and write executions.json."""
-    executing: Annotated[ChosenExecution, PLAIN] = field(default_factory=ChosenExecution)
+    executing: Annotated[ChosenExecution, BARE] = field(default_factory=ChosenExecution)
 
 
 @declared
-class Validate(Spoken):
+class ValidateFlags(Spoken):
     """Flags of the command `validate`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     friction: AtFriction = None
     limit: FirstOnly = None
     seed: Seed | None = None
@@ -86,23 +86,23 @@ class Validate(Spoken):
     protocol: UseAppendAction[tuple[ProtocolName, ...]] = ()
     """Judge the grasps by the published test of another tool, beside our verdict under its loads
     and the predicted margin, instead of by our usual trials; may be repeated."""
-    testing: Annotated[Testing, PLAIN] = field(default_factory=Testing)
+    testing: Annotated[Testing, BARE] = field(default_factory=Testing)
     out: Path | None = None
     """Folder for verdicts.json, or for judgements.json with --protocol; if not given, no file is
     written."""
 
 
 @declared
-class Execute(Spoken):
+class ExecuteFlags(Spoken):
     """Flags of the command `execute`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     grasp: GraspId = None
     friction: AtFriction = None
     limit: FirstOnly = None
     seed: Seed | None = None
     """Seed of the directions of misplaced objects; if not given, the seed of the plan."""
-    executing: Annotated[ChosenExecution, PLAIN] = field(default_factory=ChosenExecution)
+    executing: Annotated[ChosenExecution, BARE] = field(default_factory=ChosenExecution)
     setup: Path | None = None
     """A TOML file whose table `physics` has settings of the simulator (see docs/files.md)."""
     jobs: Jobs = field(default_factory=available_cores)
@@ -111,30 +111,29 @@ class Execute(Spoken):
 
 
 @declared
-class Scene(Spoken):
+class SceneFlags(Spoken):
     """Flags of the command `scene`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     grasp: GraspId = None
     friction: AtFriction = None
     scaled: OmitArgPrefixes[ScaledScene] = field(default_factory=ScaledScene)
-    holding: Annotated[Holding, PLAIN] = field(default_factory=Holding)
+    holding: Annotated[Holding, BARE] = field(default_factory=Holding)
     out: Path | None = None
     """Folder for the scenes; if not given, a single scene is printed."""
 
 
 @declared
-class Export(Spoken):
+class ExportFlags(Spoken):
     """Flags of the command `export`."""
 
-    grasps: Positional[GraspsFile]
-    to: GraspFormat
-    """Format to write: YAML with the fields of ROS messages (moveit) or a binary glTF scene (gltf),
-    see docs/files.md."""
+    grasps: Positional[GraspsPath]
     out: Annotated[Path, arg(aliases=("-o",), help=(
         "File to write, which ends in "
-        f"{', '.join(f'{ends[0]} for {name}' for name, ends in ENDINGS.items())}."
+        f"{', '.join(f'{ends[0]} for {name}' for name, ends in EXPORT_ENDINGS.items())}."
     ))]  # fmt: skip
+    to: GraspFormat = "gltf"
+    """Format to write: gltf, a binary glTF scene (see docs/files.md)."""
     grasp: GraspId = None
     limit: FirstOnly = None
     fingertip_radius_m: Quantity | None = None
@@ -143,14 +142,14 @@ class Export(Spoken):
 
 
 @declared
-class Regions(Spoken):
+class RegionFlags(Spoken):
     """Flags of the command `regions`."""
 
-    grasps: Positional[GraspsFile]
+    grasps: Positional[GraspsPath]
     grasp: GraspId = None
     limit: FirstOnly = None
     friction: AtFriction = None
-    certifying: Annotated[Certifying, PLAIN] = field(default_factory=Certifying)
+    certifying: Annotated[Certifying, BARE] = field(default_factory=Certifying)
     time_limit_s: TimeLimit | None = None
     """Time after which no more regions are begun; those that are proved are kept [s]."""
     jobs: Jobs = field(default_factory=available_cores)

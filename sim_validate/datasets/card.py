@@ -1,0 +1,102 @@
+"""Writes the README.md of a dataset, for people and for the Hugging Face Hub.
+
+The Hub, a website for datasets, calls this page a card; `card.md.jinja` holds its sentences. A
+user's own words are escaped: in the header as quoted strings, in the text as Markdown.
+"""
+
+import inspect
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from scenes.drawing.pages import filled
+from sim_validate.datasets.columns import ROW_CLASSES
+from sim_validate.datasets.config import (
+    KEYS,
+    REFERENCES,
+    SPLITS,
+    DatasetConfig,
+    quoted,
+    settings_text,
+)
+from sim_validate.datasets.manifest import Manifest
+
+CARD = "README.md"
+HUB_SIZES = ("1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B")
+"""Powers of ten, from a thousand, as the Hugging Face Hub names sizes of datasets."""
+MARKDOWN_MARKS = frozenset("\\`*_[]<>|~&#!$@")
+"""Characters that can begin Markdown or HTML within a line."""
+SPDX = re.compile(r"[A-Za-z0-9.+-]+")
+"""Pattern of a licence's name in SPDX; in small letters it is that of the Hugging Face Hub, but for
+a few such as ODbL-1.0, there `odbl`."""
+ADDRESS = re.compile(r"https?://[^\s<>\"'`\\|{}^]+")
+"""Pattern of a web address that can stand in Markdown as a link unchanged."""
+
+
+def card_text(config: DatasetConfig, manifest: Manifest) -> str:
+    """Write the README.md of a dataset."""
+    rows, tables = manifest.rows, list(_tables(manifest))
+    (of_grasps,) = (table["splits"] for table in tables if table["name"] == "grasps")
+    chances = [
+        f"{name} {upto - before:.0%}"
+        for (name, upto), before in zip(SPLITS, (0.0, *(upto for _, upto in SPLITS)), strict=False)
+    ]
+    return filled(
+        "card.md.jinja",
+        Path(__file__).parent,
+        config=config,
+        settings=settings_text(config),
+        manifest=manifest,
+        rows=rows,
+        tables=tables,
+        executed=config.execution,
+        hub_license=config.license.lower() if SPDX.fullmatch(config.license) else "",
+        credits={
+            "Creator": _as_markdown(config.creator),
+            "Address": _as_address(config.url),
+            "Published": _as_markdown(config.published),
+            "Licence": _as_address(config.license),
+        },
+        size=_size(sum(rows.values())),
+        chances=", ".join(reversed(chances)),
+        split=next(iter(of_grasps), "train"),
+        quoted=quoted,
+        markdown=_as_markdown,
+        references=REFERENCES,
+    )
+
+
+def _size(rows: int) -> str:
+    """Return the name that the Hugging Face Hub has for datasets of about as many rows."""
+    place = min(max(len(str(rows)) - 3, 0), len(HUB_SIZES) - 1)
+    return f"{HUB_SIZES[place - 1]}<n<{HUB_SIZES[place]}" if place else f"n<{HUB_SIZES[0]}"
+
+
+def _tables(manifest: Manifest) -> Iterator[Mapping[str, Any]]:
+    for name, columns in manifest.tables.items():
+        splits = {
+            split: manifest.count(name, split)
+            for split, _ in reversed(SPLITS)
+            if manifest.of_table(name, split)
+        }
+        yield {
+            "name": name,
+            "row": inspect.getdoc(ROW_CLASSES[name]),
+            "splits": splits,
+            "sorted_by": " and ".join(f"`{key}`" for key in KEYS[name]),
+            "columns": columns,
+        }
+
+
+def _as_address(text: str) -> str:
+    """Write a web address as a link, and any other text of a user as Markdown."""
+    if text.isprintable() and ADDRESS.fullmatch(text) is not None:
+        return f"<{text}>"
+    return _as_markdown(text)
+
+
+def _as_markdown(text: str) -> str:
+    """Write a user's text on one line, with all Markdown and HTML escaped."""
+    line = "".join(letter if letter.isprintable() else " " for letter in text).strip()
+    return "".join(f"\\{letter}" if letter in MARKDOWN_MARKS else letter for letter in line)

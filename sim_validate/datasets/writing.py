@@ -1,0 +1,125 @@
+"""Writes the rows of finished units into the tables of a dataset, and the manifest, which is last.
+
+Rows are sorted by object, then by their table's key, so the files do not depend on when, where or
+in which run each unit was computed. Only the rows of one object, and rows that wait to be written,
+are in memory.
+"""
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby, product
+from pathlib import Path
+from typing import TypeAlias
+
+from grasp_core.files.file_kinds import QUARANTINE
+from grasp_core.files.text_files import write_text
+from grasp_core.provenance import arithmetic
+from sim_validate.datasets.card import CARD, card_text
+from sim_validate.datasets.columns import dataset_tables
+from sim_validate.datasets.config import SPLITS, DatasetConfig
+from sim_validate.datasets.given_grasps import given_text
+from sim_validate.datasets.manifest import (
+    LeftOut,
+    Listed,
+    Manifest,
+    left_out_text,
+    listed,
+    write_manifest,
+)
+from sim_validate.datasets.open_dataset import CONFIG
+from sim_validate.datasets.parquet import joined, write_files
+from sim_validate.datasets.resuming import OTHER_FILES, Staging, UnitRecord
+from sim_validate.datasets.work_units import WorkUnit, provenance, units_sha256
+
+DATA = "data"
+TWIN = "the same object as"
+"""First words of the reason why an object with the same mesh as another has no rows."""
+GIVEN_CONTACTS = "contacts.json"
+"""Name of the file with the given contacts, if there are any; its normals point into the object."""
+EXTRAS = ("meshes", "scenes")
+"""Folders of the files that units make besides their rows."""
+
+
+Finished: TypeAlias = tuple[WorkUnit, UnitRecord]
+"""A unit of work that has rows, with its record."""
+
+
+def write_rows(
+    folder: Path, config: DatasetConfig, units: Sequence[WorkUnit], staging: Staging
+) -> Manifest:  # fmt: skip
+    """Write the rows and files of all units, and list what is there."""
+    for name in (DATA, *EXTRAS):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    good, quarantined = _sorted_out(units, staging)
+    tables = _write_tables(config, good, staging, folder)
+    for unit, _ in good:
+        shutil.copytree(staging.of(unit) / OTHER_FILES, folder, dirs_exist_ok=True)
+    others = [
+        folder / CONFIG,
+        write_text(folder / QUARANTINE, left_out_text(quarantined)),
+        *_write_given(folder, units),
+        *(path for name in EXTRAS for path in sorted((folder / name).glob("*"))),
+    ]
+    return Manifest(
+        config_sha256=config.sha256,
+        versions=dict(provenance()),
+        arithmetic=arithmetic(),
+        units=len(units),
+        units_sha256=units_sha256(units),
+        quarantined=len(quarantined),
+        groups=config.groups,
+        files=(*tables, *(listed(folder, path) for path in others)),
+    )
+
+
+def _write_given(folder: Path, units: Sequence[WorkUnit]) -> list[Path]:
+    given = {each.id: each for unit in units for each in unit.given}
+    in_order = [given[name] for name in sorted(given)]
+    return [write_text(folder / GIVEN_CONTACTS, given_text(in_order))] if given else []
+
+
+def close(folder: Path, config: DatasetConfig, manifest: Manifest) -> None:
+    """Write the README.md of a dataset, and then the manifest, which marks it as finished."""
+    card = write_text(folder / CARD, card_text(config, manifest))
+    write_manifest(folder, replace(manifest, files=(*manifest.files, listed(folder, card))))
+
+
+def _sorted_out(
+    units: Sequence[WorkUnit], staging: Staging
+) -> tuple[list[Finished], list[LeftOut]]:
+    """List units with rows of their own, sorted by object, and the reasons why others have none."""
+    good, quarantined = list[Finished](), list[LeftOut]()
+    first: dict[tuple[str | None, float], WorkUnit] = {}
+    for unit in sorted(units, key=lambda each: (each.label, each.source_sha256, each.friction)):
+        record = staging.record(unit)
+        reason = record.reason
+        if reason is None:
+            other = first.setdefault((record.object_id, unit.friction), unit)
+            if other.object == unit.object:
+                good.append((unit, record))
+                continue
+            reason = f"{TWIN} {other.label}"
+        given = tuple(each.id for each in unit.given)
+        quarantined.append(LeftOut(unit.label, unit.source_sha256, unit.friction, given, reason))
+    return sorted(good, key=lambda each: (str(each[1].object_id), each[0].friction)), quarantined
+
+
+def _write_tables(
+    config: DatasetConfig, good: Sequence[Finished], staging: Staging, folder: Path
+) -> list[Listed]:
+    tables, found = dataset_tables(config.groups), list[Listed]()
+    about = {"schema": str(Manifest.SCHEMA), "config_sha256": config.sha256}
+    objects = groupby(good, key=lambda each: (each[1].object_id, each[1].split))
+    units = [(split, [unit for unit, _ in same]) for (_, split), same in objects]
+    for name, (split, _) in product(tables, SPLITS):
+        parts = (
+            joined([staging.table(unit, name) for unit in chosen], name, tables)
+            for own, of_object in units if own == split
+            for chosen in [of_object[:1] if name == "objects" else of_object]
+        )  # fmt: skip
+        found += [
+            replace(listed(folder, path), table=name, split=split, rows=rows)
+            for path, rows in write_files(folder / DATA / name, split, parts, about)
+        ]
+    return found
