@@ -34,11 +34,11 @@ from grasp_core.planning.certify import Certified, LateFigures, to_grasp
 from grasp_core.planning.method_search import FamilySearch, Gathered, MethodSearch, found_on
 from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Finger, reach
-from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
+from grasp_core.planning.result import FAMILIES, Ended, Outcomes, PlanRequest
 from grasp_core.processes import Processes
 from grasp_core.small_objects import fitted
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
-from grasp_core.stopping import never, until
+from grasp_core.stopping import Stop, until
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
 Item = TypeVar("Item")
@@ -81,7 +81,7 @@ class Found:
     """Processor time of another process [s]; zero for parts found in this process."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class PlanSearch:
     """The search for grasps of one object: what is asked for, and what each method has found."""
 
@@ -92,15 +92,16 @@ class PlanSearch:
     """The search of each method that is asked for; the free method comes last."""
     workers: Processes | None = None
     """Other processes that search parts; None where this one is alone."""
-    stop: Callable[[], bool] = never
+    stop: Stop = field(default_factory=Stop)
     """Whether to end the search with what was found by then."""
+    ended: Ended = "done"
     unranked: Counter[str] = field(default_factory=Counter[str])
     """Numbers of grasps without a figure to rank by, by the reason."""
 
     @classmethod
     def of(
         cls, body: Polyhedron, request: PlanRequest, workers: Processes | None = None,
-        stop: Callable[[], bool] = never,
+        stop: Stop | None = None,
     ) -> "PlanSearch":  # fmt: skip
         """Put an object into standard order, with faces cut as requested, and set up its search."""
         on = in_standard_order(body, request)
@@ -110,7 +111,7 @@ class PlanSearch:
             for method in METHODS
             if method in request.families
         }
-        return cls(body, on, request, methods, workers, stop)
+        return cls(body, on, request, methods, workers, Stop() if stop is None else stop)
 
     def run(self, progress: Progress | None = None) -> Iterator[Certified]:
         """Yield each certified grasp in the order of the methods, on the standard object."""
@@ -346,7 +347,7 @@ TIP_RADIUS = 0.1
 
 
 def chosen(
-    search: PlanSearch, stop: Callable[[], bool], progress: Callable[[int, int], None] | None = None
+    search: PlanSearch, stop: Stop, progress: Callable[[int, int], None] | None = None
 ) -> list[Certified]:
     """Select the grasps to return, the best first; by radius, families take turns.
 
@@ -363,11 +364,15 @@ def chosen(
         wanted = min(len(every), request.limit or len(every))
         order = list(_told(until(stop, islice(_far_apart(every), wanted)), wanted, progress))
         order += sorted(set(range(len(every))) - set(order))
-        return [every[place] for place in order[:wanted]]
-    measure, same = _measure(search)
-    figures = list(_told(map(measure, until(stop, every)), len(every), progress))
-    ranked = _in_order(every[: len(figures)], figures, same)
-    return [*ranked, *every[len(figures) :]][: request.limit]
+        best = [every[place] for place in order[:wanted]]
+    else:
+        measure, same = _measure(search)
+        figures = list(_told(map(measure, until(stop, every)), len(every), progress))
+        ranked = _in_order(every[: len(figures)], figures, same)
+        best = [*ranked, *every[len(figures) :]][: request.limit]
+    if search.ended == "done" and stop():
+        search.ended = stop.why
+    return best
 
 
 def _told(

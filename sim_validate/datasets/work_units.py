@@ -32,6 +32,7 @@ from grasp_core.files.text_files import read_text
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
+from grasp_core.planning.settings import PlanSettings
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import Overrides, contact_sets_from_json
 from grasp_core.settings import as_table
@@ -340,10 +341,11 @@ class Making:
         """Plan the best grasps of each family separately, and simulate them."""
         config = self.config
         for family in config.families:
-            planned = plan(
-                self.body, self.unit.friction, families=(family,), cones=config.cones,
-                limit=config.limit, seed=config.seed,
+            wanted = PlanSettings(
+                self.unit.friction, (family,), cones=config.cones, limit=config.limit,
+                seed=config.seed,
             )  # fmt: skip
+            planned = plan(self.body, settings=wanted)
             for grasp in planned.grasps:
                 cells: Cells = {
                     "grasp_id": self._name(grasp.id), "name": grasp.id,

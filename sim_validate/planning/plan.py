@@ -22,8 +22,8 @@ from grasp_core.files.text_files import write_text
 from grasp_core.names import METHODS, RankBy
 from grasp_core.objects.on_faces import nearest_edge
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.plan_search import carried
-from grasp_core.planning.planner import search_plan
+from grasp_core.planning.plan_search import carried, chosen
+from grasp_core.planning.planner import put_together, search_grasps
 from grasp_core.planning.result import Moved, Plan, PlanRequest, methods_for
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
@@ -74,11 +74,10 @@ def plan_object(
             else:  # bounds end such a search long before all are tried
                 steps.update(done, None, f"of at most {total} ({grasps} grasps)")
 
-        found = search_plan(
-            body, request, stop.part(1 + planning.optimize + later), tell,
-            partial(steps.update, note="grasps", title=f"ranking by {request.rank_by}"),
-            jobs, WRITTEN_S,
-        )  # fmt: skip
+        planned_by = stop.part(1 + planning.optimize + later)
+        search = search_grasps(body, request, planned_by, tell, jobs=jobs, after_s=WRITTEN_S)
+        ranked = partial(steps.update, note="grasps", title=f"ranking by {request.rank_by}")
+        found = put_together(search, chosen(search, planned_by, ranked))
     if planning.optimize and found.grasps:
         found = improved(body, found, planning, jobs, stop.part(1 + later), reporter)
     return found

@@ -115,7 +115,12 @@ def test_public_dataclasses_with_arrays_are_compared_by_value():
 
 def test_what_is_shown_stays_on_its_line_however_long_its_names_and_reasons_are():
     body = replace(example_object("box"), name="a\nb" * 1000)
-    plan = gc.plan(example_object("box"), 0.5, families=("concurrent",), cones="normal")
+    plan = gc.plan(
+        example_object("box"),
+        0.5,
+        families=("concurrent",),
+        settings=gc.PlanSettings(cones="normal"),
+    )
     for each in (body, replace(plan, absence="no grasp " * 1000)):
         assert len(repr(each)) <= MOST
         assert "\n" not in repr(each)

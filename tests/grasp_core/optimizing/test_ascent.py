@@ -25,7 +25,7 @@ def contacts_of(body, grasp, inset=0.05):
 @pytest.fixture(scope="module")
 def wedge():
     body = example_object("wedge")
-    return body, gc.plan(body, 0.5, limit=12, cones="normal").grasps
+    return body, gc.plan(body, 0.5, limit=12, settings=gc.PlanSettings(cones="normal")).grasps
 
 
 def ball(faces, y, length):

@@ -65,7 +65,7 @@ def test_an_object_that_no_best_grasp_can_be_searched_on_is_refused_before_it_is
     monkeypatch, capsys
 ):
     monkeypatch.setattr("grasp_core.optimizing.contact_places.MOST_PIECES", 3)
-    monkeypatch.setattr("sim_validate.planning.plan.search_plan", None)
+    monkeypatch.setattr("sim_validate.planning.plan.search_grasps", None)
     assert main(ASKED) == Exit.INPUT
     assert "1 to 3 convex pieces" in capsys.readouterr().err
 
