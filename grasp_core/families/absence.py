@@ -71,7 +71,7 @@ class Absence(Declared):
 
 def corner_contacts(pieces: Sequence[FacePiece], part: Corners) -> tuple[Array, Array]:
     """Put contacts at all corners of a part; return positions and normals, each (k, 3)."""
-    points = [p.origin + corners @ p.frame.T for p, corners in zip(pieces, part, strict=True)]
+    points = [p.places(corners) for p, corners in zip(pieces, part, strict=True)]
     normals = [np.tile(p.normal, (len(c), 1)) for p, c in zip(pieces, part, strict=True)]
     return np.vstack(points), np.vstack(normals)
 

@@ -20,6 +20,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,
+    SAME_CORNER,
     clip,
     convex_hull,
     convex_polygon,
@@ -32,7 +33,7 @@ from grasp_core.objects.booleans import inset_figure, triangulate
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.solvers.ties import graded
+from grasp_core.solvers.ties import first_best, graded
 from grasp_core.values import FINGERS
 
 THINNEST = 1e-6
@@ -92,6 +93,10 @@ class FacePiece(Declared):
         """Return the point in space, (3,), with plane coordinates `y`, (2,)."""
         return self.origin + self.frame @ y
 
+    def places(self, corners: Array) -> Array:
+        """Return the points in space, (c, 3), with plane coordinates `corners`, (c, 2)."""
+        return self.origin + corners @ self.frame.T
+
     def in_plane(self, point: Array) -> Array:
         """Return the plane coordinates, (2,), of a point of the plane, (3,)."""
         return self.frame.T @ (point - self.origin)
@@ -133,7 +138,7 @@ def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
     first = pieces[0]
     if len(pieces) == 1:
         return FaceShape((first,), first)
-    points = np.vstack([piece.origin + piece.corners @ piece.frame.T for piece in pieces])
+    points = np.vstack([piece.places(piece.corners) for piece in pieces])
     corners = convex_hull((points - first.origin) @ first.frame)
     E, b = edge_rows(corners)
     inradius = inscribed_radius(E, b)
@@ -153,6 +158,11 @@ def choices_near(
     every = product(*(range(len(each)) for each in ranked))
     ranks = sorted(every, key=lambda rank: (sum(rank), rank))[:most]
     return [tuple(each[place] for each, place in zip(ranked, rank, strict=True)) for rank in ranks]
+
+
+def deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
+    """Return the piece of a face that a point is deepest in, the first of equal ones."""
+    return pieces[first_best([piece.inset(point) for piece in pieces], SAME_CORNER)]
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:

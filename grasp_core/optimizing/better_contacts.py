@@ -24,15 +24,14 @@ from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
 from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.families.placing import point_regions
-from grasp_core.geometry.polygons import SAME_CORNER
 from grasp_core.kinds import SMALLEST, Friction, Seed, number, value_of
-from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
+from grasp_core.objects.face_pieces import FacePiece, deepest, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.planning.certify import Candidate, certify_each, to_grasp
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
-from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, surpassing
+from grasp_core.solvers.ties import coarse, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp
 
 FINGER_RADIUS = 0.05
@@ -141,7 +140,7 @@ def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
     """Return the piece of a face that each contact is deepest in, the first of equal ones."""
     pieces = pieces_by_face(body)
     return tuple(
-        pieces[face][first_best([piece.inset(point) for piece in pieces[face]], SAME_CORNER)]
+        deepest(pieces[face], point)
         for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
     )
 

@@ -30,7 +30,7 @@ from grasp_core.objects.face_pieces import THINNEST, FacePiece
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.planar_faces import planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.regions.certify_regions import Unit, pieces_under
+from grasp_core.regions.certify_regions import Unit, room_under
 from grasp_core.regions.growth import Sites, search_cover, twist_axes
 from grasp_core.regions.placement import (
     SIDES,
@@ -141,7 +141,7 @@ def placement_bound(
     if body.patches is not None:
         return "the surface is curved, where nothing is proved of misplaced contacts"
     unit = Unit(body, grasp.positions)
-    pieces = pieces_under(body, grasp, unit, 0.0)
+    pieces = room_under(body, grasp, unit, 0.0)
     if pieces is None:
         return "a contact is on a part of its face that is too narrow"
     # contacts may be off their faces by rounding
@@ -163,8 +163,7 @@ def placement_bound(
     if hidden := [str(finger) for finger, corners in enumerate(seen) if not len(corners)]:
         return f"other parts of the object may hide a contact from finger {' and '.join(hidden)}"
     landings = [
-        unit.back(piece.origin + corners @ piece.frame.T)
-        for piece, corners in zip(pieces, seen, strict=True)
+        unit.back(piece.places(corners)) for piece, corners in zip(pieces, seen, strict=True)
     ]
     lean, depth = max(p.spread for p in pieces), max(p.depth for p in pieces) + slack
     made = partial(

@@ -30,6 +30,8 @@ NAMED_OTHERWISE = {
     ("gc.Polyhedron.from_mesh", "vertices"): "vert|object",
     ("gc.Polyhedron.from_mesh", "triangles"): "triangle",
     ("gc.placement_probability", "pose_covariance"): "covariance",
+    ("gc.plan", "settings"): "settings|theta_deg|_m must",
+    ("gc.iter_grasps", "settings"): "settings|theta_deg|_m must",
     ("scenes.example_object", "name"): "name|object",
     ("scenes.write_picture", "path"): "path|picture's name",
 }
