@@ -36,7 +36,7 @@ from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import first_best, graded
 from grasp_core.values import FINGERS
 
-THINNEST = 1e-6
+LEAST_INRADIUS = 1e-6
 """Least radius of the largest disc in a piece that can hold a contact (object size one)."""
 SOUND = 1e-9
 """Largest disagreement of a piece's fields that counts as rounding, relative to a small piece."""
@@ -187,7 +187,7 @@ def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
             piece_of(index, face.normal, polygon, face.spread, face.depth / body.radius)
             for polygon in polygons
         )
-        found.append(tuple(piece for piece in pieces if piece.inradius > THINNEST))
+        found.append(tuple(piece for piece in pieces if piece.inradius > LEAST_INRADIUS))
     return tuple(found)
 
 
@@ -213,7 +213,7 @@ def inscribed_radius(E: Array, b: Array) -> float:
     return max(best.value, 0.0) if isinstance(best, Optimum) else 0.0  # thin pieces round to -1e-13
 
 
-SAME_LENGTH = 1.0 - 1e-6
+LONGEST_SHARE = 1.0 - 1e-6
 """Share of the largest length from which two count as equal; the first of equal ones is taken."""
 
 
@@ -251,7 +251,7 @@ def _halves(face: Face, apart: float) -> list[Face]:
     # along the line between the two corners that are farthest apart
     border = (face.polygon - face.centroid) @ frame
     gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
-    i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
+    i, j = np.argwhere(gaps >= LONGEST_SHARE * gaps.max())[0]
     along = (border[j] - border[i]) / gaps[i, j]
     heights = np.concatenate(pieces) @ along
     middle = 0.5 * float(heights.min() + heights.max())

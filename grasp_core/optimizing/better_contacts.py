@@ -43,7 +43,7 @@ RANDOM_TRIALS = 24
 START_DIGITS = 8
 """Digits after the point to which the grasp's contacts are rounded before the climb, at unit size.
 """
-ROUGH = 2e-2
+STARTS_GAP = 2e-2
 """Largest gap between the bounds of a quality while starting points are compared."""
 
 
@@ -165,7 +165,7 @@ def _random_starts(faces: ContactFaces, rng: np.random.Generator) -> Iterator[Ar
         )
         for _ in range(RANDOM_TRIALS)
     ]
-    rated = np.array([faces.quality(y, ROUGH).lower for y in trials])
+    rated = np.array([faces.quality(y, STARTS_GAP).lower for y in trials])
     best = largest_first(rated)
     return (trials[i] for i in best[:RANDOM_STARTS] if rated[i] > 0.0)
 

@@ -25,7 +25,7 @@ from grasp_core.names import Method, RankBy
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified, absence_as_given, faces_as_given, to_grasp
-from grasp_core.planning.plan_search import PlanSearch, Progress, chosen, worth_starting
+from grasp_core.planning.plan_search import PlanProgress, PlanSearch, chosen, worth_starting
 from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Outcomes, Plan, PlanCounts, PlanRequest, check_request
@@ -45,7 +45,7 @@ def plan(  # noqa: PLR0913 - the five settings that most plans need are keywords
     rank_by: RankBy | None = None,
     finger: Finger | None = None,
     settings: PlanSettings | None = None,
-    progress: Progress | None = None,
+    progress: PlanProgress | None = None,
     jobs: int = 1,
     **deprecated: Any,
 ) -> Plan:
@@ -153,7 +153,7 @@ MADE_S = 2e-4
 
 
 def search_grasps(
-    body: Polyhedron, request: PlanRequest, stop: Stop, progress: Progress | None = None,
+    body: Polyhedron, request: PlanRequest, stop: Stop, progress: PlanProgress | None = None,
     *, jobs: int = 1, after_s: float = MADE_S,
 ) -> PlanSearch:  # fmt: skip
     """Search for all grasps that are requested, until told to stop.

@@ -39,15 +39,15 @@ from grasp_core.regions.growth import (
     largest_discs,
     shared_out,
 )
-from grasp_core.regions.proof import PLACED, CertifiedRegions
+from grasp_core.regions.proof import PLACE_SLACK, CertifiedRegions
 from grasp_core.solvers.ties import coarse, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
-CONES = 10_000
+REGION_CONES = 10_000
 """Default for the largest number of cones in one proof, which takes half a second."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
 """Digits after the point of the unit and its origin [object radii], and of centres."""
-NARROWED = 1e-3
+DISC_PRECISION = 1e-3
 """Precision of the largest discs in grown polygons, relative to the proved radius."""
 
 
@@ -59,7 +59,7 @@ def certify_regions(
     reserve: float = 0.0,
     recenter: bool = False,
     clearance: float = 0.0,
-    max_cones: int = CONES,
+    max_cones: int = REGION_CONES,
 ) -> CertifiedRegions | None:
     """Find independent regions around the contacts of a grasp, as large as can be proved.
 
@@ -95,7 +95,7 @@ def certify_regions(
         raise InputError(
             f"grasp {grasp.id} is not in force closure at friction {left:.6g}; raise the friction"
         )
-    unit = Unit(body, positions)
+    unit = RegionUnit(body, positions)
     pieces = room_under(body, grasp, unit, clearance)
     # where the surface leans more than the friction angle nothing can be proved
     least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
@@ -122,7 +122,7 @@ def certify_regions(
     return found
 
 
-class Unit:
+class RegionUnit:
     """A unit of length and an origin that make the contacts' longest lever about one.
 
     Both are rounded to few digits, so that places in this unit do not depend on the last digits of
@@ -146,7 +146,7 @@ class Unit:
 
 
 def room_under(
-    body: Polyhedron, grasp: Grasp, unit: Unit, clearance: float
+    body: Polyhedron, grasp: Grasp, unit: RegionUnit, clearance: float
 ) -> tuple[FacePiece, ...] | None:
     """Return the pieces that contacts are deepest in, clear of edges; None if one is too narrow."""
     found = list[FacePiece]()
@@ -166,7 +166,7 @@ def room_under(
 
 
 def _placed(
-    task: RegionTask, proved: Proved, polygons: list[Array], unit: Unit
+    task: RegionTask, proved: Proved, polygons: list[Array], unit: RegionUnit
 ) -> CertifiedRegions:
     """Return polygons as regions in the object's frame, with their proof."""
     trimmed = list[Array]()
@@ -204,7 +204,7 @@ def _placed(
 def _radius_held(task: RegionTask, proved: Proved, polygons: list[Array]) -> float:
     """Return the largest radius, up to the proved one, of discs that fit into the polygons."""
     pairs = [
-        (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
+        (convex_polygon(polygon, PLACE_SLACK), convex_polygon(piece.corners, PLACE_SLACK), y)
         for piece, polygon, y in zip(task.pieces, polygons, proved.ys, strict=True)
     ]
 
@@ -217,13 +217,13 @@ def _radius_held(task: RegionTask, proved: Proved, polygons: list[Array]) -> flo
     if held(proved.radius):
         return proved.radius
     low, high = 0.0, proved.radius
-    while high - low > NARROWED * proved.radius:  # halved ten times
+    while high - low > DISC_PRECISION * proved.radius:  # halved ten times
         middle = 0.5 * (low + high)
         low, high = (middle, high) if held(middle) else (low, middle)
     return low
 
 
-def _open_choice(task: RegionTask, proved: Proved, unit: Unit) -> ClosureCertificate | None:
+def _open_choice(task: RegionTask, proved: Proved, unit: RegionUnit) -> ClosureCertificate | None:
     """Return the proof, in the object's frame, that contacts on the pieces are not closed.
 
     Nothing is claimed about patches, as curved surfaces are not planes.

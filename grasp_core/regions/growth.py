@@ -52,11 +52,11 @@ from grasp_core.geometry.polygons import (
     tidy,
 )
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.regions.proof import LEAF, TWIST, TwistCover, power_of, slack_of, summed
+from grasp_core.regions.proof import TWIST, UNDIVIDED, TwistCover, power_of, slack_of, summed
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import GRID_DIGITS, coarse, first_best, nearest_optimum, on_grid
 
-AHEAD = 1e-8
+LEAST_POWER = 1e-8
 """Least power of a force that counts, relative to its size and the farthest place: more than
 rounding sites to a grid can change it."""
 
@@ -83,7 +83,7 @@ class Sites(NamedTuple):
         aside = np.sqrt(np.einsum("kcj,kcj->kc", self.corners, self.corners)).max(axis=1)
         places = np.sqrt(np.einsum("kj,kj->k", self.points, self.points))
         farthest = 1.0 + float((places + aside + self.radii + self.depths).max())
-        return AHEAD * farthest * (1.0 + self.friction)
+        return LEAST_POWER * farthest * (1.0 + self.friction)
 
     def lowest(self, i: int, slopes: Array) -> Array:
         """Find the least values of functions with slopes (..., 2) over a contact's site, (...,)."""
@@ -102,22 +102,22 @@ def stacked_corners(polygons: list[Array]) -> Array:
     ])  # fmt: skip
 
 
-KERNEL = "grasp_core.regions.cover_kernel"
+COVER_KERNEL = "grasp_core.regions.cover_kernel"
 DIAGONAL = 1e-12
 """Number added to the diagonal of a product of motions, so that it has a triangular factor."""
 FINENESS = 0.02  # relative precision to which the largest radius is found
-FIRST_RADIUS, LEAST_RADIUS = 0.05, 1e-6
+FIRST_PROVED, LEAST_PROVED = 0.05, 1e-6
 """Radii at which the search begins and at which it gives up, relative to the levers of the
 contacts."""
 COARSE = 16  # factor by which the first attempts have fewer cones
-FAST, SLOW = 2.0, 1.1
+FAST_GROWTH, SLOW_GROWTH = 2.0, 1.1
 """Factors by which the radius grows, in the first attempts and in the others."""
 OPEN_NEAR = 0.04
 """Distance from the proved radius up to which an open choice is sought, relative to it."""
 REFUTING = 4
 """Factor by which attempts to find contacts that are not closed have fewer cones."""
 REACH_DIGITS = 10  # digits after the point to which the largest radius to try is rounded
-SIDES = 16  # number of sides of the polygon around a disc that extends beyond its face
+DISC_SIDES = 16  # number of sides of the polygon around a disc that extends beyond its face
 
 
 def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | None, Array | None]:
@@ -126,9 +126,9 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | No
     Otherwise contacts, (k, 3), may be found that leave a twist unresisted except for rounding.
     """
     # the search sees sites on a grid, so that it ends alike on all machines
-    kernel, told = compiled(KERNEL), sites.on_grid()
+    kernel, told = compiled(COVER_KERNEL), sites.on_grid()
     k, most = len(sites.points), max(cones, 1 << TWIST)
-    tree = kernel.Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
+    tree = kernel.CoverTree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
     ended, count = kernel.search(told, axes, (most, told.clear()), tree)
     # (5), translated from shifts along the frames to places
     if ended == kernel.REFUTED:
@@ -136,7 +136,7 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | No
     if ended != kernel.COVERED:
         return None, None
     codes = tree.codes[:count]
-    forces = tree.forces[:count][codes == LEAF]
+    forces = tree.forces[:count][codes == UNDIVIDED]
     return TwistCover(axes, codes, np.einsum("kij,mkj->mki", sites.frames, forces)), None
 
 
@@ -196,7 +196,7 @@ class RegionTask:
                 radii[i] = radius
                 polygons.append(y[None])
             else:
-                polygons.append(clip_to_disc(piece.corners, y, radius, SIDES))
+                polygons.append(clip_to_disc(piece.corners, y, radius, DISC_SIDES))
         return self.around(ys, polygons, radii)
 
 
@@ -211,11 +211,11 @@ class Proved:
     """Contacts that are not force-closed, in slightly larger discs, (k, 3); None if not found."""
 
 
-def largest_discs(task: RegionTask, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
+def largest_discs(task: RegionTask, ys: Array, first: float = FIRST_PROVED) -> Proved | None:
     """Find the largest equal discs, up to whole faces, that a cover proves, or None."""
     search = _Search(task, ys)
-    search.widen(task.cones // COARSE, first, FAST, SLOW - 1.0)
-    search.widen(task.cones, SLOW * search.lower or first, SLOW, FINENESS)
+    search.widen(task.cones // COARSE, first, FAST_GROWTH, SLOW_GROWTH - 1.0)
+    search.widen(task.cones, SLOW_GROWTH * search.lower or first, SLOW_GROWTH, FINENESS)
     if search.cover is None:
         return None
     search.refute(task.cones // REFUTING)
@@ -242,7 +242,7 @@ class _Search:
         """Try a radius, then radii growing by a factor, then bisect."""
         upper, radius = self.limit, min(radius, 0.5 * (self.lower + self.limit))
         # radii grow by a factor up to the reach, or the interval is halved or quartered
-        while radius >= LEAST_RADIUS and upper - self.lower > fineness * self.lower:
+        while radius >= LEAST_PROVED and upper - self.lower > fineness * self.lower:
             radius = min(radius, self.reach)
             if radius <= self.lower:
                 break
@@ -274,14 +274,14 @@ class _Search:
 
 
 SHARINGS = 2  # number of times that spare power is shared out among the contacts
-MARGIN = 4.0
+POWER_LEFT = 4.0
 """Power that polygons leave over, as a multiple of the slack with which the proof is checked."""
-MOVES = 12  # of all centres, at most
+MOST_CENTRE_MOVES = 12  # of all centres, at most
 MOVING = 8
 """Factor by which covers have fewer cones while centres move than are allowed in the end."""
 WORTH = 1.005
 """Least growth of the radius, as a factor, at which centres are moved once more."""
-FARTHEST = 1.0  # largest distance that a centre moves at once, in radii
+LONGEST_MOVE = 1.0  # largest distance that a centre moves at once, in radii
 MOVED_DIGITS = 6  # digits after the point that moved centres keep
 STOPPING = 3.0
 """Rays count in the program if they would stop a radius up to this factor of the present one."""
@@ -313,7 +313,7 @@ def _given_away(task: RegionTask, ys: Array, sites: Sites, cover: TwistCover) ->
             lowest.append(sites.lowest(i, slopes[i]))
             spare += at_origin + slope @ point + lowest[i]
             spare -= piece.depth * np.abs(slope @ piece.normal)
-            spare -= MARGIN * lengths * slack_of(F, task.places(i))[:, None]
+            spare -= POWER_LEFT * lengths * slack_of(F, task.places(i))[:, None]
         sharing = np.maximum((forces != 0.0).any(axis=2).sum(axis=0), 1)[:, None]
         for i in each:
             sizes = np.linalg.norm(slopes[i], axis=2)
@@ -347,7 +347,7 @@ def better_centers(task: RegionTask, ys: Array) -> Array:
     best = largest_discs(coarse, ys)
     if best is None:
         return ys
-    for _ in range(MOVES):
+    for _ in range(MOST_CENTRE_MOVES):
         moved = _best_for_forces(coarse, best)
         found = None if moved is None else largest_discs(coarse, moved, best.radius)
         if found is None or inside_faces(coarse, found) < WORTH * inside_faces(coarse, best):
@@ -399,7 +399,7 @@ def _best_for_forces(task: RegionTask, proved: Proved) -> Array | None:
         limits.append(piece.b - piece.E @ y)
     box = np.eye(2 * k, 2 * k + 1)
     rows += [box, -box]
-    limits += [np.full(2 * k, FARTHEST * proved.radius)] * 2
+    limits += [np.full(2 * k, LONGEST_MOVE * proved.radius)] * 2
     c = np.zeros(2 * k + 1)
     c[-1] = 1.0
     program = LinearProgram(c, np.vstack(rows), np.concatenate(limits))

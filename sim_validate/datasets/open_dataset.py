@@ -33,7 +33,7 @@ from grasp_core.files.records import Record, RecordFile, from_record, record_of
 from grasp_core.files.text_files import read_text, write_text
 from grasp_core.kinds import Number, one_of, path_of
 from grasp_core.mesh_files.limits import MeshChoices
-from grasp_core.mesh_files.reading import MeshFile, read_triangles
+from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.messages import FieldError, shown
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
@@ -60,7 +60,7 @@ from sim_validate.datasets.config import (
 from sim_validate.datasets.parquet import Columns, Tables, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.kit.files import path_inside, require_inside
-from sim_validate.planning.asked_objects import NAMED, some
+from sim_validate.planning.asked_objects import NAMES_LISTED, some
 
 CONFIG = "config.toml"
 QUARANTINE = "quarantine.jsonl"
@@ -269,7 +269,7 @@ class Dataset:
         for row in self.rows(ROWS[name]):
             yield str(getattr(row, key))[:SHORT], name, row
 
-    def surface(self, object_id: str) -> MeshFile:
+    def surface(self, object_id: str) -> FileSurface:
         """Read the triangles of an object [m]."""
         path = mesh_path(self.folder, object_id)
         mesh = read_triangles(path, DEFAULT_LIMITS)
@@ -368,7 +368,7 @@ def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
     name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
     row = next(chosen.rows(GraspRow, grasp_id=name), None)
     if row is None or not row.was_tried:
-        there = some(row.grasp_id for row in islice(chosen.rows(GraspRow), NAMED))
+        there = some(row.grasp_id for row in islice(chosen.rows(GraspRow), NAMES_LISTED))
         raise InputError(
             f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
         )

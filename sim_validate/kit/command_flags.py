@@ -27,7 +27,7 @@ from grasp_core.kinds import (
     ending,
     nonzero,
 )
-from grasp_core.mesh_files.limits import FORMATS, Lengths, MeshChoices, MeshLimits
+from grasp_core.mesh_files.limits import MESH_FORMATS, FileLengths, MeshChoices, MeshLimits
 from grasp_core.names import RANKINGS, MeasureName, RankBy
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.settings import Settings
@@ -37,7 +37,7 @@ from sim_validate.kit.workers import available_cores
 Positive = Annotated[float, Interval(gt=0.0)]
 Jobs = Annotated[Count, arg(help="Largest number of processes; results do not depend on it.")]
 ObjectName = Annotated[
-    str, arg(help=f"A mesh file ({', '.join(FORMATS)}) or the name of a built-in object.")
+    str, arg(help=f"A mesh file ({', '.join(MESH_FORMATS)}) or the name of a built-in object.")
 ]
 GraspsFile = Annotated[Path, arg(help="A grasps.json, as `plan` writes it.")]
 GraspId = Annotated[
@@ -84,7 +84,7 @@ class Spoken(Settings):
 class Mesh(Settings):
     """How a mesh file is read."""
 
-    lengths: Annotated[Lengths, PLAIN] = field(default_factory=Lengths)
+    lengths: Annotated[FileLengths, PLAIN] = field(default_factory=FileLengths)
     choices: Annotated[MeshChoices, PLAIN] = field(default_factory=MeshChoices)
     center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass in the file's frame, in metres. If not given, it is that of uniform density,
@@ -250,12 +250,12 @@ class Transfer(Spoken):
 
     grasps: Positional[GraspsFile]
     part: Annotated[Positional[str], arg(help=(
-        f"The changed part, in the same frame: a mesh file ({', '.join(FORMATS)}) or the name of a "
-        "built-in object."
+        f"The changed part, in the same frame: a mesh file ({', '.join(MESH_FORMATS)}) or the name "
+        "of a built-in object."
     ))]  # fmt: skip
     carrying: Annotated[Carrying, PLAIN] = field(default_factory=Carrying)
     friction: AtFriction = None
-    lengths: Annotated[Lengths, PLAIN] = field(default_factory=Lengths)
+    lengths: Annotated[FileLengths, PLAIN] = field(default_factory=FileLengths)
     center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
     uniform density, or the old part's if that was given."""

@@ -41,7 +41,7 @@ from sim_validate.planning.asked_objects import asked_finger, object_to_plan
 if TYPE_CHECKING:
     from grasp_core.optimizing.best_grasp import BestGrasp
 
-SAME_CONTACTS = 0.01
+ONE_OPTIMUM = 0.01
 """Distance below which two optimized contacts count as the same [object radii]; searches for one
 optimum end some thousandths from it."""
 
@@ -101,7 +101,7 @@ def improved(
     done.sort(key=lambda pair: -pair[0].ferrari_canny[0])
     kept: list[Grasp] = []
     for grasp, _ in done:
-        if not any(_same_contacts(grasp, other, SAME_CONTACTS * body.radius) for other in kept):
+        if not any(_same_contacts(grasp, other, ONE_OPTIMUM * body.radius) for other in kept):
             kept.append(grasp)
     if left_out := len(done) - len(kept):
         reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.by_value import MOST, ByValue
+from grasp_core.by_value import MOST_TEXT, ByValue
 from scenes.example_objects import example_object
 
 FRICTION = 0.5
@@ -122,5 +122,5 @@ def test_what_is_shown_stays_on_its_line_however_long_its_names_and_reasons_are(
         settings=gc.PlanSettings(cones="normal"),
     )
     for each in (body, replace(plan, absence="no grasp " * 1000)):
-        assert len(repr(each)) <= MOST
+        assert len(repr(each)) <= MOST_TEXT
         assert "\n" not in repr(each)

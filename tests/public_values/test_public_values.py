@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.by_value import MOST
+from grasp_core.by_value import MOST_TEXT
 from tests.public_values import calls_of_execution, calls_of_grasp_core, calls_of_simulation
 
 PACKAGES = {"gc": gc, "scenes": scenes, "sv": sv}
@@ -67,7 +67,7 @@ def test_the_call_that_is_spoiled_succeeds_as_it_is(call):
     found = call.target(**call.valid())
     assert found is not None
     if is_dataclass(found):
-        assert len(repr(found)) <= MOST
+        assert len(repr(found)) <= MOST_TEXT
         assert "\n" not in repr(found)
 
 

@@ -11,7 +11,7 @@ from typing import get_args
 import pytest
 import trimesh
 
-from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.mesh_files.limits import MESH_FORMATS
 from grasp_core.names import HANDS, RANKINGS, RankBy
 from grasp_core.planning.result import FAMILIES
 from grasp_core.provenance import versions
@@ -323,9 +323,9 @@ def test_help_on_a_command_shows_examples_that_can_be_typed(asked, capsys, words
     [
         ("plan", "--rank-by", get_args(RankBy)), ("run", "--rank-by", get_args(RankBy)),
         ("plan", "{ferrari-canny,weight,task}", ("Ferrari-Canny", "weight", "task")),
-        ("plan", "STR", FORMATS),
+        ("plan", "STR", MESH_FORMATS),
         ("inspect", "--picture", PICTURES), ("view", "--picture", PICTURES),
-        ("view", "--page", PAGES), ("view", "--clip", CLIPS), ("transfer", "part,", FORMATS),
+        ("view", "--page", PAGES), ("view", "--clip", CLIPS), ("transfer", "part,", MESH_FORMATS),
         ("hand", "STR", HANDS), ("reach", "--hand", HANDS),
         ("export", "--to", get_args(GraspFormat)),
         ("export", "--out", [ends[0] for ends in ENDINGS.values()]),
