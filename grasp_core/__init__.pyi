@@ -52,6 +52,7 @@ from grasp_core.planning.planner import iter_grasps as iter_grasps
 from grasp_core.planning.planner import plan as plan
 from grasp_core.planning.reach import Finger as Finger
 from grasp_core.planning.result import Plan as Plan
+from grasp_core.planning.settings import PlanSettings as PlanSettings
 from grasp_core.quality.ferrari_canny import FerrariCanny as FerrariCanny
 from grasp_core.quality.ferrari_canny import ferrari_canny as ferrari_canny
 from grasp_core.quality.metrics import hull_volume as hull_volume

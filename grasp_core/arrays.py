@@ -26,7 +26,7 @@ Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
 """Integer array of indices, of any shape."""
 
-DIGITS = 9
+KEPT_DIGITS = 9
 """Digits kept by `to_digits`: a thousand times finer than results need, far above noise."""
 SHIFT = 0.5 * (math.sqrt(5.0) - 1.0)
 """Offset, in cells, of the grids on which numbers are rounded or compared: the golden section is
@@ -34,7 +34,7 @@ the number that fractions approximate worst, so the numbers of regular objects a
 borders of cells."""
 NEXT, AFTER_NEXT = np.array([1, 2, 0]), np.array([2, 0, 1])
 """For each axis, the one after it and the one after that."""
-ASIDE = 0.05
+DECADE_SHIFT = 0.05
 """Shift of the decimal logarithm that keeps round numbers, such as the 1.0 of a unit vector, away
 from the sizes at which one digit more is kept."""
 LARGEST_ENTRY = 1e50
@@ -212,7 +212,7 @@ Frictions = Annotated[Array, Shape("k", least=0.0, most=LARGEST_FRICTION)]
 """A Coulomb coefficient for each of k contacts, (k,)."""
 Polygon = Annotated[Array, Shape(None, 3)]
 """Any number of points in space, (n, 3) [m], such as the corners of a polygon in order."""
-Figure = Annotated[float, Interval(ge=-LARGEST_ENTRY, le=LARGEST_ENTRY)]
+ProofNumber = Annotated[float, Interval(ge=-LARGEST_ENTRY, le=LARGEST_ENTRY)]
 """A number that a proof may square."""
 Amount = Annotated[float, Interval(ge=0.0, le=LARGEST_ENTRY)]
 """How much there is of something, that a proof may square."""
@@ -294,11 +294,11 @@ def of_order_one(*arrays: Array) -> list[Array]:
 
 
 def to_digits(values: Array, size: float = 0.0) -> Array:
-    """Round values to `DIGITS` digits of the largest, so that no last bits of a solver show."""
+    """Round values to some digits of the largest, so that no last bits of a solver show."""
     largest = max(float(np.abs(values).max(initial=0.0)), size)
     if largest == 0.0:
         return values
-    scale = 10.0 ** (DIGITS - 1 - math.floor(math.log10(largest) + ASIDE))
+    scale = 10.0 ** (KEPT_DIGITS - 1 - math.floor(math.log10(largest) + DECADE_SHIFT))
     return np.floor(values * scale + SHIFT) / scale
 
 

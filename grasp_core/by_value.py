@@ -15,16 +15,16 @@ from pydantic_core import CoreSchema, core_schema
 
 from grasp_core.messages import shown
 
-HASHED = (str, int, bool)
+HASHED_KINDS = (str, int, bool)
 """Classes of the fields that a hash is made from."""
 HASHED_ENTRIES = 3
 """Number of entries of an array that a hash is made from: a point tells contacts apart when they
 are looked up in a cache, without looking at each entry of a large mesh."""
-MOST = 300
+MOST_TEXT = 300
 """Largest number of characters of a value's text: two lines and a half."""
 SHORT_VECTOR = 6
 """Largest number of components of a vector that is written in full."""
-NOTHING = 1e-12
+SHOWN_AS_ZERO = 1e-12
 """Share of a vector's largest number below which a number is shown as zero."""
 
 
@@ -48,10 +48,10 @@ class ByValue:
         return hash((type(self).__name__, *kinds))
 
     def __repr__(self) -> str:
-        """Return at most `MOST` characters with the figures that are short, and sizes of others."""
+        """Return at most `MOST_TEXT` characters: figures that are short, and sizes of others."""
         told = (field.name for field in fields(cast("Any", self)) if field.repr)
         parts = (f"{name}={_size(getattr(self, name))}" for name in told)
-        return shorten(f"{type(self).__name__}({', '.join(parts)})", MOST, placeholder=" ...)")
+        return shorten(f"{type(self).__name__}({', '.join(parts)})", MOST_TEXT, placeholder=" ...)")
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -100,7 +100,7 @@ def _hashed(value: object, name: str) -> object:
     if is_array(known):
         first = known.flat[:HASHED_ENTRIES].tolist()
         return (known.shape, *(0.0 if _is_nan(entry) else entry for entry in first))
-    return known if isinstance(known, HASHED) else None
+    return known if isinstance(known, HASHED_KINDS) else None
 
 
 def summary(kind: str, *said: str, **figures: object) -> str:
@@ -136,5 +136,5 @@ def _figure(value: Any) -> str:
 def vector(value: Any) -> str:
     """Write a vector to six digits; a number that is rounding beside the largest is zero."""
     sizes = [float(x) for x in value]
-    nothing = NOTHING * max(map(abs, sizes), default=0.0)
+    nothing = SHOWN_AS_ZERO * max(map(abs, sizes), default=0.0)
     return f"({', '.join(f'{0.0 if abs(x) < nothing else x:.6g}' for x in sizes)})"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-OWN = "graspproof"
+OWN_FOLDER = "graspproof"
 """Name of our folder in those that others use, too."""
 BYTECODE = "bytecode"
 """Name of the folder in it for bytecode."""
@@ -14,9 +14,9 @@ BYTECODE = "bytecode"
 def cache_folders() -> Iterator[Path]:
     """Yield the folders that the user has chosen, and has: the first that can be written counts."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        yield Path(chosen).absolute() / OWN
+        yield Path(chosen).absolute() / OWN_FOLDER
     users = Path(os.environ.get("XDG_CACHE_HOME", ""))
     with suppress(RuntimeError):  # there may be no home
         users = users if users.is_absolute() else Path.home() / ".cache"
     if users.is_absolute():
-        yield users / OWN
+        yield users / OWN_FOLDER

@@ -38,13 +38,13 @@ Loop = TypeVar("Loop", bound=Callable[..., Any])
 
 NUMBA_FAILS = (ImportError, RuntimeError, OSError, ValueError)
 """What numba raises when it is imported with settings that it refuses, or cannot be."""
-DIGITS = 16
+HASH_DIGITS = 16
 """Number of digits of the hash in a copy's name."""
 IMPORTED = re.compile(r"^from ((?:grasp_core|scenes)(?:\.\w+)+) import", re.MULTILINE)
 """Pattern of the imports in a kernel's text."""
 COMPILERS = ("numba", "llvmlite")
 """Packages that compile."""
-KERNEL = "_kernel"
+KERNEL_ENDING = "_kernel"
 """Ending of the names of kernels, whose own imports count too."""
 
 
@@ -171,10 +171,10 @@ def _stamp(module: str, path: Path) -> str:
         for name in IMPORTED.findall(texts[ahead.pop()]):
             if name not in texts:
                 texts[name] = _text(name)
-                if name.endswith(KERNEL):
+                if name.endswith(KERNEL_ENDING):
                     ahead.append(name)
     parts = (*sorted(texts.items()), sys.implementation.cache_tag, *map(version, COMPILERS))
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:DIGITS]
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:HASH_DIGITS]
 
 
 @cache

@@ -11,14 +11,14 @@ import numpy as np
 
 from grasp_core.arrays import Array
 
-Row: TypeAlias = tuple[float, float, float]
-POSE = 4
+MatrixRow: TypeAlias = tuple[float, float, float]
+POSE_SIZE = 4
 """Rows and columns of a homogeneous transform."""
 SAME_SIZE = 1e-7
 """Difference between components that does not count: rounding, in computing or in a file."""
 
 
-def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
+def plane_tangents(x: float, y: float, z: float) -> tuple[MatrixRow, MatrixRow]:
     """Return two unit vectors that are orthogonal to each other and to the unit vector (x, y, z).
 
     The first is orthogonal also to the axis of the smallest component: the first axis whose
@@ -39,7 +39,7 @@ def plane_tangents(x: float, y: float, z: float) -> tuple[Row, Row]:
 
 def poses_along(origins: Array, directions: Array) -> Array:
     """Return poses whose z axes run along given directions, (k, 4, 4)."""
-    poses = np.tile(np.eye(POSE), (len(origins), 1, 1))
+    poses = np.tile(np.eye(POSE_SIZE), (len(origins), 1, 1))
     for pose, (x, y, z) in zip(poses, directions.tolist(), strict=True):
         pose[:3, :3] = np.array([*plane_tangents(x, y, z), (x, y, z)]).T
     poses[:, :3, 3] = origins

@@ -21,10 +21,10 @@ class Named(Protocol):
         ...
 
 
-Item = TypeVar("Item", bound=Named)
+NamedItem = TypeVar("NamedItem", bound=Named)
 
 
-class ById(Generic[Item]):
+class ById(Generic[NamedItem]):
     """Base of frozen dataclasses that are sequences of grasps or of results; true even if empty."""
 
     __slots__ = ()
@@ -32,7 +32,7 @@ class ById(Generic[Item]):
     """Name of the field with the items."""
 
     @property
-    def _items(self) -> tuple[Item, ...]:
+    def _items(self) -> tuple[NamedItem, ...]:
         return getattr(self, self.ITEMS)
 
     def __len__(self) -> int:
@@ -41,19 +41,19 @@ class ById(Generic[Item]):
     def __bool__(self) -> bool:
         return True
 
-    def __iter__(self) -> Iterator[Item]:
+    def __iter__(self) -> Iterator[NamedItem]:
         return iter(self._items)
 
     def __contains__(self, wanted: object) -> bool:
         return any(wanted in (item.id, item) for item in self._items)
 
     @overload
-    def __getitem__(self, key: int | str) -> Item: ...
+    def __getitem__(self, key: int | str) -> NamedItem: ...
 
     @overload
     def __getitem__(self, key: slice) -> Self: ...
 
-    def __getitem__(self, key: int | str | slice) -> Item | Self:
+    def __getitem__(self, key: int | str | slice) -> NamedItem | Self:
         """Return an item by its place or its id, or a value with some of the items."""
         if isinstance(key, slice):
             return replace(cast("Any", self), **{self.ITEMS: self._items[key]})

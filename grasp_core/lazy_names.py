@@ -9,11 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-Surface = tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]
+PublicNames = tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]
 """The functions `__getattr__` and `__dir__` and the list `__all__` of a package."""
 
 
-def names_in_stub(package: str, file: str) -> Surface:
+def names_in_stub(package: str, file: str) -> PublicNames:
     """Return what a package needs in order to offer the names that its stub imports."""
     stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
     imports = [part for part in stub.body if isinstance(part, ast.ImportFrom)]

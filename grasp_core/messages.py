@@ -11,7 +11,7 @@ from grasp_core.errors import InputError
 
 HUGE = 10**100
 """Whole numbers above this are shown by their size: Python does not write the largest ones."""
-SHOWN = 60
+SHOWN_VALUE = 60
 """Largest number of characters of a refused value that a message shows."""
 
 
@@ -43,7 +43,7 @@ def near(word: str, known: Iterable[str]) -> str:
     """Ask whether known words are meant that are near a mistyped one; empty if none is near."""
     import difflib  # only mistakes need it
 
-    found = [] if len(word) > SHOWN else difflib.get_close_matches(word, list(known))
+    found = [] if len(word) > SHOWN_VALUE else difflib.get_close_matches(word, list(known))
     return f"did you mean {' or '.join(found)}?" if found else ""
 
 
@@ -58,10 +58,10 @@ def shown(value: Any) -> str:
     )
     if plain or isinstance(value, Real | str | type(None)):
         said = repr(value)
-        if len(said) <= SHOWN:
+        if len(said) <= SHOWN_VALUE:
             return said
         if isinstance(value, str | Real):
-            return f"{said[:SHOWN]}..."
+            return f"{said[:SHOWN_VALUE]}..."
     size = getattr(value, "shape", None)
     kind = type(value).__name__
     return f"an array of shape {size}" if isinstance(size, tuple) else f"a value of type {kind}"

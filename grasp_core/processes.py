@@ -27,14 +27,14 @@ from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
 from typing import IO, Any, TypeVar
 
-Task = TypeVar("Task")
+GivenTask = TypeVar("GivenTask")
 Result = TypeVar("Result")
 
-LENGTH = struct.Struct("<Q")
+MESSAGE_LENGTH = struct.Struct("<Q")
 """How many bytes of a message follow."""
-AHEAD = 8
+TASKS_AHEAD = 8
 """Number of tasks per process that are handed out before the first of them is done."""
-LOOK_S = 0.1
+STOP_LOOK_S = 0.1
 """Time between two looks whether to stop, while another process works [s]."""
 COLLECTED_AFTER = 50_000
 """New objects after which unused circles are looked for: nearly all results are freed when sent."""
@@ -72,13 +72,15 @@ class Processes:
                 thread.start()
                 self._threads.append(thread)
 
-    def submit(self, function: Callable[[Task], Result], task: Task, /) -> "Future[Result]":
+    def submit(
+        self, function: Callable[[GivenTask], Result], task: GivenTask, /
+    ) -> "Future[Result]":
         """Call a function in a process; the future fails if that process ends."""
         return self._ask(function, task).future
 
     def in_order(
-        self, function: Callable[[Task], Result], tasks: Iterable[Task], *,
-        here: Callable[[Task], Result] | None = None, ahead: int = AHEAD,
+        self, function: Callable[[GivenTask], Result], tasks: Iterable[GivenTask], *,
+        here: Callable[[GivenTask], Result] | None = None, ahead: int = TASKS_AHEAD,
         stop: Callable[[], bool] | None = None,
     ) -> Generator[Result]:  # fmt: skip
         """Yield the result of each task, in order; this process helps, by `here` if given.
@@ -99,7 +101,7 @@ class Processes:
                 while stop is not None and not first.future.done():
                     if stop():
                         return
-                    wait([first.future], LOOK_S)
+                    wait([first.future], STOP_LOOK_S)
                 try:
                     result = first.future.result()
                 except ProcessEndedError:
@@ -232,14 +234,14 @@ def _working_folder() -> str:
 def send(pipe: IO[bytes], value: Any) -> None:
     """Send one value, after its length in bytes; protocol 5 keeps the bits of contiguous arrays."""
     message = pickle.dumps(value, protocol=5)
-    pipe.write(LENGTH.pack(len(message)))
+    pipe.write(MESSAGE_LENGTH.pack(len(message)))
     pipe.write(message)
     pipe.flush()
 
 
 def receive(pipe: IO[bytes]) -> bytes:
     """Receive the bytes of one value, for `unpacked`."""
-    (length,) = LENGTH.unpack(_exactly(pipe, LENGTH.size))
+    (length,) = MESSAGE_LENGTH.unpack(_exactly(pipe, MESSAGE_LENGTH.size))
     return _exactly(pipe, length)
 
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from grasp_core.compiled import compiled, state_of
 
-PACKAGES = (
+RECORDED_PACKAGES = (
     "graspproof", "mujoco", "numpy", "scipy", "manifold3d", "numba",
     "clarabel", "qpsolvers", "proxsuite",
 )  # fmt: skip
 
-SIZES = (3, 6, 12, 24, 64)
+MATRIX_SIZES = (3, 6, 12, 24, 64)
 """Numbers of rows of the square matrices that `arithmetic` tries."""
 
 
@@ -31,7 +31,7 @@ def versions() -> dict[str, str]:
 @cache  # reading them takes as long as a tenth of a validation
 def _installed() -> Mapping[str, str]:
     found = {"python": platform.python_version(), "machine": platform.machine()}
-    for package in PACKAGES:
+    for package in RECORDED_PACKAGES:
         try:
             found[package] = version(package)
         except PackageNotFoundError:
@@ -50,7 +50,7 @@ def arithmetic() -> str:
     rng = np.random.default_rng(0)
     kernel = compiled("grasp_core.closure.margin_kernel")
     digest = hashlib.sha256(b"" if state_of(kernel.search) == "interpreted" else b"compiled")
-    for size in SIZES:
+    for size in MATRIX_SIZES:
         A: Any = rng.normal(size=(size, size))
         answers: Any = (A @ A.T, np.linalg.solve(A, A[0]), np.linalg.inv(A))
         for answer in answers:

@@ -79,7 +79,9 @@ TITLE = 24.0
 
 def best(name, family, friction, cones="tilted"):
     body = scenes.example_object(name)
-    plan = gc.plan(body, friction, families=(family,), cones=cones, limit=1)
+    plan = gc.plan(
+        body, friction, families=(family,), limit=1, settings=gc.PlanSettings(cones=cones)
+    )
     return body, plan.grasps[0]
 
 

@@ -116,7 +116,9 @@ def test_the_examples_of_the_paper_are_those_that_the_planner_finds():
     for name, grasp_id, family, disc_mm, critical in rows:
         friction = math.tan(math.radians(10.0))
         body = scenes.example_object(name)
-        grasp = gc.plan(body, friction, families=(family,), cones="normal")[grasp_id]
+        grasp = gc.plan(
+            body, friction, families=(family,), settings=gc.PlanSettings(cones="normal")
+        )[grasp_id]
         assert f"{1e3 * grasp.radius:.2f}" == (disc_mm or "0.00")
         assert grasp.critical_friction == pytest.approx(float(critical), abs=5e-5)
 

@@ -29,7 +29,7 @@ from grasp_core.kinds import LARGEST, LARGEST_FRICTION, instance, several
 from grasp_core.messages import shown
 from grasp_core.values import FINGERS, Contact, Grasp
 
-FEWEST = 2
+LEAST_CONTACTS = 2
 """Least number of contacts that can balance anything."""
 WRENCH = 6
 """Number of components of a wrench."""
@@ -41,7 +41,7 @@ def listed_contacts(given: Iterable[Contact], name: str) -> tuple[Contact, ...]:
     """Return contacts of any origin, if there are enough to balance anything."""
     each = partial(instance, kind=Contact, name=name, remedy="or give a Grasp")
     contacts = several(given, each, name, "Contact values")
-    if len(contacts) < FEWEST:
+    if len(contacts) < LEAST_CONTACTS:
         raise InputError(f"{name}: at least two are needed, got {len(contacts)}")
     return contacts
 
@@ -80,7 +80,7 @@ def contact_arrays(
             "normals are missing; pass positions and normals, a Grasp, or a sequence of Contacts"
         )
     points = frozen(given, (None, None, 3) if many else (None, 3), "positions")
-    if points.shape[-2] < FEWEST:
+    if points.shape[-2] < LEAST_CONTACTS:
         raise InputError(f"positions must hold at least two contacts, got {points.shape[-2]}")
     check_spread(np.ptp(points, axis=-2))
     return points, frozen_units(units, points.shape, "normals")

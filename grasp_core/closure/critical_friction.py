@@ -68,8 +68,8 @@ from grasp_core.closure.contacts import (
     unit_size,
 )
 from grasp_core.closure.decision import (
-    KERNEL,
-    Answer,
+    MARGIN_KERNEL,
+    Decision,
     decide,
     deepest_forces,
     margin_program,
@@ -87,8 +87,8 @@ from grasp_core.closure.friction_interval import (
 )
 from grasp_core.closure.proofs import (
     CHECK_SLACK,
+    LEAST_DIVISOR,
     RANK,
-    SMALLEST_NORMAL,
     ContactCones,
     margin_ceiling,
     proves_closure,
@@ -101,7 +101,7 @@ from grasp_core.values import Contact, Grasp
 
 LARGEST_VARIABLE = 1e4
 """Largest size of a variable of the programs, whose answers are of order one."""
-POSITIVE = 1e-6
+POSITIVE_OPTIMUM = 1e-6
 """Optima below this count as zero: a hundred times the residual of a linear program."""
 FRICTION_ACCURACY = 5e-8
 """Width of the final interval of a critical friction, relative to its upper end."""
@@ -109,18 +109,18 @@ FIRST_TRIAL = 0.5
 PROOF_SHARES = (0.0, 1e-3, 0.03)
 """Frictions at which closure is tried, as shares of the way from the friction that the forces need
 to the trial friction."""
-GROWTH = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
+TRIAL_STEPS = ((0.1 * FRICTIONLESS, 3.0), (1e-3, 2.0), (math.inf, 10.0))
 """Pairs of a distance and a factor: up to that distance from an undecided friction, the next trial
 is that factor farther away."""
 NUDGE = 0.4
 """Trials pass the expected threshold, to close in from both sides: by this share of the accuracy,
 and by the error of Newton's method, which is its step's square over the friction."""
-MOST_TRIALS = 80
+MOST_FRICTION_TRIALS = 80
 """Largest number of trials in one search: nine are usual, and some fifty where contacts are nearly
 degenerate."""
 LITTLE = 1e-3
 """Largest friction that is tried first where any positive friction seems enough."""
-RESTING = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
+RESTING_SPEEDS = (NEARLY_AT_REST, 1e-7, 1e-5, 1e-3)
 """Speeds below which contacts are put to rest under a unit twist, tried in turn: a solver leaves
 the square root of its accuracy where two contacts carry nearly all force."""
 ADDED, SHAVED = 5e-9, 1e-10
@@ -206,7 +206,7 @@ def critical_friction_interval(
     """
     points, units = contact_arrays(positions, normals)
     found, upper, forces, twists = _at_once(points[None], units[None])
-    ends = Ends.of(points, units)
+    ends = FrictionEnds.of(points, units)
     # the quick answer is proved again in rational arithmetic before it is kept
     if found[0]:
         ends.close(forces[0], float(upper[0]), exactly=True)
@@ -236,7 +236,9 @@ def _at_once(points: Array, normals: Array) -> tuple[NDArray[np.bool_], Array, A
     units = np.array(normals)  # writable, like all that the search is compiled for
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     bounds, found = np.zeros((len(arms), 2)), np.zeros(len(arms), dtype=bool)
-    compiled(KERNEL).search(arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds)
+    compiled(MARGIN_KERNEL).search(
+        arms, units, SEARCHED * FRICTION_ACCURACY, forces, twists, bounds
+    )
     # (2): the friction for which the search says that its twists separate
     lower = bounds[:, 0]
     bounded = (lower > FRICTIONLESS) & (lower < 0.5 * LARGEST_FRICTION)
@@ -244,7 +246,7 @@ def _at_once(points: Array, normals: Array) -> tuple[NDArray[np.bool_], Array, A
     highest = lower * (1.0 + FRICTION_ACCURACY - 2.0 * SHAVED)
     with np.errstate(over="ignore", invalid="ignore"):  # degenerate contacts, proved nothing below
         along, across = normal_and_tangential(forces, units)
-        needed = (across / np.maximum(along, SMALLEST_NORMAL)).max(axis=1)
+        needed = (across / np.maximum(along, LEAST_DIVISOR)).max(axis=1)
     # (1): the friction that the forces need, raised by a tenth of the width so that they lie inside
     upper = needed * (1.0 + 0.1 * FRICTION_ACCURACY)
     near = np.flatnonzero(bounded & (upper <= highest))
@@ -358,12 +360,12 @@ def _best(c: Array, A: Array, b: Array) -> Array | None:
         found = maximize(LinearProgram(c, A, b))
     except SolverError:
         return None
-    return found.x if isinstance(found, Optimum) and found.value > POSITIVE else None
+    return found.x if isinstance(found, Optimum) and found.value > POSITIVE_OPTIMUM else None
 
 
-def searched(points: Array, units: Array) -> "Ends":
+def searched(points: Array, units: Array) -> "FrictionEnds":
     """Find ends of the critical friction as near each other as accuracy or proofs allow."""
-    ends = Ends.of(points, units)
+    ends = FrictionEnds.of(points, units)
     hopeless = hopeless_twist(ends.cones.arms, units)
     if hopeless is not None:
         ends.opened(hopeless, math.inf)
@@ -373,18 +375,18 @@ def searched(points: Array, units: Array) -> "Ends":
     return ends
 
 
-def soft_ends(cones: ContactCones, highest: float) -> "Ends":
+def soft_ends(cones: ContactCones, highest: float) -> "FrictionEnds":
     """Find the ends for soft contacts; hard ones have the critical friction `highest`."""
-    ends = Ends(cones.at_friction(1.0))
+    ends = FrictionEnds(cones.at_friction(1.0))
     _try(ends, min(2.0 * highest, LARGEST_FRICTION))
     if math.isfinite(ends.upper):
         _close_in(ends, max(min(FIRST_TRIAL, 0.5 * highest), FRICTIONLESS))
     return ends
 
 
-def _close_in(ends: "Ends", trial: float) -> None:
+def _close_in(ends: "FrictionEnds", trial: float) -> None:
     """Try one friction after the other, as Newton's method says, until the ends are settled."""
-    for _ in range(MOST_TRIALS):
+    for _ in range(MOST_FRICTION_TRIALS):
         if ends.settled:
             break
         trial = min(trial, LARGEST_FRICTION)
@@ -400,19 +402,19 @@ def _close_in(ends: "Ends", trial: float) -> None:
         trial = ends.next_trial(trial, answer.margin, slope)
 
 
-def _try(ends: "Ends", friction: float) -> Answer:
+def _try(ends: "FrictionEnds", friction: float) -> Decision:
     """Move the ends as far as the margin program's answer at a friction proves."""
     try:
         answer = decide(ends.cones.at_friction(friction))
     except SolverError:  # zeros prove nothing
         nothing = np.zeros_like(ends.cones.normals), np.zeros(WRENCH)
-        answer = Answer(math.nan, *nothing, closed=None)
+        answer = Decision(math.nan, *nothing, closed=None)
     ends.close(answer.forces, friction)
     ends.open(answer.twist)
     return answer
 
 
-def _try_little(ends: "Ends") -> None:
+def _try_little(ends: "FrictionEnds") -> None:
     """Look for a proof of closure at very small friction, or else for a first lower end."""
     units = ends.cones.inward
     every, friction = rounds(ends.cones.arms, units), FRICTIONLESS
@@ -424,7 +426,7 @@ def _try_little(ends: "Ends") -> None:
         _try(ends, FRICTIONLESS)
 
 
-def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
+def _try_evened(ends: "FrictionEnds", friction: float, forces: Array) -> None:
     """Solve the margin program again in units of the pushes of its own answer.
 
     Near a threshold, some contacts push so much less than others that a solver cannot tell their
@@ -448,7 +450,7 @@ def _try_evened(ends: "Ends", friction: float, forces: Array) -> None:
 
 
 @dataclass(slots=True)
-class Ends:
+class FrictionEnds:
     """The proved ends of an interval of friction, and where to try next."""
 
     cones: ContactCones
@@ -469,7 +471,7 @@ class Ends:
     """Distance from `center` at which the next proofs are tried."""
 
     @classmethod
-    def of(cls, points: Array, units: Array) -> "Ends":
+    def of(cls, points: Array, units: Array) -> "FrictionEnds":
         """Begin with nothing proved of hard contacts."""
         return cls(ContactCones.at(unit_size(points)[0], units, np.ones(len(points))), points)
 
@@ -497,7 +499,7 @@ class Ends:
         if undecided and math.isnan(self.center):
             self.center, self.spread = friction, NUDGE * FRICTION_ACCURACY * friction
         elif undecided:
-            self.spread *= next(factor for far, factor in GROWTH if self.spread < far)
+            self.spread *= next(factor for far, factor in TRIAL_STEPS if self.spread < far)
         elif self.upper <= self.center or self.lower >= self.center:
             self.center, self.spread = math.nan, 0.0  # the threshold turned out to be elsewhere
 
@@ -532,7 +534,7 @@ class Ends:
             return
         speeds = np.linalg.norm(self.cones.velocities(twist / length), axis=1)
         # fewest at rest first, and the same contacts once
-        for resting in np.unique([speeds <= slow for slow in RESTING], axis=0):
+        for resting in np.unique([speeds <= slow for slow in RESTING_SPEEDS], axis=0):
             still, friction = _put_to_rest(twist / length, self.cones, resting)
             friction *= 1.0 - SHAVED
             if self.lower < friction < self.upper:
@@ -583,5 +585,5 @@ def _put_to_rest(
     # (7), of contacts that depart
     departing = np.sqrt(np.maximum(-along - turning, 0.0) * np.maximum(turning - along, 0.0))
     with np.errstate(over="ignore"):  # contacts that hardly slide are separated at any friction
-        ratios = departing / np.maximum(across, SMALLEST_NORMAL)
+        ratios = departing / np.maximum(across, LEAST_DIVISOR)
     return twist, float(ratios.min(initial=2.0 * LARGEST_FRICTION))

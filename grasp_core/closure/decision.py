@@ -16,8 +16,8 @@ from grasp_core.arrays import Array
 from grasp_core.closure.contacts import WRENCH, in_frames, normal_and_tangential
 from grasp_core.closure.proofs import (
     CHECK_SLACK,
+    LEAST_DIVISOR,
     RANK,
-    SMALLEST_NORMAL,
     ContactCones,
     proves_closure,
     refutes_closure,
@@ -28,7 +28,7 @@ from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
 from grasp_core.solvers.conic import minimize
 
-KERNEL = "grasp_core.closure.margin_kernel"
+MARGIN_KERNEL = "grasp_core.closure.margin_kernel"
 """Kernel of the search for critical friction, which solves the same program at many frictions."""
 SIGN_SHARE = 0.1
 """Gap, as in `margin_kernel`, that may be left where only the sign of a margin is asked for."""
@@ -38,13 +38,13 @@ a hundred times the tolerance that the solver is asked for."""
 PRECISE = 1e-10
 """Gap that compiled code may leave, relative to the margin: smaller than the gap that the conic
 solver leaves."""
-FAR = 1e3
+FAR_MARGIN = 1e3
 """Distance of a margin from zero, in units of the friction, above which the conic solver decides:
 such margins come from nearly parallel normals, where compiled code has errors of some per mille."""
 INTERIOR = 1e-6
 """Depth of a force inside its cone above which it counts as interior, if normal parts sum to 1: far
 more than the solver leaves on a boundary."""
-TOUCHING = 1e-9
+TOUCHING_SUPPORT = 1e-9
 """Supports of a unit twist above minus this value count as zero: the tolerance of the solver."""
 NEWTON_STEPS = 3
 
@@ -61,7 +61,7 @@ def deepest_forces(
     forces, twists = np.zeros_like(arms), np.zeros((len(arms), WRENCH))
     values = np.ones((len(arms), 2))
     given = tuple(np.array(each) for each in (arms, normals, friction))  # writable
-    compiled(KERNEL).deepest(given, share, forces, twists, values)
+    compiled(MARGIN_KERNEL).deepest(given, share, forces, twists, values)
     contacts = arms.shape[1]
     return forces, twists / contacts, friction[:, None] / contacts * (1.0 - values)
 
@@ -87,7 +87,7 @@ def margin_program(cones: ContactCones, balance: Array) -> tuple[float, Array, A
     forces, depth = np.eye(n, n + 1), np.eye(n + 1)[n]
     equal = (rows @ forces, 0.0), (pushing[None] @ forces, 1.0)
     largest = float(cones.friction.max()) or 1.0
-    depths = largest / np.where(flat, 1.0, np.maximum(cones.friction, SMALLEST_NORMAL))
+    depths = largest / np.where(flat, 1.0, np.maximum(cones.friction, LEAST_DIVISOR))
     answer = minimize(contact_program(-depth, 1.0 - flat, width, equal, room=depths))
     # what the solver leaves of the imbalance is taken off by least squares
     x = answer.x[:-1]
@@ -98,7 +98,7 @@ def margin_program(cones: ContactCones, balance: Array) -> tuple[float, Array, A
 
 def _departing_twist(rows: Array, share: Array) -> Array | None:
     """Find a twist with which every contact leaves along its normal: then no forces balance."""
-    sizes = np.maximum(np.linalg.norm(rows, axis=0), SMALLEST_NORMAL)
+    sizes = np.maximum(np.linalg.norm(rows, axis=0), LEAST_DIVISOR)
     scaled: Array = (rows / sizes).T
     twist = -np.asarray(np.linalg.lstsq(scaled, share / sizes, rcond=None)[0], dtype=np.float64)
     missed = np.abs(rows.T @ twist + share) / np.maximum(sizes, 1.0)
@@ -107,7 +107,7 @@ def _departing_twist(rows: Array, share: Array) -> Array | None:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
+class Decision:
     """The margin program's solution, and the verdict on force closure that it proves.
 
     Only `closed` is proved: True by `forces`, (k, w), False by `twist`, (6,), and None by neither.
@@ -119,12 +119,12 @@ class Answer:
     closed: bool | None
 
 
-def decide(cones: ContactCones) -> Answer:
+def decide(cones: ContactCones) -> Decision:
     """Decide force closure of one set of contacts, in compiled code or by the conic solver."""
     return _decided_quickly(cones) or _decided_by_programs(cones)
 
 
-def _decided_by_programs(cones: ContactCones) -> Answer:
+def _decided_by_programs(cones: ContactCones) -> Decision:
     try:
         margin, forces, twist = margin_program(cones, cones.maps)
     except SolverError:
@@ -132,11 +132,11 @@ def _decided_by_programs(cones: ContactCones) -> Answer:
         # nearest wrench may refute closure
         _, twist = nearest_wrench(WrenchSet.within(cones, "l1"))
         closed = False if refutes_closure(cones, twist) else None
-        return Answer(-math.inf, np.zeros_like(cones.normals), twist, closed)
+        return Decision(-math.inf, np.zeros_like(cones.normals), twist, closed)
     if proves_closure(cones, forces):
-        return Answer(margin, forces, twist, closed=True)
+        return Decision(margin, forces, twist, closed=True)
     if margin < 0.0 and refutes_closure(cones, twist):
-        return Answer(margin, forces, twist, closed=False)
+        return Decision(margin, forces, twist, closed=False)
     # at a margin of zero, (2) holds once the twist is taken onto the cones
     others = [_touching_twist(cones, twist)] if abs(margin) < DECIDED else []
     # some contacts may balance by themselves: the margin is zero then, and only the others depart
@@ -145,11 +145,11 @@ def _decided_by_programs(cones: ContactCones) -> Answer:
         others += [sparing, _touching_twist(cones, sparing)]
     for each in others:
         if refutes_closure(cones, each):
-            return Answer(0.0, forces, each, closed=False)
-    return Answer(margin, forces, twist, closed=None)
+            return Decision(0.0, forces, each, closed=False)
+    return Decision(margin, forces, twist, closed=None)
 
 
-def _decided_quickly(cones: ContactCones) -> Answer | None:
+def _decided_quickly(cones: ContactCones) -> Decision | None:
     """Return compiled code's answer if it is proved, for hard contacts with one friction."""
     alike = (cones.friction > 0.0).all() and np.ptp(cones.friction) == 0.0
     if cones.torsion is not None or not alike:
@@ -158,7 +158,7 @@ def _decided_quickly(cones: ContactCones) -> Answer | None:
     closed, separated, margins, forces, twists = decided_at_once(one)
     if not (closed[0] or separated[0]):
         return None
-    return Answer(float(margins[0]), forces[0], twists[0], closed=bool(closed[0]))
+    return Decision(float(margins[0]), forces[0], twists[0], closed=bool(closed[0]))
 
 
 def decided_at_once(
@@ -171,7 +171,7 @@ def decided_at_once(
     lower, upper = margins.T
     with np.errstate(invalid="ignore"):  # a search that broke down ends with NaN
         close = np.abs(upper - lower) <= DECIDED * np.maximum(friction, np.abs(lower))
-        close &= np.abs(lower) <= FAR * friction
+        close &= np.abs(lower) <= FAR_MARGIN * friction
         closed, separated = close & (lower > DECIDED), close & (upper < -DECIDED)
     closed[closed] = proves_closure(cones.only(closed), forces[closed])
     separated[separated] = refutes_closure(cones.only(separated), twists[separated])
@@ -186,16 +186,16 @@ def _touching_twist(cones: ContactCones, twist: Array) -> Array:
     gradient of a support is the wrench of the force in the cone that works most along the twist.
     """
     maps = cones.maps.reshape(WRENCH, *cones.normals.shape)
-    twist = twist / max(float(np.linalg.norm(twist)), SMALLEST_NORMAL)
+    twist = twist / max(float(np.linalg.norm(twist)), LEAST_DIVISOR)
     for _ in range(NEWTON_STEPS):
         velocities = cones.velocities(twist)
         along, across = normal_and_tangential(velocities, cones.normals)
         sideways = velocities - along[:, None] * cones.normals
-        sideways = sideways / np.maximum(across, SMALLEST_NORMAL)[:, None]
+        sideways = sideways / np.maximum(across, LEAST_DIVISOR)[:, None]
         working = cones.normals + cones.friction[:, None] * sideways
         gradients: Array = np.einsum("wkj,kj->kw", maps, working)
         excess: Array = along + cones.friction * across
-        touched = excess > -TOUCHING
+        touched = excess > -TOUCHING_SUPPORT
         step, *_ = np.linalg.lstsq(gradients[touched], excess[touched], rcond=RANK)
         twist = twist - np.asarray(step, dtype=np.float64)
     return twist

@@ -66,9 +66,9 @@ from grasp_core.errors import UndecidedError
 from grasp_core.kinds import LARGEST
 from grasp_core.values import Contact, Grasp
 
-UNSAFE = 1e-6
+CLEAR_MARGIN = 1e-6
 """Size of a margin above which the margin itself does not explain why nothing can be proved."""
-CAUTION = 1.01
+MARGIN_CAUTION = 1.01
 """Factor on the allowance for rounding in the reported margin, relative to that in `verify`: sums
 and singular values differ in their last digits from processor to processor."""
 SUMMED = 1e-9
@@ -221,10 +221,10 @@ def force_closure(
             torques=torques,
         )  # fmt: skip
         # a caution above one leaves room for `verify` to round otherwise on another processor
-        found = made(margin=made(margin=0.0).proved(CAUTION))
+        found = made(margin=made(margin=0.0).proved(MARGIN_CAUTION))
         if found.verify():
             return found
-    if abs(answer.margin) < UNSAFE:
+    if abs(answer.margin) < CLEAR_MARGIN:
         raise UndecidedError(
             f"the closure margin is {answer.margin:.2g}, too close to zero to decide; change the "
             "friction or the contacts slightly"
@@ -282,10 +282,10 @@ def _decided(
     wrenches = to_origin(twists, centers, sizes)
     # the bounds at a caution of one, which `verify` asks for, are farther away
     found = np.full(count, math.nan)
-    proved = _lower_bound(cones.only(closed), forces[closed], CAUTION)
+    proved = _lower_bound(cones.only(closed), forces[closed], MARGIN_CAUTION)
     found[closed] = np.where(proved > 0.0, proved, math.nan)
     back = to_center(wrenches, centers, sizes)[separated]  # as `verify` does
-    proved = _upper_bound(cones.only(separated), back, CAUTION)
+    proved = _upper_bound(cones.only(separated), back, MARGIN_CAUTION)
     found[separated] = np.where(proved <= 0.0, proved, math.nan)
     return closed & ~np.isnan(found), found, forces, wrenches
 

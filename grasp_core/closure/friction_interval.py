@@ -19,8 +19,8 @@ are put to rest exactly; the others must depart, steeply enough:
 
     p = n.v <= 0  and  mu^2 (|v|^2 |n|^2 - p^2) <= p^2.                                 (2)
 
-There is one tolerance, `SAME`, for what has no exact answer: contacts whose wrenches are dependent
-but for the rounding of their coordinates.
+There is one tolerance, `RESTING_INVERSE`, for what has no exact answer: contacts whose wrenches are
+dependent but for the rounding of their coordinates.
 """
 
 import math
@@ -31,7 +31,13 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices, Points, UnitVectors, Wrench, cross
-from grasp_core.closure.contacts import FEWEST, WRENCH, grasp_map, normal_and_tangential, unit_size
+from grasp_core.closure.contacts import (
+    LEAST_CONTACTS,
+    WRENCH,
+    grasp_map,
+    normal_and_tangential,
+    unit_size,
+)
 from grasp_core.declared import Declared, declared
 from grasp_core.kinds import LARGEST_FRICTION
 
@@ -43,8 +49,8 @@ INDEPENDENT = (1e-6, 1e-9)
 tried in turn; the last one defines the rank that force closure asks for."""
 NEARLY_AT_REST = 1e-9
 """Speed below which a contact is meant to be at rest, for twists of unit size."""
-AXES: Whole = np.eye(3, dtype=np.int64).astype(np.object_)
-SAME = 10**12
+UNIT_VECTORS: Whole = np.eye(3, dtype=np.int64).astype(np.object_)
+RESTING_INVERSE = 10**12
 """One over the speed at which a contact that cannot be put to rest exactly still counts as at rest,
 for twists of unit size: moving it by that share of the contacts' size would put it to rest."""
 FRICTIONLESS = 1e-6
@@ -110,9 +116,9 @@ def separates(twist: Array, positions: Array, normals: Array, friction: float) -
     # what is left of a twist that is put to rest may be short: all speeds are relative to it
     rest = (length * np.abs(exact).max()) ** 2
     along, across, squares = _split(velocities, normals)
-    at_rest = SAME**2 * (velocities**2).sum(axis=1) <= rest
+    at_rest = RESTING_INVERSE**2 * (velocities**2).sum(axis=1) <= rest
     if friction == math.inf:
-        steep = SAME**2 * across <= rest * squares
+        steep = RESTING_INVERSE**2 * across <= rest * squares
     else:
         above, below = friction.as_integer_ratio()
         steep = above**2 * across <= below**2 * along**2  # (2)
@@ -164,7 +170,7 @@ def _balanced(forces: Array, positions: Array, columns: Indices) -> tuple[Whole,
     arms = points - points[0]
     total = np.append(exact.sum(axis=0), _cross(arms, exact).sum(axis=0))
     contacts, axes = np.divmod(columns, 3)
-    changing = np.hstack([AXES[axes], _cross(arms[contacts], AXES[axes])])
+    changing = np.hstack([UNIT_VECTORS[axes], _cross(arms[contacts], UNIT_VECTORS[axes])])
     found = _solution(changing.T, total)
     if found is None:
         return None
@@ -178,7 +184,7 @@ def _at_rest(twist: Whole, arms: Whole, length: int, resting: Indices) -> Whole 
     """Change a twist so that some components of contacts' velocities are zero; its size changes."""
     # the product of such a wrench of a unit force with a twist is a contact's speed
     contacts, axes = np.divmod(resting, 3)
-    rows = np.hstack([length * AXES[axes], _cross(arms[contacts], AXES[axes])])
+    rows = np.hstack([length * UNIT_VECTORS[axes], _cross(arms[contacts], UNIT_VECTORS[axes])])
     found = _solution(rows, (rows * twist).sum(axis=1))
     if found is None:
         return None
@@ -253,7 +259,9 @@ class FrictionInterval(Declared):
     def verify(self) -> bool:
         """Check both ends again, in rational arithmetic and without any solver."""
         # without a twist nothing is claimed from below, without forces nothing from above
-        if not (self.is_sound() and len(self.normals) >= FEWEST and self.lower <= self.upper):
+        if not (
+            self.is_sound() and len(self.normals) >= LEAST_CONTACTS and self.lower <= self.upper
+        ):
             return False
         contacts = self.positions, self.normals
         if self.twist is None:

@@ -38,7 +38,7 @@ spread over a unit length: ten times what a linear program's answer may be off."
 ONE_POINT = 1e-12
 """Points closer than this, relative to their coordinates, are one point."""
 LINES = 4
-REGULUS = 3
+REGULUS_RANK = 3
 """Rank of the reciprocal form on the span of four lines that lie on a regulus."""
 
 
@@ -93,6 +93,6 @@ def classify_each(points: Array, directions: Array) -> list[LineClass]:
     ranks = spanning.sum(axis=-1)
     for rank, count, plane in zip(ranks.tolist(), meeting.tolist(), flat.tolist(), strict=True):
         together: LineClass = "planar" if plane else "concurrent"
-        crossing: LineClass = "regulus" if count >= REGULUS else "pencil"
+        crossing: LineClass = "regulus" if count >= REGULUS_RANK else "pencil"
         found.append("independent" if rank == LINES else crossing if count else together)
     return found

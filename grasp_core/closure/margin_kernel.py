@@ -45,27 +45,27 @@ from grasp_core.arrays_kernel import copy
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.compiled import loop
 
-MOST_STEPS = 40
+NEWTON_STEPS_MOST = 40
 """Most Newton steps; ten are usual."""
 SIGN_SHARE = 0.1
 """Gap, as a share of the distance of V from one, that leaves no doubt on which side of one V is."""
-SMALLEST_GAP = 1e-11
+ROUNDING_GAP = 1e-11
 """Gap below which only rounding is left, in programs of order one."""
-BALANCED = 1e-10
+MOST_IMBALANCE = 1e-10
 """Largest accepted imbalance of the last point; 1e-15 is usual."""
-SHORTER = 0.99
+BORDER_SHARE = 0.99
 """Share of the distance to the border of the cones that a step may use."""
 FIRST_TRIAL = 0.5
-MOST_TRIALS = 30
+MOST_PROGRAMS = 30
 """Most programs per set of contacts; seven are usual."""
-LEAST_FRICTION, MOST_FRICTION = 1e-6, 1e3
+LEAST_TRIED, MOST_TRIED = 1e-6, 1e3
 """Smallest and largest friction that is tried."""
-AT_REST = 1e-4
+RESTING_SHARE = 1e-4
 """Share of the largest z_i below which a contact's z_i counts as zero, and the contact as at rest.
 """
 SPANNED = 1e-6
 """Sine of the angle between a row and the span of a basis below which the row adds nothing."""
-ABOVE, BELOW = 0.75, 0.15
+PASSED_ABOVE, PASSED_BELOW = 0.75, 0.15
 """Trials pass the root by these shares of the width asked for, to close in from both sides: above
 it by more, as the proof of closure is the harder one; and by the error of Newton's method, the
 square of its step over the friction."""
@@ -174,10 +174,10 @@ def least_cone_sum(
     pair[:, :, 0] = 1.0
     y[:] = 0.0
     primal = dual = 0.0
-    for _ in range(MOST_STEPS):
+    for _ in range(NEWTON_STEPS_MOST):
         primal, dual, gap = _values(mean, pair, y)
         off = _missing(columns, mean, pair, missing)
-        if off <= BALANCED and gap <= max(share * abs(1.0 - primal), SMALLEST_GAP):
+        if off <= MOST_IMBALANCE and gap <= max(share * abs(1.0 - primal), ROUNDING_GAP):
             break
         if not (scale_to_middle(pair, W, middle) and _factor(columns, W, V, R)):
             break
@@ -190,7 +190,7 @@ def least_cone_sum(
         reach = min(1.0, longest_step(middle, step))
         towards_the_middle(middle, step, (1.0 - reach) ** 3 * gap / k, wanted)
         _direct(V, R, missing, wanted, step, turn)
-        reach = min(1.0, SHORTER * longest_step(middle, step))
+        reach = min(1.0, BORDER_SHARE * longest_step(middle, step))
         take_step(pair, W, step, reach)
         for w in range(WRENCH):
             y[w] += reach * turn[w]
@@ -307,7 +307,7 @@ def search(
     for g in range(len(arms)):
         _set_up(arms[g], normals[g], axes, rows, mean)
         lower, upper, friction = 0.0, np.inf, FIRST_TRIAL
-        for _ in range(MOST_TRIALS):
+        for _ in range(MOST_PROGRAMS):
             _at_friction(rows, mean, friction, columns)
             primal, dual = least_cone_sum(columns, mean, SIGN_SHARE, pair, y)
             needed = _needed(pair, primal, friction)
@@ -327,7 +327,7 @@ def search(
             if upper - lower <= width * lower:
                 break
             friction = _next(pair, 0.5 * (primal + dual), friction, lower, upper, width)
-            if not LEAST_FRICTION <= friction <= MOST_FRICTION:
+            if not LEAST_TRIED <= friction <= MOST_TRIED:
                 break
         bounds[g, 0], bounds[g, 1] = lower, upper
 
@@ -414,7 +414,7 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
     """Return the friction up to which a twist refutes closure, with slow contacts at rest."""
     still = 0.0
     for i in range(len(rows)):
-        still = max(still, AT_REST * z[i, 0])
+        still = max(still, RESTING_SHARE * z[i, 0])
     spanned = 0
     for i in range(len(rows)):
         for a in range(3):
@@ -427,7 +427,7 @@ def _separates(rows: Array, z: Array, span: Array, twist: Array) -> float:
 
 @loop("numpy", once=True)
 def _least_ratio(rows: Array, z: Array, still: float, twist: Array) -> float:
-    least = MOST_FRICTION
+    least = MOST_TRIED
     for i in range(len(rows)):
         if z[i, 0] > still:
             along, across = -_inner(rows[i, 0], twist), 0.0
@@ -486,13 +486,13 @@ def _next(
         slope += pair[0, i, 1] * pair[1, i, 1] + pair[0, i, 2] * pair[1, i, 2]
     if abs(value - 1.0) <= NEAR_ONE:
         # 1 / V is linear: d(1/V) = -dV / V^2, over the logarithm of the friction
-        return lower * (1.0 + ABOVE * width) if lower > friction else 0.0
+        return lower * (1.0 + PASSED_ABOVE * width) if lower > friction else 0.0
     root = friction * (1.0 - value * (value - 1.0) / slope) if slope < 0.0 else np.nan
     if lower < root < upper:
         error = (root - friction) ** 2 / root
         if upper - root > root - lower:
-            return root + min(ABOVE * width * root + error, 0.5 * (upper - root))
-        return root - min(BELOW * width * root + error, 0.5 * (root - lower))
+            return root + min(PASSED_ABOVE * width * root + error, 0.5 * (upper - root))
+        return root - min(PASSED_BELOW * width * root + error, 0.5 * (root - lower))
     if upper == np.inf:
         return 2.0 * max(friction, lower)
     return math.sqrt(lower * upper) if lower > 0.0 else 0.1 * upper

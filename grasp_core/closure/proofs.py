@@ -56,7 +56,7 @@ from grasp_core.closure.contacts import (
 CHECK_SLACK = 1e-12
 """Slack of the plain-arithmetic checks, for data scaled to unit size: some thousand
 rounding errors."""
-SMALLEST_NORMAL = float(np.finfo(np.float64).tiny)
+LEAST_DIVISOR = float(np.finfo(np.float64).tiny)
 """Least number that is divided by: the smallest of full precision."""
 GIANT = 1e100
 """Largest number accepted from a compiled search, which may end with larger ones or NaN where
@@ -222,7 +222,7 @@ def margin_ceiling(cones: ContactCones, twist: Array, caution: float = 1.0) -> A
     below = largest < 0.0
     # r_i of (4); each term of the sum is raised by rounding, so that the bound is no less
     flat = cones.friction == 0.0
-    shares = np.where(flat, 1.0, 1.0 / np.maximum(cones.friction, SMALLEST_NORMAL))
+    shares = np.where(flat, 1.0, 1.0 / np.maximum(cones.friction, LEAST_DIVISOR))
     sums = (shares * (largest[..., None] - along + caution * rounding)).sum(axis=-1)
     return np.where(refuted, np.where(below, largest / np.where(below, sums, 1.0), 0.0), math.inf)
 

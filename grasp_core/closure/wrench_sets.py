@@ -49,20 +49,20 @@ from grasp_core.values import Contact, Grasp
 Norm: TypeAlias = Literal["l1", "linf"]
 """How contact forces are bounded: by the sum of normal forces (`l1`) or one by one (`linf`)."""
 
-Rows: TypeAlias = tuple[Array, Array | float]
+ProgramRows: TypeAlias = tuple[Array, Array | float]
 """Rows A and their right-hand sides b of b - A x."""
 NO_SLIDE = 1e-290
 """Speed along the surface below which the direction of sliding is undefined."""
 SAME_FRAME = 1e-9
 """How far frames may be from orthonormal: normals are unit vectors to nine digits."""
-SEARCH_DIGITS = 10
+SET_DIGITS = 10
 """Digits after the point that searches are given: frames stay within `SAME_FRAME`."""
-LARGEST_RATIO = 1e6
+LARGEST_SCALE_RATIO = 1e6
 """Largest ratio of torque scale and contacts' extent, and its inverse: beyond it, rounding decides.
 """
 LONGEST_LEVER = 2e9
-"""Largest entry of a matrix of wrenches: coordinates up to `LARGEST_RATIO`, and a thousand times as
-much where torques are over a thousandth of the scale (see `measures`)."""
+"""Largest entry of a matrix of wrenches: coordinates up to `LARGEST_SCALE_RATIO`, and a thousand
+times as much where torques are over a thousandth of the scale (see `measures`)."""
 
 
 def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
@@ -72,16 +72,16 @@ def scaled_arms(points: Array, center: ArrayLike, torque_scale: float) -> Array:
     check_spread(spread)
     apart = points - points.mean(axis=0)
     extent = float(np.linalg.norm(apart, axis=1).max()) if spread.any() else scale
-    if not 1.0 / LARGEST_RATIO <= scale / extent <= LARGEST_RATIO:
+    if not 1.0 / LARGEST_SCALE_RATIO <= scale / extent <= LARGEST_SCALE_RATIO:
         raise InputError(
-            f"torque_scale must be within a factor {LARGEST_RATIO:g} of the extent of the "
+            f"torque_scale must be within a factor {LARGEST_SCALE_RATIO:g} of the extent of the "
             f"positions, {extent:.3g} m, got {torque_scale}"
         )
     arms = (points - frozen(center, (3,), "center")) / scale
-    if float(np.abs(arms).max()) > LARGEST_RATIO:
+    if float(np.abs(arms).max()) > LARGEST_SCALE_RATIO:
         raise InputError(
-            f"center must be within {LARGEST_RATIO:g} times torque_scale of the positions, got "
-            f"{shown(center)}"
+            f"center must be within {LARGEST_SCALE_RATIO:g} times torque_scale of the positions, "
+            f"got {shown(center)}"
         )
     return arms
 
@@ -137,7 +137,7 @@ class WrenchSet(Declared):
 
     def on_grid(self) -> "WrenchSet":
         """Round the set to a grid, so that searches do not depend on last digits."""
-        G, friction = on_grid(self.G, SEARCH_DIGITS), on_grid(self.friction, SEARCH_DIGITS)
+        G, friction = on_grid(self.G, SET_DIGITS), on_grid(self.friction, SET_DIGITS)
         return trusted(WrenchSet, G=G, friction=friction, norm=self.norm)
 
     def _is_consistent(self) -> bool:
@@ -235,8 +235,8 @@ def _are_torques(columns: Array, normals: Array) -> bool:
 
 
 def contact_program(
-    objective: Array, friction: Array, width: int, equal: Sequence[Rows],
-    least: Sequence[Rows] = (), cones: Sequence[Rows] = (), room: Array | None = None,
+    objective: Array, friction: Array, width: int, equal: Sequence[ProgramRows],
+    least: Sequence[ProgramRows] = (), cones: Sequence[ProgramRows] = (), room: Array | None = None,
 ) -> ConicProgram:  # fmt: skip
     """Build a conic program over the local forces of contacts, side by side, and other numbers.
 

@@ -33,14 +33,14 @@ from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
 from grasp_core.values import FINGERS
 
-SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
-KERNEL = "grasp_core.cones.spanning_kernel"
-FEW = 30
+ORTHANT_SIGNS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=np.float64)
+SPANNING_KERNEL = "grasp_core.cones.spanning_kernel"
+FEW_DIRECTIONS = 30
 """Number of directions up to which trying all quadruples is faster than loading compiled code."""
 GUESS = 2
 """Number of quadruples per pair of directions for which memory is reserved before they are counted.
 """
-DEPENDENT = 1e-12
+COPLANAR = 1e-12
 """Determinant below which three unit vectors count as coplanar: a few rounding errors."""
 TRIPLES = np.array(list(combinations(range(FINGERS), 3)))
 """Indices of three of four vectors, (4, 3)."""
@@ -61,7 +61,7 @@ def span_angle(normals: ArrayLike) -> float:
 def count_spanning(normals: ArrayLike, least: float) -> int:
     """Count the quadruples of unit vectors (n, 3) that span at an angle [rad]."""
     units = frozen_units(normals, (None, 3), "normals")
-    if len(units) <= FEW:
+    if len(units) <= FEW_DIRECTIONS:
         every = np.array(list(combinations(units, 4))).reshape(-1, 4, 3)
         return int(np.count_nonzero(span_angles(every) > least))
     table = SpanningTable(units, least)
@@ -71,7 +71,7 @@ def count_spanning(normals: ArrayLike, least: float) -> int:
 def span_sines(units: Array) -> Array:
     """Compute sin(theta*) of quadruples, (q,); below zero, by how much a weight is too small."""
     sines = np.empty(len(units))
-    compiled(KERNEL).fill_span_sines(np.ascontiguousarray(units), sines)
+    compiled(SPANNING_KERNEL).fill_span_sines(np.ascontiguousarray(units), sines)
     return sines
 
 
@@ -110,9 +110,7 @@ def positively_span(vectors: Array) -> NDArray[np.bool_]:
     """Return whether a combination of four vectors (..., 4, 3) with positive weights vanishes."""
     # the weights of a vanishing combination by Cramer's rule, but for signs
     signed = np.linalg.det(vectors[..., TRIPLES[::-1], :]) * (1.0, -1.0, 1.0, -1.0)
-    found: NDArray[np.bool_] = (signed.min(axis=-1) > DEPENDENT) | (
-        signed.max(axis=-1) < -DEPENDENT
-    )
+    found: NDArray[np.bool_] = (signed.min(axis=-1) > COPLANAR) | (signed.max(axis=-1) < -COPLANAR)
     return found
 
 
@@ -121,7 +119,7 @@ class SpanningTable:
 
     def __init__(self, normals: Array, least_angle: float) -> None:
         self.units, self.least = np.ascontiguousarray(normals), math.sin(least_angle)
-        self.kernel = compiled(KERNEL)
+        self.kernel = compiled(SPANNING_KERNEL)
         self.size, self.bits = 0, self.kernel.empty_table(len(normals))
 
     def quadruples(self, start: int, end: int) -> Indices:
@@ -170,7 +168,7 @@ def each_cones_positively_span(axes: Array, half_angles: Array) -> NDArray[np.bo
 
 def _farthest(axes: Array, sines: Array) -> Array:
     """Find the largest |A^-1 y| over the triples' boxes |y_j| <= sines_j, (q,)."""
-    corners = SIGNS * sines[:, TRIPLES][:, :, None]
+    corners = ORTHANT_SIGNS * sines[:, TRIPLES][:, :, None]
     reached = np.linalg.solve(axes[:, TRIPLES], corners.swapaxes(-1, -2))
     farthest: Array = np.linalg.norm(reached, axis=-2).max(axis=(1, 2), initial=0.0)
     return farthest

@@ -16,7 +16,7 @@ from grasp_core.compiled import loop
 from grasp_core.geometry.vectors_kernel import crossed, dotted, vanishing_weights
 
 WORD = 64
-DEPENDENT = 1e-12
+COPLANAR = 1e-12
 """Determinant below which three unit vectors count as coplanar, as in `spanning`."""
 
 
@@ -39,9 +39,9 @@ def extend(table: NDArray[np.uint64], units: Array, start: int, end: int, least:
                 longest = longest_squared(dotted(units[i], units[j]), to_k[j], to_k[i])
                 if determinant * determinant <= least * least * longest:
                     continue
-                if determinant > DEPENDENT:
+                if determinant > COPLANAR:
                     _mark(table, i, j, k)
-                elif determinant < -DEPENDENT:
+                elif determinant < -COPLANAR:
                     _mark(table, j, i, k)
 
 
@@ -136,12 +136,12 @@ def span_sine(units: Array) -> float:
     """
     a, b, c, d = vanishing_weights(units)
     total = a + b + c + d
-    if abs(total) <= DEPENDENT:  # none is positive, but for rounding
+    if abs(total) <= COPLANAR:  # none is positive, but for rounding
         return -max(max(abs(a), abs(b)), max(abs(c), abs(d)))
     side = 1.0 if total > 0.0 else -1.0
     a, b, c, d = side * a, side * b, side * c, side * d
     lowest = min(min(a, b), min(c, d))
-    if lowest <= DEPENDENT:
+    if lowest <= COPLANAR:
         return min(lowest, 0.0)
     ab, ac, ad = _cosine(units, 0, 1), _cosine(units, 0, 2), _cosine(units, 0, 3)
     bc, bd, cd = _cosine(units, 1, 2), _cosine(units, 1, 3), _cosine(units, 2, 3)

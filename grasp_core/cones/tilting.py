@@ -41,19 +41,19 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import compiled
 from grasp_core.values import FINGERS
 
-KERNEL = "grasp_core.cones.tilting_kernel"
+TILTING_KERNEL = "grasp_core.cones.tilting_kernel"
 TOWARD = (0.5, 0.9)
 """Angles up to which axes may lean to meet in a point, in friction angles."""
-MOVES = 60
+RANDOM_MOVES = 60
 SLIGHT = 1e-6
 """Size below which improvements and directions decide nothing, as in `tilting_kernel`."""
-BESIDE = 0.1
+LEAST_ANGLE_SINE = 0.1
 """Sine of the angle between two axes above which one can serve to find a direction across the
 other."""
-FLAT = 0.5
+NEARLY_PLANAR = 0.5
 """Spread of normals across a plane, as a share of their next larger spread, below which they nearly
 lie in the plane."""
-CHUNK = 20_000
+QUADRUPLES_AT_ONCE = 20_000
 """Number of quadruples that are searched at once, which needs some tens of megabytes."""
 
 
@@ -68,7 +68,7 @@ class TiltedCones(NamedTuple):
 
 def tilted_cones(normals: Array, thetas: Array) -> TiltedCones:
     """Search for wide force cones that positively span, for many quadruples."""
-    cuts = [*range(0, len(normals), CHUNK), len(normals)]
+    cuts = [*range(0, len(normals), QUADRUPLES_AT_ONCE), len(normals)]
     parts = [_search(normals[i:j], thetas[i:j]) for i, j in pairwise(cuts)]
     if not parts:
         return TiltedCones(np.empty((0, FINGERS, 3)), np.empty(0))
@@ -83,7 +83,7 @@ def widest_half_angles(normals: Array, thetas: Array, sines: Array) -> Array:
     negative, and taken where m is in the middle of two normals, or as far from three.
     """
     lowest = np.empty(len(normals))
-    compiled(KERNEL).lowest_heights(np.ascontiguousarray(normals), lowest)
+    compiled(TILTING_KERNEL).lowest_heights(np.ascontiguousarray(normals), lowest)
     heights = np.where(sines > 0.0, sines, np.minimum(lowest, 0.0))
     # (2), for the largest theta_i and the best m; psi is no more than any theta_i, by (1)
     widest = 0.5 * (thetas.max(axis=1) + np.arcsin(np.clip(heights, -1.0, 1.0)))
@@ -104,7 +104,9 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
     best, half_angles = normals, np.full(len(normals), -np.inf)
     for cap in TOWARD:
         axes = np.empty_like(ways)
-        compiled(KERNEL).lean_each(*map(np.ascontiguousarray, (ways, normals, thetas)), cap, axes)
+        compiled(TILTING_KERNEL).lean_each(
+            *map(np.ascontiguousarray, (ways, normals, thetas)), cap, axes
+        )
         found, reached = _improved(axes, normals, thetas)
         better = reached > half_angles + SLIGHT
         best = np.where(better[:, None, None], found, best)
@@ -114,12 +116,12 @@ def toward(points: Array, positions: Array, normals: Array, thetas: Array) -> Ti
 
 def _search(normals: Array, thetas: Array) -> TiltedCones:
     normals, thetas = np.ascontiguousarray(normals), np.ascontiguousarray(thetas)
-    kernel, best = compiled(KERNEL), TiltedCones(normals.copy(), np.empty(len(normals)))
+    kernel, best = compiled(TILTING_KERNEL), TiltedCones(normals.copy(), np.empty(len(normals)))
     kernel.half_angles(best.axes, normals, thetas, best.half_angles)
     kernel.balance(tuple(best), normals, thetas)
     # squares of spreads: the first is across the plane that the normals lie in most nearly
     squares, directions = np.linalg.eigh(normals.transpose(0, 2, 1) @ normals)
-    flat = np.flatnonzero(squares[:, 0] < FLAT**2 * squares[:, 1])
+    flat = np.flatnonzero(squares[:, 0] < NEARLY_PLANAR**2 * squares[:, 1])
     bent = best.axes[flat], best.half_angles[flat]
     kernel.bend(bent, normals[flat], thetas[flat], _across(normals[flat], directions[flat, :, 0]))
     best.axes[flat], best.half_angles[flat] = bent
@@ -129,18 +131,18 @@ def _search(normals: Array, thetas: Array) -> TiltedCones:
 def _across(normals: Array, across: Array) -> Array:
     """Return directions across planes, each to the side that tells turned normals alike, (q, 3)."""
     turns = np.cross(normals[:, :1], normals[:, 1:])
-    which = np.argmax(np.linalg.norm(turns, axis=-1) > BESIDE, axis=1)
+    which = np.argmax(np.linalg.norm(turns, axis=-1) > LEAST_ANGLE_SINE, axis=1)
     handed = np.einsum("qi,qi->q", turns[np.arange(len(turns)), which], across)
     return np.asarray(across * np.where(handed < 0.0, -1.0, 1.0)[:, None], dtype=np.float64)
 
 
 def _improved(axes: Array, normals: Array, thetas: Array) -> TiltedCones:
     # one seed for all quadruples: equal ones get equal moves, wherever they are listed
-    moves = np.random.default_rng(0).normal(size=(MOVES, FINGERS, 2))
+    moves = np.random.default_rng(0).normal(size=(RANDOM_MOVES, FINGERS, 2))
     first, second = _aside(axes)
     cones = TiltedCones(np.array(axes, order="C"), np.empty(len(axes)))
     given = map(np.ascontiguousarray, (normals, thetas, np.stack([first, second])))
-    compiled(KERNEL).improve(tuple(cones), *given, moves)
+    compiled(TILTING_KERNEL).improve(tuple(cones), *given, moves)
     return cones
 
 
@@ -150,5 +152,7 @@ def _aside(axes: Array) -> tuple[Array, Array]:
     for ahead in range(FINGERS - 1, 0, -1):
         cross = np.cross(axes, np.roll(axes, -ahead, axis=1))
         length = np.linalg.norm(cross, axis=-1, keepdims=True)
-        first = np.where(length > BESIDE, cross / np.maximum(length, BESIDE), first)
+        first = np.where(
+            length > LEAST_ANGLE_SINE, cross / np.maximum(length, LEAST_ANGLE_SINE), first
+        )
     return first, np.cross(axes, first)

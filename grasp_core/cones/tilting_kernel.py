@@ -12,12 +12,12 @@ from grasp_core.values import FINGERS
 CAPS = (0.3, 0.5, 0.7, 0.9)
 """Angles up to which axes may lean while they are balanced, in friction angles."""
 SWEEPS = 8
-SIDES = np.array([
+PLANE_SIDES = np.array([
     [1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0], [1.0, -1.0, -1.0, 1.0],
     [-1.0, -1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0], [-1.0, 1.0, 1.0, -1.0],
 ])  # fmt: skip
 """Signs that put two fingers on either side of a plane, (6, 4)."""
-FIRST_MOVE, GROWTH, DECAY = 0.2, 1.3, 0.9
+FIRST_MOVE, MOVE_GROWTH, MOVE_DECAY = 0.2, 1.3, 0.9
 """Length of the first random move, in friction angles, and its factors after a success and a
 failure."""
 SLIGHT = 1e-6
@@ -89,10 +89,10 @@ def bend(cones: tuple[Array, Array], normals: Array, thetas: Array, across: Arra
     """Lean axes to either side of a plane, given the directions across it."""
     (axes, reached), bent, ways = cones, np.empty((FINGERS, 3)), np.empty((FINGERS, 3))
     for q in range(len(normals)):
-        for s in range(len(SIDES)):
+        for s in range(len(PLANE_SIDES)):
             for finger in range(FINGERS):
                 for d in range(3):
-                    ways[finger, d] = SIDES[s, finger] * across[q, d]
+                    ways[finger, d] = PLANE_SIDES[s, finger] * across[q, d]
             for cap in CAPS[:-1]:
                 lean(ways, normals[q], thetas[q], cap, bent)
                 floor = reached[q] + SLIGHT
@@ -142,9 +142,9 @@ def improve(
             if now > floor:
                 reached[q] = now
                 copy(moved, axes[q])
-                step *= GROWTH
+                step *= MOVE_GROWTH
             else:
-                step *= DECAY
+                step *= MOVE_DECAY
 
 
 @loop()

@@ -49,7 +49,7 @@ from numpy.typing import ArrayLike
 
 from grasp_core.arrays import Array, Frictions, Shape, UnitVectors, frozen, frozen_each, real_array
 from grasp_core.closure.contacts import (
-    FEWEST,
+    LEAST_CONTACTS,
     WRENCH,
     contact_arrays,
     contact_frames,
@@ -130,7 +130,9 @@ class Grip(Declared):
     def _is_consistent(self) -> bool:
         """Return whether the fields are those of contacts whose squeeze balances."""
         plain = replace(self)  # without what it has kept, which may be anything
-        return len(self.friction) >= FEWEST and are_springs(self.stiffness) and plain.balanced
+        return (
+            len(self.friction) >= LEAST_CONTACTS and are_springs(self.stiffness) and plain.balanced
+        )
 
     @property
     def left(self) -> Array:

@@ -46,7 +46,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_core.arrays import Amount, Array, Figure, Indices, Shape, of_order_one
+from grasp_core.arrays import Amount, Array, Indices, ProofNumber, Shape, of_order_one
 from grasp_core.closure.contacts import WRENCH, grasp_map, in_frames
 from grasp_core.declared import Declared, declared, trusted
 from grasp_core.execution.grips import Grip
@@ -241,7 +241,7 @@ class BestSqueeze(Declared):
     scale: Amount
     """Scale of the set's ellipsoid up to which no contact slips, no push exceeds the limit, and no
     joint its torque."""
-    upper: Figure
+    upper: ProofNumber
     """Scale that no squeeze with the same response and largest push exceeds."""
     contact: int
     """Index of the contact that slips, or reaches the limit, first; -1 where a joint is first."""

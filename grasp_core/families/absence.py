@@ -22,10 +22,10 @@ from grasp_core.kinds import FrictionOrZero
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.ties import first_best
 
-DEEPEST = 1000
+MOST_CUTS_IN_A_ROW = 1000
 """Largest number of cuts in a row: more leave parts smaller than floating-point numbers can tell
 apart."""
-Corners = tuple[Array, ...]
+PartCorners = tuple[Array, ...]
 """Corners of a convex part of each piece, each (k, 2) in the plane coordinates of its piece."""
 Path = tuple[int, ...]
 """The half, 0 or 1, that was kept at each cut."""
@@ -69,14 +69,14 @@ class Absence(Declared):
         )
 
 
-def corner_contacts(pieces: Sequence[FacePiece], part: Corners) -> tuple[Array, Array]:
+def corner_contacts(pieces: Sequence[FacePiece], part: PartCorners) -> tuple[Array, Array]:
     """Put contacts at all corners of a part; return positions and normals, each (k, 3)."""
-    points = [p.origin + corners @ p.frame.T for p, corners in zip(pieces, part, strict=True)]
+    points = [p.places(corners) for p, corners in zip(pieces, part, strict=True)]
     normals = [np.tile(p.normal, (len(c), 1)) for p, c in zip(pieces, part, strict=True)]
     return np.vstack(points), np.vstack(normals)
 
 
-def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
+def part_at(pieces: Sequence[FacePiece], path: Path) -> PartCorners:
     """Return the part reached by a path, which cuts the polygon with the longest diagonal."""
     part = [piece.corners for piece in pieces]
     for half in path:
@@ -91,7 +91,7 @@ def part_at(pieces: Sequence[FacePiece], path: Path) -> Corners:
 
 def _cover_everything(paths: Sequence[Path]) -> bool:
     """Return whether paths name parts, none inside another, that together make up the whole."""
-    if not all(len(path) <= DEEPEST and set(path) <= {0, 1} for path in paths):
+    if not all(len(path) <= MOST_CUTS_IN_A_ROW and set(path) <= {0, 1} for path in paths):
         return False
     apart = not any(
         two[: len(one)] == one

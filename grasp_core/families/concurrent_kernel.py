@@ -50,7 +50,7 @@ from grasp_core.arrays import Array
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import (
-    TURNS,
+    FACET_TURNS,
     Program,
     balance,
     facets,
@@ -64,22 +64,22 @@ from grasp_core.geometry.vectors_kernel import dotted
 from grasp_core.solvers.lp_kernel import empty_rows
 from grasp_core.values import FINGERS
 
-Y, RADII, VARIABLES = 3, 11, 15
+Y, DISC_RADII, CONCURRENT_VARIABLES = 3, 11, 15
 """Indices of the first disc centre and of the first radius among (x0, y_1 .. y_4, r_1 .. r_4), and
 the number of these variables."""
-FEWEST = 3
+TRIANGLE = 3
 """Fewest corners of a polygon."""
 
 
 @loop("numpy", once=True)
 def concurrent_program(fingers: Fingers, sides: Array) -> Program:
     """Build the program of one attempt for given sides (4) of its fingers."""
-    each, (E, limits) = len(TURNS), (fingers.E, fingers.b)
+    each, (E, limits) = len(FACET_TURNS), (fingers.E, fingers.b)
     count = FINGERS * each + fingers.edges.sum()
-    program, row = room_for_program(count, count, RADII, VARIABLES, 0.0), 0
+    program, row = room_for_program(count, count, DISC_RADII, CONCURRENT_VARIABLES, 0.0), 0
     A, b = program.A, program.b
     for i in range(FINGERS):
-        y, r = Y + 2 * i, RADII + i
+        y, r = Y + 2 * i, DISC_RADII + i
         _aim_rows(fingers, i, sides[i], (y, r), (A[row : row + each], b[row : row + each]))
         row += each
         # (2): the disc stays inside the face
@@ -131,7 +131,7 @@ def footprints(
     polygons, counts, radii = cut
     most = polygons.shape[2]
     flat, heights, way = np.empty((2, most, 2)), np.empty(most), np.empty(3)
-    A, b = np.empty((len(TURNS), 6)), np.empty(len(TURNS))
+    A, b = np.empty((len(FACET_TURNS), 6)), np.empty(len(FACET_TURNS))
     for a in range(len(counts)):
         fingers = fingers_of(faces, attempts, a)
         for finger in range(FINGERS):
@@ -181,7 +181,7 @@ def _clip(flat: Array, heights: Array, count: int, row: tuple[float, float, floa
 @loop("numpy", once=True)
 def _inscribed_radius(polygon: Array, count: int) -> float:
     """Compute the radius of the largest disc in a convex polygon; not finite where it is left."""
-    if count < FEWEST:
+    if count < TRIANGLE:
         return np.inf
     rows = empty_rows(3, count, 0)
     for k in range(count):

@@ -37,8 +37,8 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
-from grasp_core.families.placements import PAIRINGS, Corners
-from grasp_core.families.placing import KERNEL
+from grasp_core.families.placements import PAIRINGS, FaceCorners
+from grasp_core.families.placing import PLACING_KERNEL
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import FINGERS, FaceQuadruple
 
@@ -46,7 +46,7 @@ LEAST_SINE = 1e-6
 """Half angles between axes with a sine up to this are so small that they bound no width."""
 
 
-def corners_of(body: Polyhedron) -> Corners:
+def corners_of(body: Polyhedron) -> FaceCorners:
     """Return the corners of each face, padded, about the centre of mass and over the radius."""
     corners = [
         (np.vstack([face.polygon, *face.holes]) - body.center_of_mass) / body.radius
@@ -55,16 +55,16 @@ def corners_of(body: Polyhedron) -> Corners:
     counts = np.array([len(each) for each in corners])
     most = int(counts.max(initial=0))
     padded = [np.vstack([each, np.repeat(each[:1], most - len(each), axis=0)]) for each in corners]
-    return Corners(np.array(padded), counts)
+    return FaceCorners(np.array(padded), counts)
 
 
 def disc_limits(
-    corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array
+    corners: FaceCorners, normals: Array, faces: Indices, axes: Array, half_angles: Array
 ) -> Array:
     """Bound discs of quadruples from above, (q, 4): a concurrent grasp, then each of `PAIRINGS`."""
     limits = np.empty((len(faces), 1 + len(PAIRINGS)))
     given = map(np.ascontiguousarray, (normals, faces, axes, half_angles))
-    compiled(KERNEL).fill_limits(corners, *given, limits)
+    compiled(PLACING_KERNEL).fill_limits(corners, *given, limits)
     return limits
 
 
@@ -97,7 +97,7 @@ def pencil_radius_bounds(
     return np.stack(depths, axis=-1) * np.tan(half_angles / 2.0)[..., None]
 
 
-def distances(corners: Corners) -> Array:
+def distances(corners: FaceCorners) -> Array:
     """Bound the distance between points of two faces from above, (f, f)."""
     middles = corners.points.mean(axis=1)
     radii = np.linalg.norm(corners.points - middles[:, None], axis=-1).max(axis=1)

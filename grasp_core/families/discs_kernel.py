@@ -19,17 +19,25 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.cones.pyramids import PYRAMID_SIDES, facet_turns
-from grasp_core.families.placements import KEPT, LEFT, NONE, PLACED, Attempts, FaceTable, Fingers
+from grasp_core.families.placements import (
+    CONTACTS_PLACED,
+    NOT_DECIDED,
+    NOTHING_HELD,
+    RADIUS_GIVEN_UP,
+    Attempts,
+    FaceTable,
+    Fingers,
+)
 from grasp_core.geometry.vectors_kernel import across, balancing_weights, dotted
-from grasp_core.solvers.lp import RESIDUAL
-from grasp_core.solvers.lp_kernel import Rows, bounded, empty_rows, vertex_of
+from grasp_core.solvers.lp import LP_RESIDUAL
+from grasp_core.solvers.lp_kernel import LpRows, bounded, empty_rows, vertex_of
 from grasp_core.solvers.nearest_point_kernel import nearest
-from grasp_core.solvers.ties import FEASIBLE, FOUND, SAME_VALUE
+from grasp_core.solvers.ties import CONDITIONS_MET, FEASIBLE, SAME_VALUE
 from grasp_core.values import FINGERS
 
-TURNS = facet_turns(PYRAMID_SIDES)
+FACET_TURNS = facet_turns(PYRAMID_SIDES)
 """Directions in which the facets of a pyramid lean, (facets, 2)."""
-SPARE = FINGERS + 1
+ADDED_ROWS = FINGERS + 1
 """Number of rows that the second program adds."""
 ACCURACY = 1e-11
 """Error up to which multipliers give the objective: even if a focus is a thousand object radii
@@ -40,9 +48,9 @@ class Program(NamedTuple):
     """Rows A x <= b that keep four discs; the last four variables are their radii."""
 
     A: Array
-    """Rows, (rows + `SPARE`, n); the last ones are zeros, filled in by `largest_discs`."""
+    """Rows, (rows + `ADDED_ROWS`, n); the last ones are zeros, filled in by `largest_discs`."""
     b: Array
-    """Limits of the rows, (rows + `SPARE`,)."""
+    """Limits of the rows, (rows + `ADDED_ROWS`,)."""
     common: int
     """Number of rows that count where all radii are equal; the others only compare radii."""
     radii: int
@@ -54,7 +62,9 @@ class Program(NamedTuple):
 @loop("numpy")
 def room_for_program(common: int, rows: int, radii: int, n: int, excess: float) -> Program:
     """Make a program of zeros."""
-    return Program(np.zeros((rows + SPARE, n)), np.zeros(rows + SPARE), common, radii, excess)
+    return Program(
+        np.zeros((rows + ADDED_ROWS, n)), np.zeros(rows + ADDED_ROWS), common, radii, excess
+    )
 
 
 @loop("numpy")
@@ -71,12 +81,14 @@ def fingers_of(faces: FaceTable, attempts: Attempts, a: int) -> Fingers:
 def facets(axis: Array, half_angle: float, T: Array) -> Array:
     """Compute the normals g of `pyramid_facets` in `cones.pyramids`, for the usual pyramid."""
     first, second = across(axis, T)
-    tangent = np.tan(half_angle) * np.cos(np.pi / len(TURNS))
+    tangent = np.tan(half_angle) * np.cos(np.pi / len(FACET_TURNS))
     sine, cosine = tangent / np.hypot(1.0, tangent), 1.0 / np.hypot(1.0, tangent)
-    g = np.empty((len(TURNS), 3))
-    for m in range(len(TURNS)):
+    g = np.empty((len(FACET_TURNS), 3))
+    for m in range(len(FACET_TURNS)):
         for j in range(3):
-            g[m, j] = sine * axis[j] - cosine * (TURNS[m, 0] * first[j] + TURNS[m, 1] * second[j])
+            g[m, j] = sine * axis[j] - cosine * (
+                FACET_TURNS[m, 0] * first[j] + FACET_TURNS[m, 1] * second[j]
+            )
     return g
 
 
@@ -93,7 +105,7 @@ def balance(ways: Array, normals: Array, forces: Array) -> None:
 
 
 @loop("numpy")
-def of_equal_radii(program: Program) -> Rows:
+def of_equal_radii(program: Program) -> LpRows:
     """Write a program over one common radius, the last variable."""
     A, b, count, radii, excess = program
     rows = empty_rows(radii + 1, count, 0)
@@ -108,7 +120,7 @@ def of_equal_radii(program: Program) -> Rows:
 
 
 @loop("numpy")
-def largest_last(rows: Rows, least: float) -> float:
+def largest_last(rows: LpRows, least: float) -> float:
     """Bound the last variable from above; above `least` the bound is the tightest one."""
     c = np.zeros(len(rows.At))
     c[-1] = 1.0
@@ -120,14 +132,14 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
     """Find the largest four equal discs, then enlarge each; return the end and the radius."""
     first = largest_last(of_equal_radii(program), least)
     if not least <= first < np.inf:
-        return (NONE if first < least else LEFT), first
+        return (NOTHING_HELD if first < least else NOT_DECIDED), first
     A, b, n = program.A, program.b, len(x)
-    count, c = len(b) - SPARE, np.zeros(n)
+    count, c = len(b) - ADDED_ROWS, np.zeros(n)
     # the sum of the radii, where the smallest one stays nearly as large
     for finger in range(FINGERS):
         r = n - FINGERS + finger
         c[r] = 1.0
-        A[count + finger, r], b[count + finger] = -1.0, -first * (1.0 - KEPT)
+        A[count + finger, r], b[count + finger] = -1.0, -first * (1.0 - RADIUS_GIVEN_UP)
         A[-1, r] = -1.0
     rows = empty_rows(n, len(b) - 1, 0)
     for k in range(len(b) - 1):
@@ -135,10 +147,12 @@ def largest_discs(program: Program, least: float, x: Array) -> tuple[int, float]
         for j in range(n):
             rows.At[j, k] = A[k, j]
     # multipliers are large here, and how large the sum can be is needed to few digits
-    second = bounded(c, rows, -np.inf, RESIDUAL, vertex_of(n))
+    second = bounded(c, rows, -np.inf, LP_RESIDUAL, vertex_of(n))
     if not abs(second) < np.inf:
-        return LEFT, first
+        return NOT_DECIDED, first
     b[-1] = -(second - SAME_VALUE * (1.0 + abs(second)))
     # that there is such a point shows that both bounds are reached
     unmet, excess = nearest(A, b, x)
-    return (PLACED if unmet <= FOUND and excess <= FEASIBLE else LEFT), first
+    return (
+        CONTACTS_PLACED if unmet <= CONDITIONS_MET and excess <= FEASIBLE else NOT_DECIDED
+    ), first

@@ -62,7 +62,7 @@ from grasp_core.closure.force_closure import ClosureCertificate, certificates, f
 from grasp_core.closure.lines import classify_lines
 from grasp_core.cones.pyramids import pyramid_facets
 from grasp_core.errors import InputError, UndecidedError
-from grasp_core.families.absence import Absence, Corners, Path, corner_contacts, part_at
+from grasp_core.families.absence import Absence, PartCorners, Path, corner_contacts, part_at
 from grasp_core.families.placements import Placement
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
@@ -75,13 +75,13 @@ SMALLER = 0.5
 """Size of randomly shrunk pieces, relative to the piece."""
 PATCH_SIDES = 8
 """Number of facets of the pyramids."""
-DEPENDENT = 1e-6
+ZERO_SINGULAR = 1e-6
 """Singular values smaller than this, relative to the largest, are zero but for rounding."""
-LEAST_INSET = 1e-4
+FREE_INSET = 1e-4
 """Least distance of a contact from the edges of its face, in object radii."""
 DEPTH_KEPT = 0.5
 """Share of the patch's margin that its forces keep inside their cones."""
-ROUNDED = 1e-12
+LEAST_WEIGHT = 1e-12
 """Least weight of a corner in a centre of pressure: keeps the weights' sum above zero."""
 INSET_KEPT = 0.9
 """Share of the largest distance from the edges that contacts keep when they move to the middles."""
@@ -94,7 +94,7 @@ RESTARTS = 12
 
 
 def grasp_from_patch(
-    pieces: Sequence[FacePiece], part: Corners, patch: ClosureCertificate, friction: float
+    pieces: Sequence[FacePiece], part: PartCorners, patch: ClosureCertificate, friction: float
 ) -> Placement | None:
     """Find a grasp from balanced forces at the corners of faces; None if all attempts fail."""
     if patch.forces is None:
@@ -111,13 +111,13 @@ def grasp_from_patch(
         return found
     # (9): pressed harder, a corner draws the contact nearer
     pushes, _ = normal_and_tangential(at_corners, patch.normals)
-    weights = np.maximum(pushes, ROUNDED)
+    weights = np.maximum(pushes, LEAST_WEIGHT)
     at = [owner == i for i in range(FINGERS)]
     centers = np.array(
         [np.average(patch.positions[own], axis=0, weights=weights[own]) for own in at]
     )
     inset = min(piece.inset(at) for piece, at in zip(pieces, centers, strict=True))
-    if inset < LEAST_INSET or _on_one_line(centers):
+    if inset < FREE_INSET or _on_one_line(centers):
         return None
     return closed_at(pieces, centers, friction, inset)
 
@@ -129,7 +129,7 @@ def smallest_forces(
     # (4): f_0 is the least-squares solution, Z spans what it leaves free
     conditions = np.vstack([grasp_map(points), normals.reshape(1, -1)])
     left, sizes, right = np.linalg.svd(conditions)
-    rank = int((sizes > DEPENDENT * sizes[0]).sum())
+    rank = int((sizes > ZERO_SINGULAR * sizes[0]).sum())
     Z = right[rank:].T
     f_0 = right[:rank].T @ (left[-1, :rank] / sizes[:rank])
     toward = np.array([piece.frame[:, 0] for piece in pieces])
@@ -163,7 +163,7 @@ def place_by_forces(pieces: Sequence[FacePiece], forces: Array) -> Placement | N
         # scaling (7) by the largest force leaves the solver numbers of size one
         LinearProgram(objective, np.vstack(rows), np.hstack(limits), A_eq / scale, b_eq / scale)
     )
-    if not isinstance(found, Optimum) or INSET_KEPT * found.value < LEAST_INSET:
+    if not isinstance(found, Optimum) or INSET_KEPT * found.value < FREE_INSET:
         return None
     edges, ends = np.vstack(rows)[:, :-1], np.hstack(limits)
     inside = ends - INSET_KEPT * found.value
@@ -296,7 +296,7 @@ def _share(waiting: Sequence[tuple[float, Path]]) -> float:
 
 
 def close_patch(
-    pieces: Sequence[FacePiece], part: Corners, friction: float
+    pieces: Sequence[FacePiece], part: PartCorners, friction: float
 ) -> ClosureCertificate | None:
     """Decide force closure of contacts at all corners of a part; None if too close to call."""
     try:

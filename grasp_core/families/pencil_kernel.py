@@ -55,7 +55,7 @@ from grasp_core.families.placements import LEAST_RADIUS, Fingers, Placed
 from grasp_core.geometry.vectors_kernel import angle_between, dotted, focus_direction
 from grasp_core.values import FINGERS
 
-K, BALL, RADII, VARIABLES = 3, 4, 5, 9
+K, INNER_RADIUS, PENCIL_RADII, PENCIL_VARIABLES = 3, 4, 5, 9
 """Indices of k, R and the first radius among (x0, k, R, r_11 .. r_22), and their number."""
 ONE = 4
 """Place of the constant in functions of (x0, k)."""
@@ -69,7 +69,9 @@ def pencil_program(fingers: Fingers, signs: Array) -> Program:
     """
     near, u = signs[0] > 0.0, focus_direction(fingers.axes)
     common = 1 + FINGERS + fingers.edges.sum() + (FINGERS if near else 0)
-    program = room_for_program(common, common + FINGERS, BALL, VARIABLES, fingers.depths.max())
+    program = room_for_program(
+        common, common + FINGERS, INNER_RADIUS, PENCIL_VARIABLES, fingers.depths.max()
+    )
     A, b = program.A, program.b
     s, y = _centers(fingers, u, signs)
     # the foci are 2 k apart
@@ -79,7 +81,7 @@ def pencil_program(fingers: Fingers, signs: Array) -> Program:
         row = _near_rows(fingers, u, s, (A, b), row)
     for i in range(FINGERS):
         # (3) loses eps by (6)
-        A[row, RADII + i], A[row, BALL], b[row] = 1.0, -1.0, -fingers.depths[i]
+        A[row, PENCIL_RADII + i], A[row, INNER_RADIUS], b[row] = 1.0, -1.0, -fingers.depths[i]
         row += 1
     return program
 
@@ -115,11 +117,11 @@ def _disc_rows(fingers: Fingers, centers: tuple[Array, Array], A: Array, b: Arra
     """Fill in, from row 1 on, the rows (2) and those that keep discs in faces; return the next."""
     (s, y), psi, row = centers, fingers.half_angle, 1
     for i in range(FINGERS):
-        r, lean = RADII + i, angle_between(fingers.normals[i], fingers.axes[i])
+        r, lean = PENCIL_RADII + i, angle_between(fingers.normals[i], fingers.axes[i])
         # (2), with eps off the limit by (6)
         for j in range(ONE):
             A[row, j] = -np.sin(psi) * s[i, j]
-        A[row, BALL], A[row, r] = 1.0, 1.0 if lean >= psi else np.cos(psi - lean)
+        A[row, INNER_RADIUS], A[row, r] = 1.0, 1.0 if lean >= psi else np.cos(psi - lean)
         b[row] = np.sin(psi) * s[i, ONE] - fingers.depths[i]
         row += 1
         for e in range(fingers.edges[i]):
@@ -143,7 +145,7 @@ def _near_rows(fingers: Fingers, u: Array, s: Array, rows: tuple[Array, Array], 
         for j in range(ONE):
             A[row, j] = -toward * s[i, j]
         A[row, K] += 2.0
-        A[row, RADII + i] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
+        A[row, PENCIL_RADII + i] = np.hypot(dotted(T[:, 0], u), dotted(T[:, 1], u))
         # (6) takes eps |n.u| from the limit
         off = fingers.depths[i] * abs(dotted(fingers.normals[i], u))
         b[row] = toward * s[i, ONE] - off

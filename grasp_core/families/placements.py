@@ -22,7 +22,7 @@ PAIRINGS: tuple[FingerOrder, ...] = ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2))
 LEAST_RADIUS = 1e-3
 """Least radius, relative to the object's, of a disc that counts as a region to stand in; foci of a
 pencil that are closer than this count as one point."""
-KEPT = 1e-6
+RADIUS_GIVEN_UP = 1e-6
 """Share of the smallest radius that the second program may give up. With less, its optima would
 form slivers, in which rounding moves the nearest point a thousand times as far."""
 
@@ -43,7 +43,7 @@ class Placement:
     """Forces for which the contacts were chosen, (4, 3); None if they are those of `forces`."""
 
 
-LEFT, NONE, PLACED = -1, 0, 1
+NOT_DECIDED, NOTHING_HELD, CONTACTS_PLACED = -1, 0, 1
 """Ends of an attempt: neither solved nor refuted, proved to hold nothing as good as asked for, or
 placed."""
 
@@ -86,7 +86,7 @@ class Fingers(NamedTuple):
     half_angle: float
 
 
-class Corners(NamedTuple):
+class FaceCorners(NamedTuple):
     """Corners of faces, in arrays as long as the largest number of corners."""
 
     points: Array  # corners in space, (f, c, 3); a face with fewer corners leaves rows unused
@@ -120,7 +120,9 @@ def face_table(pieces: Sequence[FacePiece | None]) -> FaceTable:
 class Placed(NamedTuple):
     """Contacts of many attempts, with the letters of `Placement`."""
 
-    ends: Indices  # how each attempt ended, (a,): `LEFT`, `NONE` or `PLACED`
+    ends: (
+        Indices  # how each attempt ended, (a,): `NOT_DECIDED`, `NOTHING_HELD` or `CONTACTS_PLACED`
+    )
     positions: Array  # contact points, (a, 4, 3)
     forces: Array  # balanced forces whose normal parts sum to one, (a, 4, 3)
     foci: Array  # foci, (a, 2, 3); concurrent grasps use the first only

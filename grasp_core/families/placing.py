@@ -32,8 +32,8 @@ from grasp_core.declared import trusted
 from grasp_core.errors import SolverError
 from grasp_core.families.placements import (
     LEAST_RADIUS,
-    LEFT,
-    NONE,
+    NOT_DECIDED,
+    NOTHING_HELD,
     PAIRINGS,
     Attempts,
     FaceTable,
@@ -53,7 +53,7 @@ from grasp_core.objects.face_pieces import (
     inscribed_radius,
     piece_of,
 )
-from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.solvers.lp import LP_RESIDUAL
 from grasp_core.solvers.ties import graded, surpassing
 from grasp_core.values import (
     FINGERS,
@@ -65,11 +65,11 @@ from grasp_core.values import (
     four,
 )
 
-KERNEL = "grasp_core.families.placing_kernel"
+PLACING_KERNEL = "grasp_core.families.placing_kernel"
 DISCS = "grasp_core.families.discs_kernel"
-REGULUS = "grasp_core.families.regulus_kernel"
+REGULUS_KERNEL = "grasp_core.families.regulus_kernel"
 AS_LISTED: tuple[FingerOrder, ...] = ((0, 1, 2, 3),)
-BEFORE, BEHIND = np.ones(FINGERS), -np.ones(FINGERS)
+ALL_BEFORE, ALL_BEHIND = np.ones(FINGERS), -np.ones(FINGERS)
 MIXED_SIDES = np.array([s for s in product((1.0, -1.0), repeat=FINGERS) if abs(sum(s)) < FINGERS])
 """Patterns of a concurrent grasp: sides on which fingers have the focus, see `concurrent_kernel`.
 """
@@ -88,12 +88,12 @@ ON_EDGE = 1e-12
 meets both triangles beside the edge: a thousand rounding errors. The first of them that is large
 enough counts."""
 
-Cones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
-Regions: TypeAlias = tuple[ContactRegion, ...]
+FourCones: TypeAlias = tuple[ForceCone, ForceCone, ForceCone, ForceCone]
+FingerRegions: TypeAlias = tuple[ContactRegion, ...]
 """The regions of the fingers, in the pieces' units."""
-Planned: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement]
+Planned: TypeAlias = tuple[tuple[FacePiece, ...], FourCones, Placement]
 """Convex pieces of four faces, force cones and contacts."""
-Settled: TypeAlias = tuple[tuple[FacePiece, ...], Cones, Placement, Regions]
+Settled: TypeAlias = tuple[tuple[FacePiece, ...], FourCones, Placement, FingerRegions]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,10 +121,10 @@ class Construction:
         """Place contacts for each attempt, with merits of at least `least`, (a,)."""
         placed = room_for(len(least))
         if self.patterns is None:
-            compiled(REGULUS).place(table, attempts, placed)
+            compiled(REGULUS_KERNEL).place(table, attempts, placed)
         else:
             pencil = self.family == "pencil"
-            compiled(KERNEL).place(pencil, table, attempts, self.patterns, least, placed)
+            compiled(PLACING_KERNEL).place(pencil, table, attempts, self.patterns, least, placed)
         return placed
 
     def bounds(self, table: FaceTable, attempts: Attempts, least: float) -> Array:
@@ -137,18 +137,18 @@ class Construction:
         attempts = Attempts._make(map(np.ascontiguousarray, attempts))
         bounds = np.empty(len(attempts.faces))
         if self.patterns is None:
-            compiled(REGULUS).regulus_bounds(table, attempts, bounds)
+            compiled(REGULUS_KERNEL).regulus_bounds(table, attempts, bounds)
         else:
             pencil = self.family == "pencil"
-            compiled(KERNEL).bounds(pencil, table, attempts, self.patterns, least, bounds)
+            compiled(PLACING_KERNEL).bounds(pencil, table, attempts, self.patterns, least, bounds)
         # a proved bound may be off by what the check of multipliers allows
-        return bounds + RESIDUAL
+        return bounds + LP_RESIDUAL
 
     def one_of(self, placed: Placed, a: int) -> Placement | None:
         """Return what was placed for one attempt, or None if there is nothing as good as asked."""
-        if placed.ends[a] == LEFT:
+        if placed.ends[a] == NOT_DECIDED:
             raise SolverError("a program was neither solved nor proved infeasible")
-        if placed.ends[a] == NONE:
+        if placed.ends[a] == NOTHING_HELD:
             return None
         foci = placed.foci[a, : 1 if self.family == "concurrent" else 2]
         merit = float(placed.merits[a])
@@ -165,14 +165,14 @@ class Construction:
 def nearly_symmetric(axes: Array, half_angles: Array) -> NDArray[np.bool_]:
     """Return whether both pairs of each quadruple leave their slopes a choice, (q,)."""
     found = np.empty(len(axes), dtype=np.bool_)
-    kernel = compiled(REGULUS)
+    kernel = compiled(REGULUS_KERNEL)
     kernel.nearly_symmetric(np.ascontiguousarray(axes), np.ascontiguousarray(half_angles), found)
     return found
 
 
 CONSTRUCTIONS: dict[Family, Construction] = {
     "concurrent": Construction(
-        "concurrent", "cone", AS_LISTED, np.array([BEFORE, BEHIND]), slice(0, 1)
+        "concurrent", "cone", AS_LISTED, np.array([ALL_BEFORE, ALL_BEHIND]), slice(0, 1)
     ),
     "pencil": Construction("pencil", "disc", PAIRINGS, np.array([CELL_A, CELL_B]), slice(1, 4)),
     "regulus": Construction("regulus", "point", PAIRINGS, admits=nearly_symmetric),
@@ -191,12 +191,12 @@ def attempts_of(asked: Sequence[tuple[FaceQuadruple, Sequence[ForceCone]]]) -> A
     )
 
 
-def point_regions(placement: Placement) -> Regions:
+def point_regions(placement: Placement) -> FingerRegions:
     """Make regions of one point each, the contacts themselves."""
     return tuple(ContactRegion("point", at[None], 0.0) for at in placement.positions)
 
 
-def regions_of(kind: RegionKind, planned: Sequence[Planned]) -> list[Regions]:
+def regions_of(kind: RegionKind, planned: Sequence[Planned]) -> list[FingerRegions]:
     """Make the regions of the fingers for many placements."""
     if kind == "point" or not planned:
         return [point_regions(placement) for _, _, placement in planned]
@@ -246,7 +246,7 @@ class Attempt:
     """One order of the fingers on four faces, with the force cones to try in a construction."""
 
     faces: FaceQuadruple  # the face that each finger touches
-    cones: tuple[Cones, ...]
+    cones: tuple[FourCones, ...]
     """Choices of force cones in finger order, the choice with the largest bound first."""
     bounds: tuple[float, ...]
     """Upper bound on the discs of each choice [object radii]; infinite for constructions without
@@ -267,7 +267,7 @@ class End:
 
 
 @dataclass(frozen=True, eq=False)
-class Settling:
+class ContactPlacing:
     """Places the contacts of one construction on the faces of one object."""
 
     construction: Construction
@@ -295,7 +295,7 @@ class Settling:
         )
         return ends
 
-    def _place(self, asked: Sequence[tuple[FaceQuadruple, Cones, End]]) -> None:
+    def _place(self, asked: Sequence[tuple[FaceQuadruple, FourCones, End]]) -> None:
         """Enter the contacts of one choice of cones where they are better than those before."""
         if not asked:
             return
@@ -313,7 +313,7 @@ class Settling:
                 end.planned, end.least = found, surpassing(found[2].merit)
 
     def _best(
-        self, faces: FaceQuadruple, cones: Cones, whole: Placement | None, end: End
+        self, faces: FaceQuadruple, cones: FourCones, whole: Placement | None, end: End
     ) -> Planned | None:
         """Place contacts on the best choice of one convex piece per face; None unless above least.
 

@@ -19,18 +19,18 @@ from grasp_core.families.discs_kernel import (
 )
 from grasp_core.families.pencil_kernel import pencil_program, take_pencil
 from grasp_core.families.placements import (
-    LEFT,
-    NONE,
+    CONTACTS_PLACED,
+    NOT_DECIDED,
+    NOTHING_HELD,
     PAIRINGS,
-    PLACED,
     Attempts,
-    Corners,
+    FaceCorners,
     FaceTable,
     Fingers,
     Placed,
 )
 from grasp_core.geometry.vectors_kernel import balancing_weights, cross, dotted
-from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.solvers.lp import LP_RESIDUAL
 from grasp_core.solvers.ties import SAME_SHARE
 from grasp_core.values import FINGERS
 
@@ -58,8 +58,8 @@ def take(
     else:
         take_concurrent(fingers, a, pattern, x, placed)
     for finger in range(FINGERS):
-        placed.radii[a, finger] = max(x[len(x) - FINGERS + finger] - RESIDUAL, 0.0)
-    placed.ends[a], placed.merits[a] = PLACED, radius - RESIDUAL
+        placed.radii[a, finger] = max(x[len(x) - FINGERS + finger] - LP_RESIDUAL, 0.0)
+    placed.ends[a], placed.merits[a] = CONTACTS_PLACED, radius - LP_RESIDUAL
 
 
 @loop("numpy")
@@ -69,15 +69,15 @@ def place(
 ) -> None:  # fmt: skip
     """Place the largest four equal discs for each attempt."""
     for a in range(len(least)):
-        worth, placed.ends[a], fingers = least[a], NONE, fingers_of(faces, attempts, a)
+        worth, placed.ends[a], fingers = least[a], NOTHING_HELD, fingers_of(faces, attempts, a)
         for p in range(len(patterns)):
             program = program_of(pencil, fingers, patterns[p])
             x = np.empty(program.A.shape[1])
             end, radius = largest_discs(program, worth, x)
-            if end == LEFT:
-                placed.ends[a] = LEFT
+            if end == NOT_DECIDED:
+                placed.ends[a] = NOT_DECIDED
                 break
-            if end == PLACED:
+            if end == CONTACTS_PLACED:
                 take(pencil, fingers, a, patterns[p], x, radius, placed)
                 worth = placed.merits[a] + SAME_SHARE * abs(placed.merits[a])
 
@@ -97,7 +97,12 @@ def bounds(
 
 @loop()
 def fill_limits(
-    corners: Corners, normals: Array, faces: Indices, axes: Array, half_angles: Array, limits: Array
+    corners: FaceCorners,
+    normals: Array,
+    faces: Indices,
+    axes: Array,
+    half_angles: Array,
+    limits: Array,
 ) -> None:
     """Bound the discs of many quadruples from above (see `disc_limits`)."""
     for q in range(len(faces)):
@@ -121,7 +126,7 @@ def fill_limits(
 
 
 @loop()
-def _reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, float]:
+def _reaches(corners: FaceCorners, faces: Indices, axes: Array) -> tuple[float, float]:
     """Bound the mean distance of contacts from a focus before and behind them, by (1)."""
     weights, before, behind = np.empty(FINGERS), 0.0, 0.0
     balancing_weights(axes, weights)
@@ -132,7 +137,7 @@ def _reaches(corners: Corners, faces: Indices, axes: Array) -> tuple[float, floa
 
 
 @loop(once=True)
-def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
+def _width(corners: FaceCorners, faces: Indices, axes: Array, pair: tuple[int, int]) -> float:
     """Bound the sum of two contacts' distances s_i and s_j from a common focus, by (2)."""
     (i, j), apart = pair, np.empty(3)
     for d in range(3):
@@ -145,7 +150,7 @@ def _width(corners: Corners, faces: Indices, axes: Array, pair: tuple[int, int])
 
 @loop(once=True)
 def _across(
-    corners: Corners, normals: Array, faces: Indices, axes: Array,
+    corners: FaceCorners, normals: Array, faces: Indices, axes: Array,
     places: tuple[int, int, int, int], half: float,
 ) -> float:  # fmt: skip
     """Bound a disc's radius by the faces' heights across the axes of two fingers, (3) and (4)."""
@@ -183,7 +188,7 @@ def _lean(normal: Array, N: Array) -> float:
 
 
 @loop()
-def _extent(corners: Corners, face: int, direction: Array) -> tuple[float, float]:
+def _extent(corners: FaceCorners, face: int, direction: Array) -> tuple[float, float]:
     """Find the least and largest height of a face's corners along a direction."""
     low, high = np.inf, -np.inf
     for k in range(corners.counts[face]):

@@ -55,39 +55,39 @@ from grasp_core.arrays import Array
 from grasp_core.compiled import loop
 from grasp_core.families.discs_kernel import (
     ACCURACY,
-    TURNS,
+    FACET_TURNS,
     balance,
     facets,
     fingers_of,
 )
 from grasp_core.families.placements import (
-    LEFT,
-    NONE,
-    PLACED,
+    CONTACTS_PLACED,
+    NOT_DECIDED,
+    NOTHING_HELD,
     Attempts,
     FaceTable,
     Fingers,
     Placed,
 )
 from grasp_core.geometry.vectors_kernel import angle_between, cross, dotted, focus_direction
-from grasp_core.solvers.lp_kernel import Rows, Vertex, bounded, empty_rows, vertex_of
+from grasp_core.solvers.lp_kernel import LpRows, Vertex, bounded, empty_rows, vertex_of
 from grasp_core.solvers.nearest_point_kernel import nearest
-from grasp_core.solvers.ties import FEASIBLE, FOUND
+from grasp_core.solvers.ties import CONDITIONS_MET, FEASIBLE
 from grasp_core.values import FINGERS
 
 LEAST_DEPTH = 0.02
 """Least height of the passing points over their faces, in object radii."""
-LEAST_INSET = 1e-3
+REGULUS_INSET = 1e-3
 """Least distance of a contact from the edges of its face, in object radii."""
-LEAST_GAP = 0.01
+LEAST_PASS = 0.01
 """Least distance l_i, along N_i, at which a line passes the focus line, in object radii."""
-K, P, X, Z, T, VARIABLES = 3, 4, 5, 7, 9, 10
+K, P, X, Z, T, REGULUS_VARIABLES = 3, 4, 5, 7, 9, 10
 """Indices of k, p, x_1, z_1 and t among the variables, and their number."""
-SLOPES = (0.5, 0.2, 0.8)
+ANGLE_SHARES = (0.5, 0.2, 0.8)
 """Shares of the interval (3) at which each slope's angle is tried."""
 SAME_OFFSET = 1e-9
 """Difference between offsets that counts as none; of equal slopes, those tried first win."""
-FLAT = 1e-12
+NO_BOUND = 1e-12
 """Size of a facet's component along N below which the facet does not bound z / x: it allows every
 value or none."""
 GIVEN_UP = 1e-9
@@ -136,7 +136,7 @@ def _interval(axes: Array, half_angle: float, u: Array, pair: int) -> tuple[floa
 @loop()
 def pair_frames(fingers: Fingers) -> PairFrames:
     """Compute the frames of one attempt; slopes of too asymmetric pairs are not usable."""
-    axes, half_angle, slopes = fingers.axes, fingers.half_angle, len(SLOPES)
+    axes, half_angle, slopes = fingers.axes, fingers.half_angle, len(ANGLE_SHARES)
     u, normal = focus_direction(axes), np.empty(3)
     frames = PairFrames(
         u, np.empty((2, 3)), np.empty((2, 3)), np.zeros((2, slopes)),
@@ -157,7 +157,7 @@ def pair_frames(fingers: Fingers) -> PairFrames:
         along = _facets_along(fingers, pair, frames)
         for s in range(slopes):
             # the sign of the slope is that of x
-            tau = resultant * np.tan(least + SLOPES[s] * (largest - least))
+            tau = resultant * np.tan(least + ANGLE_SHARES[s] * (largest - least))
             frames.tau[pair, s] = tau
             frames.usable[pair, s] = _tightest(along, resultant, tau, frames.tight[pair, s])
     return frames
@@ -166,7 +166,7 @@ def pair_frames(fingers: Fingers) -> PairFrames:
 @loop(once=True)
 def _facets_along(fingers: Fingers, pair: int, frames: PairFrames) -> Array:
     """Compute normals of the facets of a pair's pyramids along u, v, N, (2, facets, 3)."""
-    found = np.empty((2, len(TURNS), 3))
+    found = np.empty((2, len(FACET_TURNS), 3))
     for each in range(2):
         finger = 2 * pair + each
         G = facets(fingers.axes[finger], fingers.half_angle, fingers.frames[finger])
@@ -187,8 +187,8 @@ def _tightest(facets: Array, resultant: float, tau: float, tight: Array) -> bool
             # g.f of a force x (u +- tau v) +- z N
             alpha = facets[each, m, 0] + side * tau * facets[each, m, 1]
             beta = side * facets[each, m, 2]
-            if abs(beta) <= FLAT:
-                if resultant * alpha < -FLAT:
+            if abs(beta) <= NO_BOUND:
+                if resultant * alpha < -NO_BOUND:
                     return False
                 continue
             bound = -resultant * alpha / beta
@@ -228,15 +228,15 @@ def place(faces: FaceTable, attempts: Attempts, placed: Placed) -> None:
 
     The merit is minus the largest offset from the middles of the faces.
     """
-    x = np.empty(VARIABLES)
+    x = np.empty(REGULUS_VARIABLES)
     for a in range(len(placed.ends)):
         fingers = fingers_of(faces, attempts, a)
         frames = pair_frames(fingers)
         best, slopes, side = _best_choice(fingers, frames, -SAME_OFFSET)
-        placed.ends[a] = NONE if best == -np.inf else LEFT
+        placed.ends[a] = NOTHING_HELD if best == -np.inf else NOT_DECIDED
         if abs(best) < np.inf and _nearest_optimum(fingers, frames, slopes, side, best, x):
             _take(fingers, frames, slopes, a, x, placed)
-            placed.ends[a], placed.merits[a] = PLACED, best
+            placed.ends[a], placed.merits[a] = CONTACTS_PLACED, best
 
 
 @loop()
@@ -244,9 +244,9 @@ def _best_choice(
     fingers: Fingers, frames: PairFrames, enough: float
 ) -> tuple[float, tuple[int, int], float]:
     """Find the slopes and the side of p with the largest bound, until one is above `enough`."""
-    best, slopes, side, vertex = -np.inf, (0, 0), 1.0, vertex_of(VARIABLES)
-    for i in range(len(SLOPES)):
-        for j in range(len(SLOPES)):
+    best, slopes, side, vertex = -np.inf, (0, 0), 1.0, vertex_of(REGULUS_VARIABLES)
+    for i in range(len(ANGLE_SHARES)):
+        for j in range(len(ANGLE_SHARES)):
             if frames.usable[0, i] and frames.usable[1, j] and best <= enough:
                 # ties go to the first choice: rounding must not decide between equal ones
                 worth = best + SAME_OFFSET
@@ -266,16 +266,16 @@ def _nearest_optimum(
     rows, gap = _rows(fingers, frames, slopes)
     rows.At[P, 0], rows.b[0] = -side, -gap
     count, room = len(rows.b), len(rows.b) + rows.equalities + 1
-    A, b = np.zeros((room, VARIABLES)), np.empty(room)
+    A, b = np.zeros((room, REGULUS_VARIABLES)), np.empty(room)
     for k in range(room - 1):
         # equalities hold from both sides
         sign, row = (1.0, k) if k < count else (-1.0, k - rows.equalities)
         b[k] = sign * rows.b[row]
-        for j in range(VARIABLES):
+        for j in range(REGULUS_VARIABLES):
             A[k, j] = sign * rows.At[j, row]
     A[-1, T], b[-1] = 1.0, GIVEN_UP * (1.0 + abs(best)) - best
     unmet, excess = nearest(A, b, x)
-    return unmet <= FOUND and excess <= FEASIBLE
+    return unmet <= CONDITIONS_MET and excess <= FEASIBLE
 
 
 @loop(once=True)
@@ -303,7 +303,7 @@ def _take(
 
 
 @loop(once=True)
-def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[float, float]:
+def _best_side(rows: LpRows, gap: float, worth: float, vertex: Vertex) -> tuple[float, float]:
     """Solve the programs for p > gap and p < -gap; return the better bound and the sign of p."""
     either = _bounded(rows, worth, vertex)
     p = vertex.x[P]  # anything where `either` is infinite: the sides decide then, or nothing does
@@ -322,18 +322,18 @@ def _best_side(rows: Rows, gap: float, worth: float, vertex: Vertex) -> tuple[fl
 
 
 @loop()
-def _bounded(rows: Rows, worth: float, vertex: Vertex) -> float:
+def _bounded(rows: LpRows, worth: float, vertex: Vertex) -> float:
     """Bound minus the offset from above."""
-    c = np.zeros(VARIABLES)
+    c = np.zeros(REGULUS_VARIABLES)
     c[T] = -1.0
     return bounded(c, rows, worth, ACCURACY, vertex)
 
 
 @loop("numpy")
-def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tuple[Rows, float]:
+def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tuple[LpRows, float]:
     """Build the rows, the first left for the gap (8) and equalities last; return also the gap."""
     count = 1 + FINGERS * (4 + 1 + 1) + 4 + fingers.edges.sum()
-    rows = empty_rows(VARIABLES, count, FINGERS)
+    rows = empty_rows(REGULUS_VARIABLES, count, FINGERS)
     row, equality = 1, count - FINGERS
     for finger in range(FINGERS):
         line, n = _line(frames, slopes, finger), fingers.normals[finger]
@@ -354,24 +354,24 @@ def _rows(fingers: Fingers, frames: PairFrames, slopes: tuple[int, int]) -> tupl
             row += 1
     # (8) for both pairs: by (2), l_i is p times the slope of the other
     flattest = min(abs(frames.tau[0, slopes[0]]), abs(frames.tau[1, slopes[1]]))
-    return rows, LEAST_GAP / flattest
+    return rows, LEAST_PASS / flattest
 
 
 @loop()
-def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
+def _edge_rows(fingers: Fingers, i: int, line: _Line, rows: LpRows, row: int) -> int:
     """Fill in the rows (4), which keep the contact D - F of a line inside its face."""
     edge, frame, E = np.empty(3), fingers.frames[i], fingers.E[i]
     for e in range(fingers.edges[i]):
         for j in range(3):
             edge[j] = frame[j, 0] * E[e, 0] + frame[j, 1] * E[e, 1]
         _add(line, edge, (1.0, -1.0), rows, row)
-        rows.b[row] = fingers.b[i, e] - LEAST_INSET + dotted(edge, fingers.origins[i])
+        rows.b[row] = fingers.b[i, e] - REGULUS_INSET + dotted(edge, fingers.origins[i])
         row += 1
     return row
 
 
 @loop()
-def _offset_rows(fingers: Fingers, i: int, line: _Line, rows: Rows, row: int) -> int:
+def _offset_rows(fingers: Fingers, i: int, line: _Line, rows: LpRows, row: int) -> int:
     """Fill in the rows (5), which make t the largest offset from the middle of the face."""
     along = np.empty(3)
     for axis in range(2):
@@ -399,7 +399,7 @@ def _line(frames: PairFrames, slopes: tuple[int, int], finger: int) -> _Line:
 
 
 @loop()
-def _add(line: _Line, d: Array, shares: tuple[float, float], rows: Rows, row: int) -> None:
+def _add(line: _Line, d: Array, shares: tuple[float, float], rows: LpRows, row: int) -> None:
     """Fill in a row that adds shares of d.D and d.F, for `shares` = (passing, force)."""
     passing, force = shares
     for j in range(3):

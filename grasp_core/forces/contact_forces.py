@@ -54,7 +54,7 @@ from grasp_core.solvers.conic import ConicProgram
 from grasp_core.solvers.qp import PROXQP, check_solver, least_distance
 from grasp_core.values import Contact, Grasp
 
-RESIDUAL = 1e-6
+FORCES_RESIDUAL = 1e-6
 """Largest imbalance and cone violation accepted, in units of the largest normal force: a
 hundred times the accuracy asked of ProxQP."""
 FINE_RESIDUAL = 1e-9
@@ -70,7 +70,7 @@ REGULAR = 1e-3
 against the imbalance."""
 FRICTIONLESS = 1e-6
 """Friction coefficient below which no lower one is searched for."""
-ROUNDS, IMPROVEMENT = 20, 1e-2
+PYRAMID_ROUNDS, IMPROVEMENT = 20, 1e-2
 """Most rounds in pyramids, and the share by which the coefficient must fall in each."""
 CONE_ROUNDS, CONE_IMPROVEMENT = 12, 1e-4
 """Most rounds in exact cones, and the share by which the coefficient must fall in each. The excess
@@ -127,7 +127,7 @@ class Balance:
             d.append(np.full(count, self.largest))
         return np.vstack(C), np.concatenate(d)
 
-    def checked(self, f: Array, residual: float = RESIDUAL) -> Array | None:
+    def checked(self, f: Array, residual: float = FORCES_RESIDUAL) -> Array | None:
         """Make forces (3k,) balance to rounding; None where they then break a limit."""
         # the least change that balances f is the pseudo-inverse of what is left
         exact = f - self.inverse @ (self.G @ f + self.w)
@@ -166,7 +166,7 @@ def balances(
     return found
 
 
-def needed_friction(f: Array, weights: Array, slack: float = RESIDUAL) -> float:
+def needed_friction(f: Array, weights: Array, slack: float = FORCES_RESIDUAL) -> float:
     """Return the largest ratio of tangential to weighted normal force of forces (3k,).
 
     Tangential forces up to the slack count as none, and with a slack of zero those of contacts
@@ -180,7 +180,7 @@ def needed_friction(f: Array, weights: Array, slack: float = RESIDUAL) -> float:
 
 def in_cones(f: Array | None, friction: Array) -> bool:
     """Return whether local forces (3k,) are there and need no more than the friction."""
-    return f is not None and needed_friction(f, friction) <= 1.0 + RESIDUAL
+    return f is not None and needed_friction(f, friction) <= 1.0 + FORCES_RESIDUAL
 
 
 def least_norm(balance: Balance, friction: Array, solver: str) -> Array | None:
@@ -213,7 +213,7 @@ def least_norm_in_cones(balance: Balance, friction: Array) -> Array | None:
 def least_friction(balance: Balance, start: float, weights: Array) -> Array | None:
     """Find forces (3k,) of least r, the friction being r times a weight, from some coefficient."""
     best, friction = None, start
-    for _ in range(ROUNDS):
+    for _ in range(PYRAMID_ROUNDS):
         better = _toward_less_friction(balance, friction, weights)
         if better is None:
             break

@@ -217,12 +217,12 @@ def _edges(loop: list[int]) -> list[tuple[int, int]]:
 
 
 FEWEST_CORNERS, MOST_CORNERS = 3, 5000
-WIDTH, FINE = 1e-6, 1e-9
+RADIUS_ERROR, EXTENT_ERROR = 1e-6, 1e-9
 """Largest error of a claimed radius of the largest disc, over it and over the polygon's extent."""
 LEFT_OUT = 2e-3
 """Share of a polygon's area by which it may fail to cover its disc: half of it is given up to have
-fewer corners, the rest is for `SIDES`."""
-SIDES = 64
+fewer corners, the rest is for `CIRCLE_SIDES`."""
+CIRCLE_SIDES = 64
 """Number of sides of the polygon around a disc; its area exceeds the disc's by a share of 8e-4."""
 
 
@@ -260,7 +260,7 @@ def _turns_once(E: Array) -> bool:
 def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
     """Return whether a polygon shrinks to nothing when its edges move in by the radius."""
     extent = float(np.linalg.norm(np.ptp(polygon.corners, axis=0)))
-    slack = WIDTH * radius + FINE * extent
+    slack = RADIUS_ERROR * radius + EXTENT_ERROR * extent
     inner, outer = (
         clip(polygon.corners, polygon.E, polygon.b - radius - sign * slack) for sign in (-1.0, 1.0)
     )
@@ -269,7 +269,7 @@ def has_inscribed_radius(polygon: FlatPolygon, radius: float) -> bool:
 
 def holds_disc(polygon: FlatPolygon, border: FlatPolygon, center: Array, radius: float) -> bool:
     """Return whether a polygon covers a disc in a border, but for `LEFT_OUT` of its own area."""
-    disc = clip_to_disc(border.corners, center, radius, SIDES)
+    disc = clip_to_disc(border.corners, center, radius, CIRCLE_SIDES)
     if len(disc) == 0:
         return radius == 0.0
     held = clip(disc, polygon.E, polygon.b)

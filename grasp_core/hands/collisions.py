@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import compiled
-from grasp_core.frames import POSE
+from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.hand import PALM, SAME, Hand
 from grasp_core.hands.hand_arrays import HandArrays, SurfaceTree, hand_arrays, places
 from grasp_core.objects.polyhedron import Polyhedron
@@ -138,7 +138,7 @@ def _shapes(hand: Hand, joints: Array, palm_pose: Array) -> tuple[HandArrays, Ar
 
 def overlapping_pairs(hand: Hand, joints: Array) -> set[tuple[str, str]]:
     """Return the names of links, in order of the alphabet, that overlap at some joint angles."""
-    kernel, (arrays, turned, middles) = compiled(KERNEL), _shapes(hand, joints, np.eye(POSE))
+    kernel, (arrays, turned, middles) = compiled(KERNEL), _shapes(hand, joints, np.eye(POSE_SIZE))
     names = [PALM, *(link.name for link in hand.links)]
     found, way, point = set[tuple[str, str]](), np.empty(3), np.empty(3)
     for i, j in arrays.pairs.tolist():

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from grasp_core.arrays import Array, Indices, cross, frozen_copy, real_array
 from grasp_core.compiled import compiled
 from grasp_core.errors import InputError
-from grasp_core.frames import POSE
+from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.hand import PALM, SAME, Hand, HandFinger, LinkShape
 
 _Part: TypeAlias = tuple[int, LinkShape]  # a shape with the number of its link
@@ -283,10 +283,10 @@ def places(hand: Hand, joints: ArrayLike, palm_pose: ArrayLike | None = None) ->
         raise InputError(
             f"joints must have shape ({length},) or (n, {length}), got {np.shape(joints)}"
         )
-    pose = np.eye(POSE) if palm_pose is None else real_array(palm_pose, "palm_pose")
-    if pose.shape not in {(POSE, POSE), (count, POSE, POSE)}:
+    pose = np.eye(POSE_SIZE) if palm_pose is None else real_array(palm_pose, "palm_pose")
+    if pose.shape not in {(POSE_SIZE, POSE_SIZE), (count, POSE_SIZE, POSE_SIZE)}:
         raise InputError(f"palm_pose must have shape (4, 4) or ({count}, 4, 4), got {pose.shape}")
-    poses = np.broadcast_to(pose, (count, POSE, POSE))
+    poses = np.broadcast_to(pose, (count, POSE_SIZE, POSE_SIZE))
     R, p = np.empty((count, length, 3, 3)), np.empty((count, length, 3))
     W = np.empty_like(p)
     kernel = compiled("grasp_core.hands.collisions_kernel")

@@ -25,7 +25,7 @@ from grasp_core.closure.force_closure import ClosureCertificate
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.figures import Shown
-from grasp_core.frames import POSE
+from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.hand import Fingertip, Hand
 from grasp_core.hands.hand_arrays import places
 from grasp_core.hands.pose_search import Asked, contact_choices, find_pose, opened
@@ -64,7 +64,7 @@ class HandReach(Declared):
     """The hand's finger at each contact that is used, (k,)."""
     joints: Annotated[Annotated[Array, Shape("j")] | None, Field(alias="joints_rad")] = None
     """Joint angles in the order of `Hand.joints`, (j,) [rad]."""
-    palm_pose: Annotated[Array, Shape(POSE, POSE)] | None = None
+    palm_pose: Annotated[Array, Shape(POSE_SIZE, POSE_SIZE)] | None = None
     """Pose of the palm in the object's frame, (4, 4)."""
     certificate: ClosureCertificate | None = None
     """Proof that the k contacts that are reached are in force closure."""
@@ -200,7 +200,7 @@ def reach_with(  # noqa: PLR0913 - one keyword for each thing that may be asked
         reason, said = _why(found)
         return HandReach(hand.name, grasp.id, reason, said, found.total(), clearance_m)
     joints, way = opened(asked, found)
-    palm_pose = np.eye(POSE)
+    palm_pose = np.eye(POSE_SIZE)
     palm_pose[:3, :3], palm_pose[:3, 3] = found.pose.palm, found.pose.origin
     return HandReach(
         hand.name, grasp.id, "", "", found.starts, clearance_m, found.aims.fingers, found.pose.q,

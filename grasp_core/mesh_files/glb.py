@@ -19,23 +19,23 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.mesh_files.polygons import check_corners, too_many, unsupported
 
-HEAD = "<4sIIII"
+GLB_HEAD = "<4sIIII"
 JSON_CHUNK = 0x4E4F534A
 MOST_NODES = 10_000
 MOST_VALUES = 4_000_000
 """Largest number of JSON values allowed: each of them takes up to a quarter of a kilobyte."""
 MOST_SHARED = 4
 """Largest number of times, on average, that views and accessors may use each byte of a file."""
-PLAIN_EXTENSIONS = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
+PLAIN_PREFIXES = ("KHR_materials", "KHR_texture", "KHR_lights", "EXT_texture", "KHR_xmp")
 """Prefixes of glTF extensions that change only the appearance; files with others are refused."""
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 INDEX_TYPES, FLOAT_TYPE = (5121, 5123, 5125), 5126
 TRIANGLES, STRIP = 4, 5
 MODES = {TRIANGLES, STRIP}
-BELOW = {"mesh", "children"}
-MOTIONS = {"translation": 3, "rotation": 4, "scale": 3}
+NODE_REFERENCES = {"mesh", "children"}
+POSE_PARTS = {"translation": 3, "rotation": 4, "scale": 3}
 """Parts of a node's pose, with their counts of numbers."""
-Tree = dict[str, Any]
+JsonObject = dict[str, Any]
 """A JSON object of a glTF file, whose values are checked where they are used."""
 
 
@@ -53,9 +53,9 @@ def read_glb(data: bytes, most: int) -> tuple[Array, Indices]:
         raise ValueError(f"{type(error).__name__}: {error}") from error
 
 
-def _tree(data: bytes) -> Tree:
-    _, version, length, size, chunk = struct.unpack_from(HEAD, data)
-    start = struct.calcsize(HEAD)
+def _tree(data: bytes) -> JsonObject:
+    _, version, length, size, chunk = struct.unpack_from(GLB_HEAD, data)
+    start = struct.calcsize(GLB_HEAD)
     if version != 2 or length != len(data) or chunk != JSON_CHUNK:  # noqa: PLR2004
         raise ValueError(f"expected glTF 2 of {len(data)} bytes, JSON first; got {length} bytes")
     text = data[start : start + size]
@@ -65,16 +65,16 @@ def _tree(data: bytes) -> Tree:
     return json.loads(text.decode("utf-8"))
 
 
-def _check_features(tree: Tree) -> None:
+def _check_features(tree: JsonObject) -> None:
     """Refuse features that would change the shape and are not read."""
     buffers, nodes, accessors = (tree.get(name, []) for name in ("buffers", "nodes", "accessors"))
     parts = [part for mesh in tree.get("meshes", []) for part in mesh["primitives"]]
     names = map(str, (*tree.get("extensionsRequired", ()), *tree.get("extensionsUsed", ())))
     wrong = {
         "numbers outside the binary chunk": len(buffers) > 1 or any("uri" in b for b in buffers),
-        "compression": not all(name.startswith(PLAIN_EXTENSIONS) for name in names),
+        "compression": not all(name.startswith(PLAIN_PREFIXES) for name in names),
         "a skin or weights of morph targets": any({"skin", "weights"} & n.keys() for n in nodes),
-        "a camera with meshes": any("camera" in n and BELOW & n.keys() for n in nodes),
+        "a camera with meshes": any("camera" in n and NODE_REFERENCES & n.keys() for n in nodes),
         "morph targets or extensions": any("targets" in p or p.get("extensions") for p in parts),
         "lines, points or fans": not {part.get("mode", TRIANGLES) for part in parts} <= MODES,
         "sparse numbers": any("sparse" in a or "bufferView" not in a for a in accessors),
@@ -92,7 +92,7 @@ def _check_features(tree: Tree) -> None:
             raise ValueError("indices must be whole numbers without a sign")
 
 
-def _check_sizes(tree: Tree, size: int, most: int) -> None:
+def _check_sizes(tree: JsonObject, size: int, most: int) -> None:
     """Refuse numbers that would make trimesh reserve more memory than the file accounts for."""
     views, meshes, nodes = (tree.get(name, []) for name in ("bufferViews", "meshes", "nodes"))
     used = sum(_whole(view["byteLength"]) for view in views)
@@ -110,13 +110,15 @@ def _check_sizes(tree: Tree, size: int, most: int) -> None:
         raise ValueError(f"nodes must form a tree of at most {MOST_NODES} nodes")
 
 
-def _check_pose(node: Tree) -> None:
+def _check_pose(node: JsonObject) -> None:
     """Refuse a pose that trimesh would read as another one."""
     if "matrix" in node:
         columns = _numbers(node["matrix"], 16)[3::4]  # glTF lists matrices by columns
-        if MOTIONS.keys() & node.keys() or columns.tolist() != [0.0, 0.0, 0.0, 1.0]:
+        if POSE_PARTS.keys() & node.keys() or columns.tolist() != [0.0, 0.0, 0.0, 1.0]:
             raise ValueError("a node has a matrix of perspective, or a rotation beside its matrix")
-    given = {name: _numbers(node[name], count) for name, count in MOTIONS.items() if name in node}
+    given = {
+        name: _numbers(node[name], count) for name, count in POSE_PARTS.items() if name in node
+    }
     size = float(np.linalg.norm(given.get("rotation", 1.0)))
     if not 0.5 < size < 2.0:  # noqa: PLR2004 - rounding does not get there
         raise ValueError(f"a rotation is a quaternion of length {size:.3g}, expected 1")
@@ -156,12 +158,12 @@ def _numbers(given: list[Any], count: int) -> Array:
     return np.array(given, dtype=np.float64)
 
 
-def _roots(tree: Tree) -> list[int]:
+def _roots(tree: JsonObject) -> list[int]:
     scenes = tree.get("scenes")
     return _item(scenes, tree.get("scene", 0)).get("nodes", []) if scenes else []
 
 
-def _item(listed: list[Tree], place: object) -> Tree:
+def _item(listed: list[JsonObject], place: object) -> JsonObject:
     if type(place) is not int or not 0 <= place < len(listed):
         raise ValueError(f"it refers to item {str(place)[:40]} of a list of {len(listed)}")
     return listed[place]

@@ -10,9 +10,9 @@ from grasp_core.kinds import Count, Quantity
 from grasp_core.settings import Settings
 
 FaceKind: TypeAlias = Literal["auto", "planar", "patches"]
-FORMATS = ("obj", "stl", "ply", "off", "glb", "3mf")
+MESH_FORMATS = ("obj", "stl", "ply", "off", "glb", "3mf")
 """Endings of mesh files, which say their format."""
-Unit: TypeAlias = Literal["m", "cm", "mm", "um", "in", "ft"]
+LengthUnit: TypeAlias = Literal["m", "cm", "mm", "um", "in", "ft"]
 
 
 @declared
@@ -47,10 +47,10 @@ class PatchLimits(Settings):
 
 
 @declared
-class Lengths(Settings):
+class FileLengths(Settings):
     """What lengths the numbers of a mesh file mean."""
 
-    unit: Unit | None = None
+    unit: LengthUnit | None = None
     """Unit of length in a mesh file. If not given, it is the one that a 3MF file states, and the
     metre in other files."""
     scale: Quantity = 1.0

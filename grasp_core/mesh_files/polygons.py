@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
 
-CORNERS, QUAD = 3, 4
+TRIANGLE, QUAD = 3, 4
 FOLDED = 1e-9
 """A fan's triangle is folded back if its projection is below minus this share of the polygon."""
-FLATTEST = 0.5
+PROJECTED_SHARE = 0.5
 """Least area of a polygon projected along its normal, relative to the sum of its triangles."""
 
 
@@ -75,7 +75,7 @@ class Polygons:
 
     def add(self, corners: Sequence[int]) -> None:
         """Add one polygon."""
-        if len(corners) < CORNERS:
+        if len(corners) < TRIANGLE:
             raise ValueError(f"a face needs at least three corners, got {len(corners)}")
         self.triangles += len(corners) - 2
         if self.triangles > self.most:
@@ -88,11 +88,11 @@ class Polygons:
         flat, sizes = np.array(self.corners), np.array(self.sizes)
         check_corners(flat, len(points))
         first, before = np.cumsum(sizes) - sizes, np.cumsum(sizes - 2) - (sizes - 2)
-        triangles = np.empty((self.triangles, CORNERS), dtype=np.int64)
+        triangles = np.empty((self.triangles, TRIANGLE), dtype=np.int64)
         for size in np.unique(sizes):
             alike = sizes == size
             corners = flat[first[alike, None] + np.arange(size)]
-            if size > CORNERS and _ambiguous_fans(points[corners]).any():
+            if size > TRIANGLE and _ambiguous_fans(points[corners]).any():
                 message = "a face is dented or bent, so its shape is ambiguous; export triangles"
                 raise MeshError(MeshRefusal.POLYGON, message)
             rows = np.stack(
@@ -116,17 +116,17 @@ def _ambiguous_fans(corners: Array) -> NDArray[np.bool_]:
         length = np.linalg.norm(whole, axis=1)
         folds = (along < -FOLDED * length[:, None] ** 2).any(axis=1)
         winds = np.arctan2(areas, dots).sum(axis=1) > 2.0 * np.pi + FOLDED
-        flat = length < FLATTEST * areas.sum(axis=1)
+        flat = length < PROJECTED_SHARE * areas.sum(axis=1)
     return folds | winds | flat
 
 
 SINGLE = 2.0**-24
 """Largest rounding error of single precision, relative to a number."""
 FEWEST_DIGITS, ALL_DIGITS = 5, 17
-WRITTEN = 0.501
+WRITTEN_ERROR = 0.501
 """Largest error of a written number, in units of its last digit."""
 EXPONENT = re.compile(rb"[eE][+-]?\d+")
-SIGNS = b"+-."
+NUMBER_SIGNS = b"+-."
 FLOATS = 3
 
 
@@ -173,7 +173,7 @@ def most_digits(words: Iterable[bytes]) -> int:
     """Return the most significant digits of some numbers, zeros at the end of decimals included."""
     plain = EXPONENT.sub(b"", b" ".join(words)).split()
     plain = [word if b"." in word else word.rstrip(b"0") for word in plain]
-    digits = b" ".join(plain).translate(None, SIGNS).split()
+    digits = b" ".join(plain).translate(None, NUMBER_SIGNS).split()
     return max((len(each.lstrip(b"0")) for each in digits), default=0)
 
 
@@ -190,6 +190,6 @@ def single_rounding(points: Array, digits: int = 0) -> float:
     with np.errstate(all="ignore"):  # what is not finite is refused later
         sizes = np.abs(points)
         last = 10.0 ** (np.floor(np.log10(sizes)) + 1 - digits) if digits else np.zeros(())
-        if not (np.abs(points - points.astype(np.float32)) <= WRITTEN * last).all():
+        if not (np.abs(points - points.astype(np.float32)) <= WRITTEN_ERROR * last).all():
             return 0.0
     return SINGLE * float(np.abs(points).max(initial=0.0))

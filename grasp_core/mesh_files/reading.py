@@ -23,7 +23,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.errors import InputError, MeshError, MeshRefusal, about
 from grasp_core.files.text_files import bounded_bytes
 from grasp_core.mesh_files.glb import read_glb
-from grasp_core.mesh_files.limits import FORMATS, MeshLimits, Unit
+from grasp_core.mesh_files.limits import MESH_FORMATS, LengthUnit, MeshLimits
 from grasp_core.mesh_files.polygons import (
     Polygons,
     TextPoints,
@@ -39,11 +39,11 @@ BEGINNINGS = {"ply": b"ply", "glb": b"gltf"}
 STL_HEAD = 80
 STL_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 BYTE_ORDER_MARK, UTF_16 = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
-SHOWN = 100
+SHOWN_FAULT = 100
 """Largest number of characters of a fault that a message quotes."""
 
 
-class MeshFile(NamedTuple):
+class FileSurface(NamedTuple):
     """The surface that a mesh file holds, in the file's unit of length."""
 
     vertices: Array
@@ -51,17 +51,17 @@ class MeshFile(NamedTuple):
     rounding: float
     """Largest rounding error of a coordinate that the numbers of the file show; 0 if they show
     none."""
-    unit: Unit | None
+    unit: LengthUnit | None
     """Unit of length that the file states; None if its format has none."""
     data: bytes
 
 
-def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
+def read_triangles(path: Path, limits: MeshLimits) -> FileSurface:
     """Read a mesh file."""
     with about(path):
         kind = path.suffix.lower().lstrip(".")
-        if kind not in FORMATS:
-            message = f"the file's ending must be one of {', '.join(FORMATS)}, got {kind!r}"
+        if kind not in MESH_FORMATS:
+            message = f"the file's ending must be one of {', '.join(MESH_FORMATS)}, got {kind!r}"
             raise MeshError(MeshRefusal.FORMAT, message)
         try:
             data = bounded_bytes(path, limits.max_mesh_bytes)
@@ -87,7 +87,7 @@ def read_triangles(path: Path, limits: MeshLimits) -> MeshFile:
 
 def mesh_of_bytes(
     kind: str, data: bytes, most: int, room: int = MeshLimits().max_mesh_bytes
-) -> MeshFile:
+) -> FileSurface:
     """Read the bytes of a mesh file, unpacked at most as many as there is room, and judge them."""
     for other, beginning in BEGINNINGS.items():
         if other != kind and data[:4].lower().startswith(beginning):
@@ -97,7 +97,9 @@ def mesh_of_bytes(
         read = partial(read_3mf, room=room) if kind == "3mf" else partial(_surface, kind)
         points, triangles, rounding, unit = read(data, most)
     except (ValueError, OverflowError) as error:
-        fault = "".join(c if c.isascii() and c.isprintable() else "?" for c in str(error)[:SHOWN])
+        fault = "".join(
+            c if c.isascii() and c.isprintable() else "?" for c in str(error)[:SHOWN_FAULT]
+        )
         message = f"the file breaks the rules of {kind.upper()} ({fault}); export it again"
         raise MeshError(MeshRefusal.UNREADABLE, message) from error
     if not len(triangles):
@@ -105,7 +107,7 @@ def mesh_of_bytes(
     if not np.isfinite(points).all():
         message = "a coordinate is infinite, not a number, or too large; repair the mesh"
         raise MeshError(MeshRefusal.NON_FINITE, message)
-    return MeshFile(points, triangles, rounding, unit, data)
+    return FileSurface(points, triangles, rounding, unit, data)
 
 
 def _surface(kind: str, data: bytes, most: int) -> tuple[Array, Indices, float, None]:
@@ -149,7 +151,7 @@ Take: TypeAlias = Callable[[str, int], Sequence[Any]]
 """A function that takes the next values of a table, of types as `struct` writes them, (n,)."""
 
 
-class Column(NamedTuple):
+class PlyProperty(NamedTuple):
     """A property of a PLY table: one number, or one list of numbers, in each row."""
 
     name: str
@@ -158,12 +160,12 @@ class Column(NamedTuple):
     """The number type of a list's length; None if the column holds single numbers."""
 
 
-class Table(NamedTuple):
+class PlyElement(NamedTuple):
     """An element that the header announces, such as `vertex` or `face`."""
 
     name: str
     rows: int
-    columns: list[Column]
+    columns: list[PlyProperty]
 
 
 def read_ply(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
@@ -211,7 +213,7 @@ def _taken_numbers(body: io.BytesIO, order: str, kinds: str, _: int) -> Sequence
     return struct.unpack(order + kinds, taken)
 
 
-def _rows(table: Table, take: Take) -> Iterator[dict[str, Any]]:
+def _rows(table: PlyElement, take: Take) -> Iterator[dict[str, Any]]:
     """Yield the cells of each row by the names of columns; single numbers are taken together."""
     runs = [
         (counted, list(columns)) for counted, columns in groupby(table.columns, lambda c: c.counted)
@@ -232,7 +234,7 @@ def _rows(table: Table, take: Take) -> Iterator[dict[str, Any]]:
         yield cells
 
 
-def _round_to(column: Column, values: Array) -> None:
+def _round_to(column: PlyProperty, values: Array) -> None:
     """Round coordinates, (n,), to the number type that the header gives them."""
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         kept = values.astype(column.kind)
@@ -241,12 +243,12 @@ def _round_to(column: Column, values: Array) -> None:
     values[:] = kept
 
 
-def _ply_header(data: bytes) -> tuple[str, list[Table], int]:
+def _ply_header(data: bytes) -> tuple[str, list[PlyElement], int]:
     """Read the byte order, the tables, and the byte where the header ends."""
     found = PLY_END.search(data[:LONGEST_HEADER])
     if not found:
         raise ValueError("expected `end_header`")
-    order, tables = "", list[Table]()
+    order, tables = "", list[PlyElement]()
     for words in map(str.split, data[: found.start()].decode("ascii", "replace").splitlines()[1:]):
         match words:
             case ["comment" | "obj_info", *_] | []:
@@ -254,20 +256,20 @@ def _ply_header(data: bytes) -> tuple[str, list[Table], int]:
             case ["format", name, "1.0"] if name in PLY_ORDERS and not order:
                 order = PLY_ORDERS[name]
             case ["element", name, rows]:
-                tables.append(Table(name, whole(rows.encode()), []))
+                tables.append(PlyElement(name, whole(rows.encode()), []))
             case ["property", "list", count, kind, name] if tables and {count, kind} <= {
                 *PLY_TYPES
             }:
-                tables[-1].columns.append(Column(name, PLY_TYPES[kind], PLY_TYPES[count]))
+                tables[-1].columns.append(PlyProperty(name, PLY_TYPES[kind], PLY_TYPES[count]))
             case ["property", kind, name] if tables and kind in PLY_TYPES:
-                tables[-1].columns.append(Column(name, PLY_TYPES[kind], None))
+                tables[-1].columns.append(PlyProperty(name, PLY_TYPES[kind], None))
             case _:
                 raise ValueError(f"the header says {' '.join(words)[:40]!r}")
     _check_ply(order, tables)
     return order, tables, found.end()
 
 
-def _check_ply(order: str, tables: list[Table]) -> None:
+def _check_ply(order: str, tables: list[PlyElement]) -> None:
     """Refuse a header without one table of points and one of faces, or with names twice."""
     by_name = {table.name: table.columns for table in tables}
     points = [column.name for column in by_name.get("vertex", ()) if not column.counted]
@@ -284,11 +286,11 @@ def _check_ply(order: str, tables: list[Table]) -> None:
             raise ValueError("the length of a list must be a whole number")
 
 
-LONGEST_LINE = 2**20
+LONGEST_MESH_LINE = 2**20
 PADDING = b"\0\x1a"
 """Bytes that may follow the last line: zeros of a fixed length, and the end mark of old systems."""
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
-COMMENT = re.compile(rb"#[^\n]*")
+OBJ_COMMENT = re.compile(rb"#[^\n]*")
 OTHER_ALPHABETS = bytes(range(128)) + b"?" * 128
 OBJ_PASSED_OVER = frozenset(
     b"vt vn vp vc g o s usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj "
@@ -332,8 +334,8 @@ def plain_text(data: bytes) -> bytes:
 def worded_lines(text: bytes) -> Iterator[list[bytes]]:
     """Yield the words of each line that is not blank, one line at a time to save memory."""
     for line in io.BytesIO(text):
-        if len(line) > LONGEST_LINE:
-            raise ValueError(f"a line is longer than {LONGEST_LINE} bytes")
+        if len(line) > LONGEST_MESH_LINE:
+            raise ValueError(f"a line is longer than {LONGEST_MESH_LINE} bytes")
         if words := line.partition(b"#")[0].split():
             yield words
 
@@ -344,7 +346,7 @@ def read_obj(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
     if SWALLOWED.search(text):
         raise ValueError("a comment ends in a backslash before a `v` or `f` line")
     if GOES_ON in text:
-        text = COMMENT.sub(b"", text).replace(GOES_ON, b"")
+        text = OBJ_COMMENT.sub(b"", text).replace(GOES_ON, b"")
     points, polygons = TextPoints(), Polygons(most)
     for keyword, *words in worded_lines(text):
         if keyword == b"v":
@@ -398,7 +400,7 @@ def read_off(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
 
 def read_stl_text(data: bytes, most: int) -> tuple[TextPoints, Polygons]:
     """Read the corners of all solids of a text STL file; line breaks between words do not count."""
-    text, points, polygons = COMMENT.sub(b"", plain_text(data)), TextPoints(), Polygons(most)
+    text, points, polygons = OBJ_COMMENT.sub(b"", plain_text(data)), TextPoints(), Polygons(most)
     place, inside = 0, False
     while found := (STL_INSIDE if inside else STL_BEGIN).match(text, place):
         place = found.end()

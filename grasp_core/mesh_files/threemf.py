@@ -26,11 +26,11 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.errors import MeshError, MeshRefusal
-from grasp_core.mesh_files.limits import Unit
+from grasp_core.mesh_files.limits import LengthUnit
 from grasp_core.mesh_files.polygons import Polygons, TextPoints, too_many, unsupported, whole
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-PLAIN_EXTENSIONS = {
+PLAIN_NAMESPACES = {
     CORE,
     "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07",
     "http://schemas.microsoft.com/3dmanufacturing/material/2015/02",
@@ -40,7 +40,7 @@ PLAIN_EXTENSIONS = {
 production may also refer to objects in other files, which is refused where it does."""
 TRIANGLE_SETS = "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07 trianglesets"
 """The one element in a mesh that is passed over."""
-UNITS: dict[str, Unit] = {
+MODEL_UNITS: dict[str, LengthUnit] = {
     "micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"
 }  # fmt: skip
 USUAL_UNIT = "millimeter"
@@ -55,13 +55,13 @@ PARENTS = {
 SHAPING = {"object", "components", "component", "mesh", "vertices", "triangles", "build", "item"}
 """Elements in which one of an extension would change the shape."""
 FOREIGN = "of an extension"
-DEEPEST, MOST_NODES = 64, 10_000
+DEEPEST_ELEMENT, MOST_NODES = 64, 10_000
 """Largest depth of elements, and largest number of objects, components and items."""
 MODEL, RELATIONS = "3d/3dmodel.model", "_rels/.rels"
 """Usual name of the model, and that of the part that names it, in small letters."""
 IS_MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 BEGINNING, LISTED, MOST_PARTS = b"PK\3\4", b"PK\1\2", 10_000
-MOST_RELATIONS, CHUNK, LONGEST_TOKEN = 2**20, 2**16, 2**20
+MOST_RELATIONS, BYTES_AT_ONCE, LONGEST_TOKEN = 2**20, 2**16, 2**20
 """Largest number of bytes of the relations, of XML that is read at once, and of one token."""
 PACKED, ENCRYPTED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED), 1
 NOT_SOLID = re.compile(
@@ -69,30 +69,30 @@ NOT_SOLID = re.compile(
 )
 """Settings of slicers that make a part of a mesh a hole, a support, or a region of other settings.
 """
-SETTINGS = re.compile(r"metadata/[^/]*model[^/]*\.config")
+SLICER_SETTINGS = re.compile(r"metadata/[^/]*model[^/]*\.config")
 """Names of the parts in which slicers keep them."""
 Attributes: TypeAlias = dict[str, str]
 Start: TypeAlias = Callable[[str, Attributes], object]
-Placed: TypeAlias = tuple[int, Array]
+PosedObject: TypeAlias = tuple[int, Array]
 """The number of an object and its pose, (4, 4)."""
 
 
-class Model(NamedTuple):
+class BuiltSurface(NamedTuple):
     """The surface that a model builds, in its unit of length."""
 
     vertices: Array
     triangles: Indices
     rounding: float
-    unit: Unit
+    unit: LengthUnit
 
 
-def read_3mf(data: bytes, most: int, room: int) -> Model:
+def read_3mf(data: bytes, most: int, room: int) -> BuiltSurface:
     """Read what a 3MF file builds; its model may have as many bytes as there is room."""
     try:
         model = ModelPart(most)
         with zipfile.ZipFile(io.BytesIO(_checked(data))) as archive:
             parts = _parts(archive)
-            settings = [part for name, part in parts.items() if SETTINGS.fullmatch(name)]
+            settings = [part for name, part in parts.items() if SLICER_SETTINGS.fullmatch(name)]
             part = _model_part(archive, parts)
             _check_sizes([part, *settings], room)
             for each in settings:
@@ -175,7 +175,7 @@ def _parse(
     parser.StartNamespaceDeclHandler = prefix
     parser.StartDoctypeDeclHandler = _refuse_document_type
     read = 0
-    while piece := stream.read(CHUNK):
+    while piece := stream.read(BYTES_AT_ONCE):
         parser.Parse(piece, False)
         read += len(piece)
         if read - parser.CurrentByteIndex > LONGEST_TOKEN:
@@ -188,14 +188,14 @@ def _refuse_document_type(*_: object) -> None:
 
 
 @dataclass(slots=True)
-class Solid:
+class ModelObject:
     """One object: a mesh, or components."""
 
     kind: str
     """Type of the object, which is `model` for solids."""
     points: TextPoints
     polygons: Polygons
-    components: list[Placed] = field(default_factory=list[Placed])
+    components: list[PosedObject] = field(default_factory=list[PosedObject])
 
     def surface(self) -> tuple[Array, Indices, float]:
         """Return the vertices that triangles use, the triangles, and the coordinates' rounding."""
@@ -209,9 +209,11 @@ class ModelPart:
 
     def __init__(self, most: int) -> None:
         self.most = most
-        self.unit: Unit = UNITS[USUAL_UNIT]
-        self.solids, self.items = dict[int, Solid](), list[Placed]()
-        self.latest = Solid("", TextPoints(), Polygons(most))  # takes the tables that are read
+        self.unit: LengthUnit = MODEL_UNITS[USUAL_UNIT]
+        self.solids, self.items = dict[int, ModelObject](), list[PosedObject]()
+        self.latest = ModelObject(
+            "", TextPoints(), Polygons(most)
+        )  # takes the tables that are read
         self.seen, self.path = set[str](), [""]  # elements of the object, and those that are open
         self.prefixes = dict[str | None, str | None]()
         self.triangles = self.nodes = 0
@@ -239,8 +241,8 @@ class ModelPart:
                 raise ValueError("an object has two meshes or tables, or components beside a mesh")
             self.seen.add(own)
         self.path.append(own)
-        if len(self.path) > DEEPEST:
-            raise ValueError(f"elements are nested more than {DEEPEST} deep")
+        if len(self.path) > DEEPEST_ELEMENT:
+            raise ValueError(f"elements are nested more than {DEEPEST_ELEMENT} deep")
         if own in self.takers:
             self.takers[own](attributes)
 
@@ -252,11 +254,11 @@ class ModelPart:
     def model(self, attributes: Attributes) -> None:
         """Take the unit and the extensions that the model requires."""
         unit = attributes.get("unit", USUAL_UNIT)
-        if unit not in UNITS:
-            raise ValueError(f"the unit must be one of {', '.join(UNITS)}, got {unit[:20]}")
-        self.unit = UNITS[unit]
+        if unit not in MODEL_UNITS:
+            raise ValueError(f"the unit must be one of {', '.join(MODEL_UNITS)}, got {unit[:20]}")
+        self.unit = MODEL_UNITS[unit]
         for prefix in attributes.get("requiredextensions", "").split():
-            if self.prefixes.get(prefix) not in PLAIN_EXTENSIONS:
+            if self.prefixes.get(prefix) not in PLAIN_NAMESPACES:
                 said = f"the extension {self.prefixes.get(prefix, prefix)!a:.80}"
                 unsupported(said, "export plain triangles")
 
@@ -270,7 +272,7 @@ class ModelPart:
             unsupported("an object of slices", "export plain triangles")
         self.seen.clear()
         kind = attributes.get("type", "model")
-        self.latest = self.solids[number] = Solid(kind, TextPoints(), Polygons(self.most))
+        self.latest = self.solids[number] = ModelObject(kind, TextPoints(), Polygons(self.most))
 
     def vertex(self, attributes: Attributes) -> None:
         """Take a vertex of the object."""
@@ -300,7 +302,7 @@ class ModelPart:
         if self.nodes > MOST_NODES:
             raise ValueError(f"it has over {MOST_NODES} objects, components and items")
 
-    def built(self) -> Model:
+    def built(self) -> BuiltSurface:
         """Place the objects that the build names."""
         points, triangles = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
         surfaces = dict[int, tuple[Array, Indices, float]]()
@@ -314,9 +316,9 @@ class ModelPart:
             triangles.append(before + (rows[:, ::-1] if np.linalg.det(turn) < 0.0 else rows))
             rounding = max(rounding, off_by * float(np.abs(turn).sum(axis=0).max()))
             before += len(local)
-        return Model(np.vstack(points), np.vstack(triangles), rounding, self.unit)
+        return BuiltSurface(np.vstack(points), np.vstack(triangles), rounding, self.unit)
 
-    def _meshes(self) -> Iterator[Placed]:
+    def _meshes(self) -> Iterator[PosedObject]:
         """Yield the meshes of the build with their poses, in the order of the file."""
         ahead, placed = [(*item, 1) for item in reversed(self.items)], 0
         while ahead:
@@ -337,7 +339,7 @@ class ModelPart:
                 ahead.append((part, within @ pose, depth + 1))
 
 
-def _placed(attributes: Attributes) -> Placed:
+def _placed(attributes: Attributes) -> PosedObject:
     """Return the object that a component or an item names, and its pose."""
     if any(name.endswith(" path") for name in attributes):
         unsupported("an object in another file of the archive", "export it without splitting it up")

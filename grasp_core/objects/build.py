@@ -53,20 +53,27 @@ from grasp_core.objects.shells import (
     outward_sheets,
     wound_alike,
 )
-from grasp_core.objects.surface import SIDES, Face, Mesh, SoundSurface, Surface, components
+from grasp_core.objects.surface import (
+    TRIANGLES_AT_EDGE,
+    Face,
+    Mesh,
+    SoundSurface,
+    Surface,
+    components,
+)
 from grasp_core.objects.touching_parts import pulled_apart
 from grasp_core.values import FINGERS
 
 SMALLEST_EXTENT_M, LARGEST_EXTENT_M = 5e-4, 20.0
 """Ends of an object's extent [m]: beyond them, the unit of the file is almost surely wrong."""
-SURROUNDINGS = 1e-6
+OUTSIDE_BOX = 1e-6
 """Largest distance of a given centre of mass from the bounding box, relative to the extent."""
-MARGIN = 8.0
+CORNER_ROUNDINGS = 8.0
 """Number of rounding errors of a coordinate that a corner of a face may be off its plane: a corner
 may be off by the root of three, and a plane through three of them as far from a fourth by more."""
 COARSEST = 1e-3
 """Largest distance from a plane, over the extent, that rounding explains and shapes do not."""
-FLATTEST = 0.1
+LARGEST_FLATNESS = 0.1
 """Largest flatness over the extent: with much more, faces are one whose normals differ by far."""
 DEFAULT_LIMITS, DEFAULT_CHOICES = MeshLimits(), MeshChoices()
 
@@ -80,9 +87,9 @@ def build(
     extent = float(np.ptp(points[np.unique(corners)], axis=0).max())
     off = single_rounding(points) if rounding is None else rounding
     blur = known.flatness_m if known else _flatness(off, choices.flatness_m, extent)
-    if blur > FLATTEST * extent:
+    if blur > LARGEST_FLATNESS * extent:
         raise InputError(
-            f"flatness_m must be at most {FLATTEST:g} of the object's extent, which is "
+            f"flatness_m must be at most {LARGEST_FLATNESS:g} of the object's extent, which is "
             f"{extent:.6g} m, got {blur:.6g}"
         )
     found = sound_surface(Mesh(points, corners), blur, choices, known)
@@ -141,7 +148,7 @@ def _flatness(rounding: float, asked: float | None, extent: float) -> float:
     """Return the distance from a plane that rounding explains, 0 if next to nothing [m]."""
     if asked is not None:
         return asked
-    explained = min(MARGIN * rounding, COARSEST * extent)
+    explained = min(CORNER_ROUNDINGS * rounding, COARSEST * extent)
     return explained if explained > PLANAR * extent else 0.0
 
 
@@ -150,7 +157,7 @@ def _given_center(points: Array, center_of_mass: ArrayLike | None) -> Array | No
         return None
     center = frozen(center_of_mass, (3,), "center_of_mass")
     low, high = points.min(axis=0), points.max(axis=0)
-    slack = SURROUNDINGS * float((high - low).max())
+    slack = OUTSIDE_BOX * float((high - low).max())
     if (center < low - slack).any() or (center > high + slack).any():
         raise InputError(
             f"center_of_mass {center.tolist()} must be inside the object, from {low.tolist()} "
@@ -270,7 +277,7 @@ def mass_properties(solid: Mesh, center: Array | None = None) -> tuple[float, Ar
 
 KNOWN = 0.02
 """Largest share of the volume that closed holes may hide, for the volume to count as known."""
-FLAT = 1e-9
+CRACK_AREA = 1e-9
 """Area of a loop, over its width squared, below which it is a crack between triangles."""
 WELD = 1e-8
 """Distance below which vertices are joined, relative to the extent: single precision in a file
@@ -349,7 +356,7 @@ def _without_repeats(mesh: Mesh) -> Mesh:
         return once
     if not mesh.edges.balance.any():
         return mesh
-    return either if (either.edges.uses == SIDES).all() else once
+    return either if (either.edges.uses == TRIANGLES_AT_EDGE).all() else once
 
 
 def _capped(mesh: Mesh, surface: Surface) -> tuple[Mesh, Surface]:
@@ -411,7 +418,7 @@ def _cap(points: Array, loop: list[int]) -> Indices:
     spokes = places - places.mean(axis=0)
     normal = np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
     length, size = float(np.linalg.norm(normal)), float(np.ptp(places, axis=0).max())
-    if len(loop) == 3 or length <= FLAT * size**2:  # noqa: PLR2004
+    if len(loop) == 3 or length <= CRACK_AREA * size**2:  # noqa: PLR2004
         return numbers[fan]
     flat: Array = spokes @ plane_frame(normal / length)
     found = triangulate([flat])
@@ -464,9 +471,9 @@ def welded(mesh: Mesh, reach: float | None = None) -> tuple[Mesh, int]:
 GENERAL = np.array([0.41421, 0.56714, 0.69315])
 """Direction of the line on which points are projected, perpendicular to no face that parts usually
 have. It is shorter than one, so that projections are closer together than points."""
-CROWDED = 64
+MOST_NEIGHBOURS = 64
 """Largest number of neighbours on the line that are compared with a point one by one."""
-MOST_LINKS = 100
+LINKS_PER_POINT = 100
 """Largest number of links per point."""
 
 
@@ -485,7 +492,7 @@ def close_pairs(points: Array, reach: float) -> Indices:
         near = shadows[order[step:]] - shadows[order[:-step]] <= reach
         if not near.any():
             break
-        if step > CROWDED:
+        if step > MOST_NEIGHBOURS:
             links.append(order[_pairs_of_tree(points[order], reach)])
             break
         pairs = np.column_stack([order[:-step][near], order[step:][near]])
@@ -498,9 +505,9 @@ def _pairs_of_tree(points: Array, reach: float) -> Indices:
     spatial: Any = importlib.import_module("scipy.spatial")
     tree = spatial.KDTree(points)
     pairs = (int(tree.count_neighbors(tree, reach)) - len(points)) // 2
-    if pairs > MOST_LINKS * len(points):
+    if pairs > LINKS_PER_POINT * len(points):
         raise InputError(
-            f"{pairs} pairs of points are within {reach:.3g} of each other, more than {MOST_LINKS} "
-            "per point; merge points that coincide first"
+            f"{pairs} pairs of points are within {reach:.3g} of each other, more than "
+            f"{LINKS_PER_POINT} per point; merge points that coincide first"
         )
     return np.asarray(tree.query_pairs(reach, output_type="ndarray"), dtype=np.int64)

@@ -20,6 +20,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.geometry.polygons import (
     FEWEST_CORNERS,
     MOST_CORNERS,
+    SAME_CORNER,
     clip,
     convex_hull,
     convex_polygon,
@@ -32,10 +33,10 @@ from grasp_core.objects.booleans import inset_figure, triangulate
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import Face
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
-from grasp_core.solvers.ties import graded
+from grasp_core.solvers.ties import first_best, graded
 from grasp_core.values import FINGERS
 
-THINNEST = 1e-6
+LEAST_INRADIUS = 1e-6
 """Least radius of the largest disc in a piece that can hold a contact (object size one)."""
 SOUND = 1e-9
 """Largest disagreement of a piece's fields that counts as rounding, relative to a small piece."""
@@ -92,6 +93,10 @@ class FacePiece(Declared):
         """Return the point in space, (3,), with plane coordinates `y`, (2,)."""
         return self.origin + self.frame @ y
 
+    def places(self, corners: Array) -> Array:
+        """Return the points in space, (c, 3), with plane coordinates `corners`, (c, 2)."""
+        return self.origin + corners @ self.frame.T
+
     def in_plane(self, point: Array) -> Array:
         """Return the plane coordinates, (2,), of a point of the plane, (3,)."""
         return self.frame.T @ (point - self.origin)
@@ -133,7 +138,7 @@ def shape_of(pieces: Sequence[FacePiece]) -> FaceShape:
     first = pieces[0]
     if len(pieces) == 1:
         return FaceShape((first,), first)
-    points = np.vstack([piece.origin + piece.corners @ piece.frame.T for piece in pieces])
+    points = np.vstack([piece.places(piece.corners) for piece in pieces])
     corners = convex_hull((points - first.origin) @ first.frame)
     E, b = edge_rows(corners)
     inradius = inscribed_radius(E, b)
@@ -153,6 +158,11 @@ def choices_near(
     every = product(*(range(len(each)) for each in ranked))
     ranks = sorted(every, key=lambda rank: (sum(rank), rank))[:most]
     return [tuple(each[place] for each, place in zip(ranked, rank, strict=True)) for rank in ranks]
+
+
+def deepest(pieces: Sequence[FacePiece], point: Array) -> FacePiece:
+    """Return the piece of a face that a point is deepest in, the first of equal ones."""
+    return pieces[first_best([piece.inset(point) for piece in pieces], SAME_CORNER)]
 
 
 def inset_piece(piece: FacePiece, inset: float) -> FacePiece:
@@ -177,7 +187,7 @@ def pieces_by_face(body: Polyhedron) -> tuple[tuple[FacePiece, ...], ...]:
             piece_of(index, face.normal, polygon, face.spread, face.depth / body.radius)
             for polygon in polygons
         )
-        found.append(tuple(piece for piece in pieces if piece.inradius > THINNEST))
+        found.append(tuple(piece for piece in pieces if piece.inradius > LEAST_INRADIUS))
     return tuple(found)
 
 
@@ -203,7 +213,7 @@ def inscribed_radius(E: Array, b: Array) -> float:
     return max(best.value, 0.0) if isinstance(best, Optimum) else 0.0  # thin pieces round to -1e-13
 
 
-SAME_LENGTH = 1.0 - 1e-6
+LONGEST_SHARE = 1.0 - 1e-6
 """Share of the largest length from which two count as equal; the first of equal ones is taken."""
 
 
@@ -241,7 +251,7 @@ def _halves(face: Face, apart: float) -> list[Face]:
     # along the line between the two corners that are farthest apart
     border = (face.polygon - face.centroid) @ frame
     gaps = np.linalg.norm(border[:, None] - border[None], axis=2)
-    i, j = np.argwhere(gaps >= SAME_LENGTH * gaps.max())[0]
+    i, j = np.argwhere(gaps >= LONGEST_SHARE * gaps.max())[0]
     along = (border[j] - border[i]) / gaps[i, j]
     heights = np.concatenate(pieces) @ along
     middle = 0.5 * float(heights.min() + heights.max())

@@ -32,13 +32,13 @@ from grasp_core.values import Contact, Grasp
 
 ON_FACE = 1e-6
 """Largest distance of a contact from its face [object radii]: six digits of a file keep it."""
-ROUNDED = 1e-3
+MESH_ROUNDING = 1e-3
 """Most that the rounding of a mesh adds to that [object radii]: a larger flatness is the user's."""
 
 
 def on_face_slack(body: Polyhedron) -> float:
     """Return the distance within which a point is on a face [m], also where its mesh is rounded."""
-    return max(ON_FACE * body.radius, min(body.surface.flatness_m, ROUNDED * body.radius))
+    return max(ON_FACE * body.radius, min(body.surface.flatness_m, MESH_ROUNDING * body.radius))
 
 
 def check_body(body: Polyhedron) -> None:
@@ -174,7 +174,7 @@ LEAN = math.cos(3e-3)
 flat to within `planar_faces.ANGLE`, and files keep six digits."""
 
 
-class Surface:
+class SolidSurface:
     """The surface of a closed triangle mesh whose triangles face outwards."""
 
     def __init__(self, vertices: Array, triangles: Indices) -> None:

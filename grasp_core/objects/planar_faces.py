@@ -66,7 +66,7 @@ FITS = 3
 face with rounded corners."""
 
 
-BESIDE = 4.0
+ACROSS_SLIVERS = 4.0
 """Distance of faces that slivers part, in distances that are in a plane."""
 LIKE = 0.99
 """Cosine of the largest angle of planes that are compared further."""
@@ -112,7 +112,7 @@ def coplanar_groups(
         caps,
     )
     every = list(islice(found, None if most is None else most + 1))
-    groups = _bridged(mesh, every, fit, sliver, BESIDE * distance)
+    groups = _bridged(mesh, every, fit, sliver, ACROSS_SLIVERS * distance)
     return sorted(map(np.sort, groups), key=lambda group: int(group[0]))
 
 
@@ -351,7 +351,7 @@ def _patch(surface: Mesh, group: Indices, normal: Array, gap: float) -> tuple[fl
     return float((b - E @ centroid).min()), face
 
 
-ROUNDS = 5
+FITTING_ROUNDS = 5
 SLENDEREST = 1e-5
 """Least width of a polygon that grows further, relative to its length: places that are stretched to
 a disc are rounded by some 1e-16 of the length divided by this, which must be well below the gap."""
@@ -374,7 +374,7 @@ def clearing(start: Array, segments: Array, gap: float) -> Array | None:
     low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     best, middle, stretch = None, start, np.eye(2)
-    for _ in range(ROUNDS):
+    for _ in range(FITTING_ROUNDS):
         polygon = _cut(box, middle, segments, stretch, gap)
         least = 0.0 if best is None else surpassing(signed_area(best))
         if len(polygon) < 3 or signed_area(polygon) <= least:  # noqa: PLR2004

@@ -22,7 +22,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, MeshError, MeshRefusal, about
 from grasp_core.kinds import LARGEST, Quantity, instance, one_of, path_of, value_of
 from grasp_core.mesh_files.limits import FaceKind, MeshChoices, MeshLimits, PatchLimits
-from grasp_core.mesh_files.reading import MeshFile, read_triangles
+from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.messages import shown
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.build import DEFAULT_CHOICES, DEFAULT_LIMITS, build
@@ -214,7 +214,7 @@ def load_polyhedron(  # noqa: PLR0913 - one keyword for each way to take a mesh
         )
 
 
-def _unit_of(mesh: MeshFile, given: str | None) -> str:
+def _unit_of(mesh: FileSurface, given: str | None) -> str:
     """Return the unit of a mesh file: as it states, as it is given, or the metre."""
     if mesh.unit is not None and given not in (None, mesh.unit):
         message = (
@@ -246,7 +246,7 @@ def polyhedron_from_mesh(  # noqa: PLR0913 - what is known of a mesh, a keyword 
 FLUSH = 1e-6
 """Largest depth of a triangle's centroid below the surface of the convex hull, in object radii: ten
 times the error of coordinates in single precision."""
-BLOCK = 256
+TRIANGLES_AT_ONCE = 256
 """Number of triangles compared with all facets at a time, which needs a few megabytes."""
 
 
@@ -256,8 +256,8 @@ def is_convex(body: Polyhedron) -> bool:
     points = (body.vertices - body.center_of_mass) / body.radius
     facets: Array = spatial.ConvexHull(points).equations
     centroids = points[body.triangles].mean(axis=1)
-    for start in range(0, len(centroids), BLOCK):
-        depths = -(centroids[start : start + BLOCK] @ facets[:, :3].T + facets[:, 3])
+    for start in range(0, len(centroids), TRIANGLES_AT_ONCE):
+        depths = -(centroids[start : start + TRIANGLES_AT_ONCE] @ facets[:, :3].T + facets[:, 3])
         if (depths.min(axis=1) > FLUSH).any():
             return False
     return True

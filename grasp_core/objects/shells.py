@@ -41,19 +41,19 @@ from grasp_core.objects.booleans import Solid, gap_between, intersection_volume,
 from grasp_core.objects.planar_faces import PLANAR, planar_slack
 from grasp_core.objects.surface import (
     NO_CAPS,
-    Edges,
     Mesh,
+    MeshEdges,
     SoundSurface,
     components,
     crosses_of,
 )
 from grasp_core.objects.touching_parts import pressed_together, widest_gap
 
-OVERLAP = 1e-6
+OVERLAP_SHARE = 1e-6
 """Volume shared by two parts, over the whole, above which they overlap and not only touch."""
-SMALL = 0.01
+SMALL_SHARE = 0.01
 """Largest share of the surface that is left out without being asked for."""
-APART = 0.5
+TOUCHING_SHARE = 0.5
 """Largest distance of faces that touch, over that within which corners count as in one plane."""
 PRESSED = 0.25
 """Depth to which touching faces are pressed into each other, over the same distance."""
@@ -61,9 +61,9 @@ NEARLY = 1e-3
 """Largest gap between solids that are nearly one, over the extent."""
 CLEAN = 1e-4
 """Largest share of a union's surface beside slits as thin as rounding; sound ones show 1e-6."""
-THINNEST = 1e-9
+LEAST_VOLUME = 1e-9
 """Least volume of a solid, relative to the cube of the extent."""
-THIN = 4e-6
+SLIT_WIDTH = 4e-6
 """Width of a slit, relative to the extent, which rounding in single precision may leave."""
 
 
@@ -134,7 +134,7 @@ def _of_many(
     """Return the one body to use, the share of the area left out, and what else was changed."""
     said = list[str]()
     area = sum(shell.area for shell in shells)
-    slack = OVERLAP * abs(found.volume)
+    slack = OVERLAP_SHARE * abs(found.volume)
     bodies, bad, why = _sorted_out(shells, slack, said)
     if not bodies and why is not None:
         raise why
@@ -149,7 +149,7 @@ def _of_many(
             "file, or use the largest alone (--largest-part)",
         )
     dropped = sum(body.area for body in (*apart, *bad)) / area
-    if why is not None and dropped > SMALL and not largest_part:
+    if why is not None and dropped > SMALL_SHARE and not largest_part:
         raise why
     if apart or bad:
         said.append(left_out(len(apart) + len(bad), dropped))
@@ -165,7 +165,7 @@ def _sorted_out(
     shells: list[_Body], slack: float, said: list[str]
 ) -> tuple[list[_Body], list[_Body], MeshError | None]:
     """Give each cavity to its body; return bodies, parts that cannot be used, and the reason."""
-    flat = [s for s in shells if abs(s.volume) <= THINNEST * s.extent**3]
+    flat = [s for s in shells if abs(s.volume) <= LEAST_VOLUME * s.extent**3]
     bodies = [s for s in shells if s not in flat and s.volume > 0.0]
     bad: list[_Body] = flat
     why: MeshError | None = None
@@ -223,12 +223,12 @@ def _united(bodies: list[_Body], found: SoundSurface, said: list[str]) -> list[_
     """Unite bodies that overlap or touch; those that do not are returned as they are."""
     if len(bodies) == 1:
         return bodies
-    extent, slack = found.extent, OVERLAP * abs(found.volume)
-    reach = APART * planar_slack(extent, found.surface.flatness_m)
+    extent, slack = found.extent, OVERLAP_SHARE * abs(found.volume)
+    reach = TOUCHING_SHARE * planar_slack(extent, found.surface.flatness_m)
     united, pairs = _union(bodies, slack), list[tuple[int, int]]()
     # exact faces unite as they are; those that are off by rounding need to overlap
-    if len(united) > 1 or reach > THIN * extent or _slitted(united):
-        places, pairs = pressed_together(bodies, max(THIN * extent, reach), PRESSED * reach)
+    if len(united) > 1 or reach > SLIT_WIDTH * extent or _slitted(united):
+        places, pairs = pressed_together(bodies, max(SLIT_WIDTH * extent, reach), PRESSED * reach)
         pressed = [replace(each, vertices=at) for each, at in zip(bodies, places, strict=True)]
         groups = _joined_by(pairs, bodies, united)
         united = _union(pressed, slack) if pairs else united
@@ -273,7 +273,7 @@ def _on_gaps(bodies: list[_Body], extent: float) -> str:
         return ""
     return (
         f"take faces that are up to {1e3 * gap:.2g} mm apart for touching (--flatness-m "
-        f"{1.1 * gap / APART:.1e}), or "
+        f"{1.1 * gap / TOUCHING_SHARE:.1e}), or "
     )
 
 
@@ -287,7 +287,7 @@ def _on_edges(bodies: list[_Body], extent: float) -> str:
 
 def check_volume(solid: Mesh) -> None:
     """Refuse a solid that encloses almost no volume."""
-    if abs(solid.volume) < THINNEST * solid.extent**3:
+    if abs(solid.volume) < LEAST_VOLUME * solid.extent**3:
         message = f"the mesh encloses only {solid.volume:.3g} m^3; close it around a solid"
         raise MeshError(MeshRefusal.ZERO_VOLUME, message)
 
@@ -297,7 +297,7 @@ def keep_out_of_voids(found: SoundSurface) -> SoundSurface:
     label, sizes = found.connected, np.linalg.det(found.corners - found.vertices.mean(axis=0))
     volumes = np.bincount(label, weights=sizes) / 6.0
     is_open = np.bincount(label, weights=(found.across < 0).any(axis=1)) > 0.0
-    is_void = ~is_open & (volumes < -THINNEST * found.extent**3)
+    is_void = ~is_open & (volumes < -LEAST_VOLUME * found.extent**3)
     if not is_void.any():
         return found
     count, volume = int(is_void.sum()), -1e6 * float(volumes[is_void].sum())
@@ -310,13 +310,13 @@ def keep_out_of_voids(found: SoundSurface) -> SoundSurface:
 
 
 def thin_share(solid: Solid) -> float:
-    """Return the share of the surface that is beside slits or walls thinner than `THIN`.
+    """Return the share of the surface that is beside slits or walls thinner than `SLIT_WIDTH`.
 
     Solved: a solid that is moved by a step along an axis leaves a volume of the step times the area
     that it shows along the axis, each wall counted, less what slits and walls thinner than the step
     hide. The largest share of the three axes is returned.
     """
-    step = THIN * solid.extent
+    step = SLIT_WIDTH * solid.extent
     seen = 0.25 * np.abs(crosses_of(solid.corners)).sum(axis=0)
     left = [
         solid.volume - intersection_volume(solid, solid.moved(step * axis)) for axis in np.eye(3)
@@ -326,15 +326,15 @@ def thin_share(solid: Solid) -> float:
 
 CERTAIN = 0.4
 """Least mean winding number on an open surface that is taken for outward: half a ball has 0.3."""
-NEAR = 0.25
+NEAR_HALF = 0.25
 """Largest distance from 1/2 of the winding number on a part that bounds the solid."""
 
 
 def check_bounds(surface: Mesh) -> None:
     """Refuse a closed surface if more than next to nothing of it does not bound the solid."""
     winding = winding_on(surface.corners, sampled(surface.areas))
-    off = float((np.abs(winding - 0.5) > NEAR).mean())
-    if off > SMALL:
+    off = float((np.abs(winding - 0.5) > NEAR_HALF).mean())
+    if off > SMALL_SHARE:
         raise _crossing(off)
 
 
@@ -348,7 +348,7 @@ def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
         label = np.zeros(len(mesh.triangles), np.int64)
     sizes = np.bincount(label, weights=mesh.areas)
     winding = _winding_of_parts(mesh, label)
-    turn = winding * (1.0 if sizes @ winding > 0.0 else -1.0) < -NEAR
+    turn = winding * (1.0 if sizes @ winding > 0.0 else -1.0) < -NEAR_HALF
     turn ^= bool(sizes @ winding < 0.0)
     if turn.any():
         turned = np.where(turn[label][:, None], mesh.triangles[:, ::-1], mesh.triangles)
@@ -356,12 +356,12 @@ def outward_sheets(found: SoundSurface, *, largest_part: bool) -> SoundSurface:
         winding = _winding_of_parts(mesh, label)
         said.append(f"{int(turn.sum())} of {len(sizes)} parts of the open surface were inside out; "
                     "their triangles were turned")  # fmt: skip
-    sound = np.abs(winding - 0.5) <= NEAR
+    sound = np.abs(winding - 0.5) <= NEAR_HALF
     mean = float(sizes @ winding / sizes.sum())
     unsound = float(sizes[~sound].sum()) / whole
-    if unsound > SMALL and mean > CERTAIN:
+    if unsound > SMALL_SHARE and mean > CERTAIN:
         raise _crossing(unsound)
-    if unsound > SMALL or not mean >= CERTAIN:
+    if unsound > SMALL_SHARE or not mean >= CERTAIN:
         raise MeshError(
             MeshRefusal.OPEN,
             "the surface is open, and it is not certain which side is inside: the mean winding "
@@ -401,7 +401,7 @@ def _crossing(share: float) -> MeshError:
 MOST_ANGLES = 2_000_000
 """Largest number of solid angles that are computed for one mesh."""
 FEWEST_SAMPLES, MOST_SAMPLES = 32, 256
-BLOCK = 20_000
+ANGLES_AT_ONCE = 20_000
 """Number of solid angles computed at a time, which stays in the processor's cache."""
 
 
@@ -416,7 +416,7 @@ def sampled(areas: Array) -> Indices:
 def winding_on(corners: Array, places: Indices) -> Array:
     """Compute the mean winding number of both sides of triangles, at their middles, (s,)."""
     found = np.zeros(len(places))
-    step = max(BLOCK // len(corners), 1)
+    step = max(ANGLES_AT_ONCE // len(corners), 1)
     axes = np.ascontiguousarray(corners.transpose(2, 1, 0))
     for start in range(0, len(places), step):
         asked = places[start : start + step]
@@ -445,7 +445,7 @@ def solid_angles(axes: Array, points: Array) -> Array:
 
 def wound_alike(corners: Indices, areas: Array) -> tuple[Indices, NDArray[np.bool_]] | None:
     """Wind triangles as most of their part by area; also say which turned. None if one-sided."""
-    edges = Edges.of(corners)
+    edges = MeshEdges.of(corners)
     across, against = edges.neighbours(), edges.against[edges.place].reshape(-1, 3)
     # each triangle counts twice, as it is and turned; those that are wound alike are linked
     inner, count = across >= 0, len(corners)

@@ -51,10 +51,10 @@ FLIP = np.array([1.0, 1.0, -1.0])
 """Signs of the coordinates in the mirror image: only z changes its sign, which is exact."""
 CELL_DIGITS = 6
 """Digits to which lengths (object size one) and cosines are compared."""
-SHORTEST = 1e-3
+LEAST_DIRECTION = 1e-3
 """Least distance of a corner from its face's centre that gives a direction [object radii]."""
 
-Cells: TypeAlias = tuple[float, ...]
+GridCells: TypeAlias = tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,18 +153,18 @@ def _rarest_flags(body: Polyhedron) -> Iterator[tuple[int, int]]:
         (face, corner, cells)
         for face in (place for place, kind in enumerate(kinds) if kind == rarest)
         for corner, cells in enumerate(_graded(corners[face]))
-        if corners[face][corner, 0] > SHORTEST
+        if corners[face][corner, 0] > LEAST_DIRECTION
     ]
     rarest = _rarest([cells for *_, cells in flags])
     return ((face, corner) for face, corner, cells in flags if cells == rarest)
 
 
-def _rarest(kinds: Sequence[Cells]) -> Cells:
+def _rarest(kinds: Sequence[GridCells]) -> GridCells:
     """Return the kind that occurs least often; of equally rare kinds, the first in order."""
     return min(((count, kind) for kind, count in Counter(kinds).items()), default=(0, ()))[1]
 
 
-def _graded(rows: Array) -> list[Cells]:
+def _graded(rows: Array) -> list[GridCells]:
     return list(map(tuple, graded(rows, CELL_DIGITS).tolist()))
 
 
@@ -216,11 +216,11 @@ of the object, in object radii: files that keep five digits stay within it."""
 SAME_GRASP = 1e-3
 """Largest distance between contacts or foci of two copies, in object radii, and between directions
 of their normals and force cones: a picture of this object shows no smaller one."""
-FAR = 4.0
+FAR_FOCUS = 4.0
 """Distance from which foci are compared by direction, to the same share of it [object radii]."""
-MOST_FACES = 200
+MOST_SYMMETRIC_FACES = 200
 """Largest number of faces of objects whose symmetries are looked for, as for exact planning."""
-CROWDED = 300
+TREE_FROM = 300
 """Number of vertices above which a search tree finds the nearest ones: comparing each with each
 takes a hundred megabytes at two thousand, for every candidate."""
 ORDERS = np.array(list(itertools.permutations(range(FINGERS))))
@@ -256,7 +256,7 @@ class Copies:
 def symmetries(body: Polyhedron) -> Symmetries:
     """Find rotations and reflections of an object; of a curved or finely cut one, the identity."""
     alone = Symmetries(np.eye(3)[None], np.empty((0, 3, 3)))
-    if body.patches is not None or len(body.faces) > MOST_FACES:
+    if body.patches is not None or len(body.faces) > MOST_SYMMETRIC_FACES:
         return alone
     flags = _flags(body)
     if not flags:
@@ -342,9 +342,9 @@ class _Traits:
 
 
 def _near(points: Array) -> Array:
-    """Move points beyond `FAR` to that distance: farther ones count by their direction."""
+    """Move points beyond `FAR_FOCUS` to that distance: farther ones count by their direction."""
     lengths = np.linalg.norm(points, axis=1, keepdims=True)
-    return points * np.minimum(1.0, FAR / np.maximum(lengths, FAR))
+    return points * np.minimum(1.0, FAR_FOCUS / np.maximum(lengths, FAR_FOCUS))
 
 
 def _flags(body: Polyhedron) -> list[Array]:
@@ -357,7 +357,7 @@ def _flags(body: Polyhedron) -> list[Array]:
         (face, corner, lengths)
         for face in (chosen, *(face for face in np.flatnonzero(alike[chosen]) if face != chosen))
         for corner, lengths in enumerate(corners[face])
-        if lengths[0] > SHORTEST
+        if lengths[0] > LEAST_DIRECTION
     ]
     return [
         flag_frame(body, int(face), corner)
@@ -368,7 +368,7 @@ def _flags(body: Polyhedron) -> list[Array]:
 
 def _is_matched(images: Array, rows: Array) -> bool:
     """Return whether images (n, d) are each near a row (n, d), no two of them near the same."""
-    if len(rows) > CROWDED:
+    if len(rows) > TREE_FROM:
         spatial: Any = importlib.import_module("scipy.spatial")
         apart, nearest = spatial.KDTree(rows).query(images, p=np.inf)
     else:

@@ -22,7 +22,7 @@ from grasp_core.errors import MeshError, MeshRefusal
 from grasp_core.kinds import LARGEST, NotNegative, Number
 from grasp_core.values import RIGHT_ANGLE
 
-SIDES = 2
+TRIANGLES_AT_EDGE = 2
 """Number of triangles that meet at an edge of a closed surface."""
 NO_CAPS = np.empty(0, dtype=np.int64)
 
@@ -87,9 +87,9 @@ class Mesh:
         return float(np.linalg.det(corners).sum()) / 6.0
 
     @cached_property
-    def edges(self) -> "Edges":
+    def edges(self) -> "MeshEdges":
         """The edges of the triangles."""
-        return Edges.of(self.triangles)
+        return MeshEdges.of(self.triangles)
 
     @cached_property
     def across(self) -> Indices:
@@ -152,7 +152,7 @@ class Mesh:
         return found
 
 
-class Edges(NamedTuple):
+class MeshEdges(NamedTuple):
     """The edges between the vertices of triangles, and how the triangles run along them."""
 
     corners: Indices  # vertex indices of the triangles, (t, 3)
@@ -161,7 +161,7 @@ class Edges(NamedTuple):
     balance: Indices  # how many more run along an edge to the higher vertex than back, (e,)
 
     @classmethod
-    def of(cls, corners: Indices) -> "Edges":
+    def of(cls, corners: Indices) -> "MeshEdges":
         """Number the edges of triangles."""
         tail, head = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
         names = np.minimum(tail, head) * (int(corners.max()) + 1) + np.maximum(tail, head)
@@ -173,12 +173,14 @@ class Edges(NamedTuple):
     @property
     def against(self) -> NDArray[np.bool_]:
         """Which edges two triangles run along in the same direction, (e,)."""
-        return (self.uses == SIDES) & (self.balance != 0)
+        return (self.uses == TRIANGLES_AT_EDGE) & (self.balance != 0)
 
     def neighbours(self) -> Indices:
         """Find the one triangle across each edge, (t, 3); -1 if there is none, or several."""
         order = np.argsort(self.place, kind="stable")
-        paired = order[(self.uses == SIDES)[self.place[order]]].reshape(-1, SIDES)
+        paired = order[(self.uses == TRIANGLES_AT_EDGE)[self.place[order]]].reshape(
+            -1, TRIANGLES_AT_EDGE
+        )
         across = np.full(len(self.place), -1, dtype=np.int64)
         across[paired[:, 0]], across[paired[:, 1]] = paired[:, 1] // 3, paired[:, 0] // 3
         return across.reshape(-1, 3)
@@ -204,8 +206,8 @@ class Edges(NamedTuple):
                 "sound parts (--faces patches) with the volume of the convex hull"
             )
             return MeshError(MeshRefusal.OPEN, message)
-        if (self.uses != SIDES).any():
-            edge = int(np.argmax(self.uses != SIDES))
+        if (self.uses != TRIANGLES_AT_EDGE).any():
+            edge = int(np.argmax(self.uses != TRIANGLES_AT_EDGE))
             row, side = divmod(int(np.argmax(self.place == edge)), 3)
             ends = sorted((int(self.corners[row, side]), int(self.corners[row, (side + 1) % 3])))
             message = (

@@ -11,8 +11,8 @@ Also solved: parts whose faces touch up to rounding are made to overlap, so that
 slits. A vertex of a touching triangle moves outwards across all planes that touch there, by the
 least way that takes each plane past the other part.
 
-Bound: no vertex moves by more than `FARTHEST` times the largest gap and the depth of the overlap
-together, so the union's surface is as near to the surfaces of the parts.
+Bound: no vertex moves by more than `FARTHEST_MOVE` times the largest gap and the depth of the
+overlap together, so the union's surface is as near to the surfaces of the parts.
 """
 
 from collections.abc import Sequence
@@ -22,28 +22,30 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.objects.planar_faces import ANGLE
-from grasp_core.objects.surface import SIDES, Mesh, components
+from grasp_core.objects.surface import TRIANGLES_AT_EDGE, Mesh, components
 
-FARTHEST = 2.0
+FARTHEST_MOVE = 2.0
 """Largest distance that a vertex moves, over that of the farthest plane that it passes."""
 OPPOSED = -0.998
 """Largest cosine between the normals of touching triangles: small ones lean by their rounding."""
-PARALLEL = 0.02
+SAME_PLANES = 0.02
 """Least singular value of normals that count as different, over the largest."""
 MOST_PAIRS = 50_000_000
 """Largest number of pairs of triangles of two parts that are compared, which takes a second."""
-BLOCK = 500_000
+PAIRS_AT_ONCE = 500_000
 """Number of pairs of triangles that are compared at a time."""
-NONE = np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)
+NO_PAIRS = np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)
 
 
 def pulled_apart(mesh: Mesh) -> Mesh | None:
     """Double vertices so that two triangles meet at each edge; None if it is not clear which."""
     edges = mesh.edges
-    if edges.balance.any() or not (edges.uses > SIDES).any():
+    if edges.balance.any() or not (edges.uses > TRIANGLES_AT_EDGE).any():
         return None
     order = np.argsort(edges.place, kind="stable")
-    paired = order[(edges.uses == SIDES)[edges.place[order]]].reshape(-1, SIDES)
+    paired = order[(edges.uses == TRIANGLES_AT_EDGE)[edges.place[order]]].reshape(
+        -1, TRIANGLES_AT_EDGE
+    )
     crowded = _wedges(mesh)
     if crowded is None:
         return None
@@ -64,7 +66,7 @@ def _head(sides: Indices) -> Indices:
 def _wedges(mesh: Mesh) -> Indices | None:
     """Pair the sides of triangles at crowded edges that bound the same material, (p, 2)."""
     edges, corners = mesh.edges, mesh.triangles.ravel()
-    side = np.flatnonzero((edges.uses > SIDES)[edges.place])
+    side = np.flatnonzero((edges.uses > TRIANGLES_AT_EDGE)[edges.place])
     place, part, tail, head = edges.place[side], mesh.connected[side // 3], side, _head(side)
     ends = corners[tail] < corners[head]
     alone = np.unique(np.column_stack([place, part]), axis=0, return_inverse=True)[1].ravel()
@@ -112,7 +114,7 @@ def pressed_together(
         found = _touching(mine, bodies[large], reach)
         if found is None or len(found[0]):
             pairs.append((small, large))
-        for triangle, gap, _ in zip(*(found or NONE), strict=True):
+        for triangle, gap, _ in zip(*(found or NO_PAIRS), strict=True):
             for vertex in mine.triangles[triangle].tolist():
                 plane = mine.normals[triangle], max(gap + depth, 0.0)
                 planes[small].setdefault(vertex, []).append(plane)
@@ -125,19 +127,19 @@ def pressed_together(
 def widest_gap(bodies: Sequence[Mesh], most: float) -> float | None:
     """Return the largest distance of faces that touch up to `most` [m]; None if none do."""
     pairs = combinations(bodies, 2)
-    gaps = np.concatenate([(_touching(one, two, most) or NONE)[2] for one, two in pairs])
+    gaps = np.concatenate([(_touching(one, two, most) or NO_PAIRS)[2] for one, two in pairs])
     return float(gaps.max()) if len(gaps) else None
 
 
 def _step(planes: list[tuple[Array, float]]) -> Array:
     """Return the least step past some planes, by their normals and distances, (3,) [m]."""
     N, d = np.array([normal for normal, _ in planes]), np.array([way for _, way in planes])
-    step = np.asarray(np.linalg.lstsq(N, d, rcond=PARALLEL)[0], dtype=np.float64)
+    step = np.asarray(np.linalg.lstsq(N, d, rcond=SAME_PLANES)[0], dtype=np.float64)
     passed = N @ step
     if (passed > 0.0).all():
         step *= max(1.0, float((d / passed).max()))
     length = float(np.linalg.norm(step))
-    return step * min(1.0, FARTHEST * float(np.abs(d).max()) / length) if length else step
+    return step * min(1.0, FARTHEST_MOVE * float(np.abs(d).max()) / length) if length else step
 
 
 def _touching(mine: Mesh, other: Mesh, reach: float) -> tuple[Indices, Array, Array] | None:
@@ -146,10 +148,10 @@ def _touching(mine: Mesh, other: Mesh, reach: float) -> tuple[Indices, Array, Ar
     Gives the triangle of `mine` in each pair, how far it must move to be past the other (negative
     where it is past it), and its distance from the other, (p,) each [m]; None for too many.
     """
-    here, there, found = _beside(mine, other, reach), _beside(other, mine, reach), [NONE]
+    here, there, found = _beside(mine, other, reach), _beside(other, mine, reach), [NO_PAIRS]
     if len(here) * len(there) > MOST_PAIRS:
         return None
-    step = max(BLOCK // max(len(there), 1), 1)
+    step = max(PAIRS_AT_ONCE // max(len(there), 1), 1)
     for start in range(0, len(here), step):
         some = here[start : start + step]
         a, b = np.nonzero(mine.normals[some] @ other.normals[there].T <= OPPOSED)

@@ -47,12 +47,12 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.geometry.polygons import edge_rows
 from grasp_core.objects.face_pieces import FacePiece
 from grasp_core.optimizing.contact_places import Grounds
-from grasp_core.optimizing.search import Found, Searching
+from grasp_core.optimizing.search import RatedContacts, Searching
 from grasp_core.quality.ferrari_canny import FerrariCanny, InnerPolytope, wrench_set_quality
 from grasp_core.quality.measures import (
     CLOSED_GAP,
     FERRARI_CANNY,
-    THIN,
+    SMALL_LENGTH,
     Measure,
     task_limits,
     thin,
@@ -70,27 +70,27 @@ from grasp_core.values import FINGERS
 
 SEARCH_GAP = 1e-3
 """Largest relative gap between the two bounds of the quality during the climb."""
-BAND = 0.2
+NEAR_SHARE = 0.2
 """Simplices up to this share farther from zero than the nearest one take part in a step."""
-MOST_ROWS, MOST_THIN_ROWS = 100, 300
+MOST_STEP_SIMPLICES, MOST_THIN_SIMPLICES = 100, 300
 """Simplices that take part at most; more where torques are over a small length, as many are alike.
 """
 STEEPEST = 20.0
 """Largest weight of a corner in the foot of the perpendicular on a simplex: on flatter simplices
 the weights do not tell where the foot moves."""
-FLAT = 1e-9
+ZERO_WIDTH = 1e-9
 """Share of the largest singular value of a simplex below which a singular value counts as zero."""
 STEP_DIGITS = 6  # digits after the point to which a step is rounded
-LAST_DIGIT = 10.0**-STEP_DIGITS
+STEP_INSIDE = 10.0**-STEP_DIGITS
 """Distance inside the limits at which a step ends, in object radii: rounding may move the end by
 this much."""
 FIRST_REACH, LEAST_REACH = 0.1, 1e-3
 """Size of the trust region at first, and the size at which the climb ends, in object radii."""
-MOST_STEPS = 40
-GOOD, GROWTH = 0.5, 1.5
+MOST_CLIMB_STEPS = 40
+GOOD_SHARE, REACH_GROWTH = 0.5, 1.5
 """Share of the predicted gain above which the trust region grows, and the factor by which it grows.
 """
-POOR, SHRINKAGE = 0.2, 0.4
+POOR_SHARE, REACH_SHRINKAGE = 0.2, 0.4
 """Share of the predicted gain below which the trust region shrinks, and the factor by which it
 shrinks."""
 WORTHWHILE = 1e-6  # predicted relative gain below which the climb ends
@@ -142,7 +142,7 @@ class ContactFaces:
                 return Height(0.0, None)
             of_loads = self.planes_of_loads(wrenches, measure)
             return Height(float(of_loads[0].min()), lambda: of_loads)
-        length = 1.0 if measure.is_usual else THIN
+        length = 1.0 if measure.is_usual else SMALL_LENGTH
         found = wrench_set_quality(wrenches if measure.is_usual else thin(wrenches), SEARCH_GAP)
         closed = found.polytope is not None
         return Height(found.lower, partial(self.nearest_planes, found, length) if closed else None)
@@ -156,7 +156,7 @@ class ContactFaces:
         """
         worthwhile = TASK_WORTHWHILE if measure.name == "task" else WORTHWHILE
         found, reach = self.height(measure, y), FIRST_REACH
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_CLIMB_STEPS):
             if found.planes is None or reach < LEAST_REACH or stop():
                 break
             step, predicted = self.step(y, found.lower, found.planes(), reach)
@@ -166,7 +166,13 @@ class ContactFaces:
             gained = (trial.lower - found.lower) / predicted
             if trial.lower > surpassing(found.lower):
                 y, found = y + step, trial
-            reach *= GROWTH if gained > GOOD else SHRINKAGE if gained < POOR else 1.0
+            reach *= (
+                REACH_GROWTH
+                if gained > GOOD_SHARE
+                else REACH_SHRINKAGE
+                if gained < POOR_SHARE
+                else 1.0
+            )
         return y, found
 
     def step(
@@ -181,7 +187,7 @@ class ContactFaces:
             inside = np.zeros((len(piece.b), n + 1))
             inside[:, 2 * i : 2 * i + 2] = piece.E
             rows.append(inside)
-            room.append(piece.b - piece.E @ y[i] - LAST_DIGIT)
+            room.append(piece.b - piece.E @ y[i] - STEP_INSIDE)
         rows += [np.eye(n + 1)[:n], -np.eye(n + 1)[:n]]
         room.append(np.full(2 * n, reach))
         program = LinearProgram(np.eye(n + 1)[n], np.vstack(rows), np.hstack(room) / reach)
@@ -201,12 +207,12 @@ class ContactFaces:
         height = np.einsum("mcj,mj->mc", points[polytope.corners], polytope.normals)
         heights: Array = height.min(axis=1)
         cells = graded(heights)
-        most = MOST_ROWS if length == 1.0 else MOST_THIN_ROWS
+        most = MOST_STEP_SIMPLICES if length == 1.0 else MOST_THIN_SIMPLICES
         near = np.argsort(cells, kind="stable")[:most]
-        near = near[cells[near] <= graded((1.0 + BAND) * float(heights.min()))]
+        near = near[cells[near] <= graded((1.0 + NEAR_SHARE) * float(heights.min()))]
         corners, normals, b = polytope.corners[near], polytope.normals[near], heights[near]
         columns = points[corners].transpose(0, 2, 1)
-        feet = np.asarray(np.linalg.pinv(columns, rcond=FLAT), dtype=np.float64)
+        feet = np.asarray(np.linalg.pinv(columns, rcond=ZERO_WIDTH), dtype=np.float64)
         shares = np.einsum("mcj,mj->mc", feet, b[:, None] * normals)
         sound = np.abs(shares).max(axis=1) < STEEPEST
         forces = self.in_space(polytope.forces)
@@ -234,20 +240,20 @@ class ContactFaces:
 
 POINTS = 3000  # random contacts
 SETS = 40_000  # random sets of four of them
-AT_ONCE = 4000
+SETS_AT_ONCE = 4000
 RATED, MOST_RATED = 200, 4000
 """Sets whose quality is measured, and how many more are looked at while few are in force closure,
 as at low friction."""
-ROUGH = 0.1  # gap of these qualities, by which sets are ordered
+ORDERING_GAP = 0.1  # gap of these qualities, by which sets are ordered
 CLIMBED, ALIKE = 16, 3
 """Sets that climb, and how many of them on the same pieces: climbs from several starts on the same
 pieces end in several local optima."""
 
 
-def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> Found | None:
+def begin(searching: Searching, twists: Array, rng: np.random.Generator) -> RatedContacts | None:
     """Return good contacts, or None if no random ones are in force closure."""
     alike, climbs = Counter[tuple[int, ...]](), 0
-    best: Found | None = None
+    best: RatedContacts | None = None
     for on, at in _closed_sets(searching, twists, rng):
         key = tuple(sorted(on.tolist()))
         alike[key] += 1
@@ -277,8 +283,8 @@ def _closed_sets(
     demands = measure.demands(twists)
     bounds = np.concatenate(
         [
-            measure.multiples(supports[sets[k : k + AT_ONCE]].max(axis=1), demands).min(axis=1)
-            for k in range(0, SETS, AT_ONCE)
+            measure.multiples(supports[sets[k : k + SETS_AT_ONCE]].max(axis=1), demands).min(axis=1)
+            for k in range(0, SETS, SETS_AT_ONCE)
         ]
     )
     closed: list[tuple[Indices, Array]] = []
@@ -288,7 +294,7 @@ def _closed_sets(
             break
         chosen = sets[k]
         wrenches = searching.wrenches(on[chosen], at[chosen])
-        lower = wrench_set_quality(wrenches, ROUGH).lower
+        lower = wrench_set_quality(wrenches, ORDERING_GAP).lower
         if lower > 0.0:
             closed.append((on[chosen], at[chosen]))
             rated.append(lower)
@@ -297,7 +303,7 @@ def _closed_sets(
     return [closed[k] for k in order]
 
 
-def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> Found:
+def climbed(searching: Searching, on: Sequence[int] | Indices, at: Array) -> RatedContacts:
     """Move contacts uphill on their pieces."""
     pieces = tuple(piece_at(searching.grounds, int(p)) for p in on)
     best = searching.measured(np.array(on), at)

@@ -59,7 +59,13 @@ from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import begin, climbed, piece_at
 from grasp_core.optimizing.better_contacts import FINGER_RADIUS, certified
-from grasp_core.optimizing.contact_places import UNIT, Grounds, exact_maps, grounds_of, grounds_on
+from grasp_core.optimizing.contact_places import (
+    UNIT_SHAPE,
+    Grounds,
+    exact_maps,
+    grounds_of,
+    grounds_on,
+)
 from grasp_core.optimizing.search import EXACT_GAP, Searching
 from grasp_core.optimizing.support_cuts import LEAST_THRESHOLD, CutTree
 from grasp_core.planning.certify import named
@@ -74,8 +80,8 @@ from grasp_core.solvers.ties import few_digits, surpassing
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS, FaceQuadruple, Grasp, four
 
-PLACED = 1e-7  # largest distance between equal points, and directions, in object radii
-Ended: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
+CONTACT_SLACK = 1e-7  # largest distance between equal points, and directions, in object radii
+BestEnded: TypeAlias = Literal["gap", "time", "interrupt", "undivided"]
 """Why a search ended: the gap is reached, time is up, it was interrupted, or polygons became too
 small, or too many, to be divided further."""
 
@@ -94,8 +100,8 @@ def are_contacts_of(grasp: Grasp, wrenches: WrenchSet, proof: CutTree) -> bool:
     size = float((away * levers).sum() / (levers * levers).sum())
     return bool(
         size > 0.0
-        and np.abs(away - size * levers).max() <= PLACED * size
-        and np.abs(grasp.normals - normals).max() <= PLACED
+        and np.abs(away - size * levers).max() <= CONTACT_SLACK * size
+        and np.abs(grasp.normals - normals).max() <= CONTACT_SLACK
     ) and all(_is_on(proof, *contact) for contact in zip(arms, normals, strict=True))
 
 
@@ -104,10 +110,10 @@ def _is_on(proof: CutTree, point: Array, normal: Array) -> bool:
     away = point - grounds.origins
     off = np.abs(np.einsum("pi,pi->p", away, grounds.normals))
     aside = np.abs(normal - grounds.normals).max(axis=1)
-    for piece in np.flatnonzero((off <= PLACED) & (aside <= PLACED)):
-        polygon = convex_polygon(grounds.polygons()[piece], UNIT)
+    for piece in np.flatnonzero((off <= CONTACT_SLACK) & (aside <= CONTACT_SLACK)):
+        polygon = convex_polygon(grounds.polygons()[piece], UNIT_SHAPE)
         at = grounds.frames[piece].T @ away[piece]
-        if polygon is not None and polygon.holds(at[None], PLACED):
+        if polygon is not None and polygon.holds(at[None], CONTACT_SLACK):
             return True
     return False
 
@@ -143,7 +149,7 @@ class BestGrasp(Declared):
     """Distance that contacts keep from the edges of faces [m], or half the radius of the largest
     disc in a face where that is less."""
     proof: CutTree
-    ended: Ended
+    ended: BestEnded
     history: tuple[GapAt, ...]
     """How the gap closed; the times do not count when values are compared."""
 
@@ -193,14 +199,14 @@ def measured(
     return measured_set(wrenches, measure, gap)
 
 
-WIDEST = 0.4
+FIRST_GAP = 0.4
 """Gap of the first level at most: a level is cheap down to it, as the search is for one twist."""
 AIMED = 0.999
 """Share of the gap that is aimed at: the grasp's quality is measured anew in the end, and multiples
 of round numbers would be where digits are cut."""
-FINER = 64.0
+STEPS_IN_GAP = 64.0
 """How much finer than the gap the steps are in which qualities and bounds count."""
-SAME = 1e-9  # share of a bound that rounding may cost it
+BOUND_ROUNDING = 1e-9  # share of a bound that rounding may cost it
 MOST_JOBS = 256  # most threads: no machine that is known has more use for them
 
 
@@ -227,15 +233,18 @@ class Levels:
         self.best = found
         self._tell()
 
-    def closed_to(self, gap: float) -> Ended:
+    def closed_to(self, gap: float) -> BestEnded:
         """Refute threshold after threshold, until the gap is reached or the search is stopped."""
-        grain = gap / FINER
-        steps = max(0, math.ceil(math.log2(WIDEST / gap)))
+        grain = gap / STEPS_IN_GAP
+        steps = max(0, math.ceil(math.log2(FIRST_GAP / gap)))
         try:
             for k in range(steps, -1, -1):
                 share = 1.0 - AIMED * gap * 2.0**k
                 # each turn lowers the bound to `wanted`, or raises the quality, or is the last
-                while self.best.quality.lower < share * (1.0 - SAME) * self.searching.proof.bound:
+                while (
+                    self.best.quality.lower
+                    < share * (1.0 - BOUND_ROUNDING) * self.searching.proof.bound
+                ):
                     wanted = few_digits(self.best.quality.lower / share, grain)
                     if not self._refuted(wanted, grain):
                         stop = self.searching.stop
@@ -263,7 +272,7 @@ class Levels:
         if self.progress is not None:
             self.progress(now)
 
-    def result(self, ended: Ended) -> BestGrasp:
+    def result(self, ended: BestEnded) -> BestGrasp:
         """Return the best contacts as a grasp, with the proof."""
         searching = self.searching
         pieces = tuple(piece_at(searching.grounds, p) for p in self.best.pieces)
@@ -361,8 +370,8 @@ def checked_clearance(body: Polyhedron, clearance: float | None) -> float:
     )
 
 
-SMALLEST_GAP, LARGEST_GAP = 1e-3, 0.9
-SMALLEST = 1e-5  # bound that is not lowered any more [N]
+SMALLEST_CEILING_GAP, LARGEST_CEILING_GAP = 1e-3, 0.9
+SMALLEST_BOUND = 1e-5  # bound that is not lowered any more [N]
 SEED = 0
 
 
@@ -426,7 +435,7 @@ def quality_ceiling(
     check_planar(body, "quality_ceiling")
     friction = value_of(Friction, friction, "friction")
     number(known, "known", ge=0.0, le=LARGEST)
-    number(gap, "gap", ge=SMALLEST_GAP, le=LARGEST_GAP)
+    number(gap, "gap", ge=SMALLEST_CEILING_GAP, le=LARGEST_CEILING_GAP)
     value_of(Cases, parts, "parts")
     given = FINGER_RADIUS * body.radius if finger_radius is None else finger_radius
     radii = frozen_each(given, FINGERS, "finger_radius")
@@ -485,8 +494,10 @@ def _bounds(first: float, known: float, gap: float) -> list[float]:
     They are multiples of what is known, or of the smallest bound where next to nothing is:
     nothing that is found on the way moves them.
     """
-    least, share = max(known, SMALLEST), 1.0 - AIMED * gap
-    rising = [least / share if known >= SMALLEST else least]
-    while rising[-1] < first * share:  # each is larger by `AIMED` of `SMALLEST_GAP` at least
+    least, share = max(known, SMALLEST_BOUND), 1.0 - AIMED * gap
+    rising = [least / share if known >= SMALLEST_BOUND else least]
+    while (
+        rising[-1] < first * share
+    ):  # each is larger by `AIMED` of `SMALLEST_CEILING_GAP` at least
         rising.append(rising[-1] / share)
-    return [few_digits(bound, gap / FINER) for bound in rising[::-1] if bound < first]
+    return [few_digits(bound, gap / STEPS_IN_GAP) for bound in rising[::-1] if bound < first]

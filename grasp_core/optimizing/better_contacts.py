@@ -24,15 +24,14 @@ from grasp_core.by_value import ByValue
 from grasp_core.errors import InputError
 from grasp_core.families.free import closed_at, of_general_type
 from grasp_core.families.placing import point_regions
-from grasp_core.geometry.polygons import SAME_CORNER
 from grasp_core.kinds import SMALLEST, Friction, Seed, number, value_of
-from grasp_core.objects.face_pieces import FacePiece, inset_piece, pieces_by_face
+from grasp_core.objects.face_pieces import FacePiece, deepest, inset_piece, pieces_by_face
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.planning.certify import Candidate, certify_each, to_grasp
 from grasp_core.quality.ferrari_canny import FerrariCanny, ferrari_canny
-from grasp_core.solvers.ties import coarse, first_best, largest_first, on_grid, surpassing
+from grasp_core.solvers.ties import coarse, largest_first, on_grid, surpassing
 from grasp_core.values import FINGERS, ForceCone, Grasp
 
 FINGER_RADIUS = 0.05
@@ -44,7 +43,7 @@ RANDOM_TRIALS = 24
 START_DIGITS = 8
 """Digits after the point to which the grasp's contacts are rounded before the climb, at unit size.
 """
-ROUGH = 2e-2
+STARTS_GAP = 2e-2
 """Largest gap between the bounds of a quality while starting points are compared."""
 
 
@@ -141,7 +140,7 @@ def pieces_under(body: Polyhedron, grasp: Grasp) -> tuple[FacePiece, ...]:
     """Return the piece of a face that each contact is deepest in, the first of equal ones."""
     pieces = pieces_by_face(body)
     return tuple(
-        pieces[face][first_best([piece.inset(point) for piece in pieces[face]], SAME_CORNER)]
+        deepest(pieces[face], point)
         for face, point in zip(grasp.faces, _unit_points(body, grasp), strict=True)
     )
 
@@ -166,7 +165,7 @@ def _random_starts(faces: ContactFaces, rng: np.random.Generator) -> Iterator[Ar
         )
         for _ in range(RANDOM_TRIALS)
     ]
-    rated = np.array([faces.quality(y, ROUGH).lower for y in trials])
+    rated = np.array([faces.quality(y, STARTS_GAP).lower for y in trials])
     best = largest_first(rated)
     return (trials[i] for i in best[:RANDOM_STARTS] if rated[i] > 0.0)
 

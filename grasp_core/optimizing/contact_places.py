@@ -19,13 +19,13 @@ piece, so that
 
 which is a half-plane for each h.
 
-Each map is exact up to `EXACT`, in pieces, normals and products of maps, which a check of all maps
-and products shows. Two maps are applied at most, so that contacts are moved to within 1e-8 of
-others that the proof is about, with normals as near: their measure differs by less than
-1e-7 (1 + mu). Loads of a task are mapped to within `EXACT` of the longest load L, so that answers
-a(y) = t d(y), t L <= 8 (1 + mu), of unit twists are off by less than 2e-8 (1 + mu); those of the
-moved contacts are off by 5e-8 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the
-same reason.
+Each map is exact up to `EXACT_MAP`, in pieces, normals and products of maps, which a check of all
+maps and products shows. Two maps are applied at most, so that contacts are moved to within 1e-8 of
+others that the proof is about, with normals as near: their measure differs by less than 1e-7 (1 +
+mu). Loads of a task are mapped to within `EXACT_MAP` of the longest load L, so that answers a(y) =
+t d(y), t L <= 8 (1 + mu), of unit twists are off by less than 2e-8 (1 + mu); those of the moved
+contacts are off by 5e-8 (1 + mu). Half-planes (1) are moved outwards by `WIDENED` for the same
+reason.
 """
 
 from collections.abc import Sequence
@@ -52,21 +52,21 @@ from grasp_core.objects.standard_order import symmetries
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
-ROOM = 24  # room for the corners of a polygon, that of the compiled cuts
+CORNER_ROOM = 24  # room for the corners of a polygon, that of the compiled cuts
 MOST_AT_FIRST = 12
 """Largest number of corners of a piece before any cut; larger ones are divided."""
-MOST_PIECES = 128
-UNIT = 1e-9
+MOST_POLYGONS = 128
+UNIT_SHAPE = 1e-9
 """Largest deviation of normals and frames from orthonormal, and of polygons from convex ones."""
-LARGEST = 2.0  # largest coordinate of a point, in object radii
-SEARCH_DIGITS = 11
+LARGEST_COORDINATE = 2.0  # largest coordinate of a point, in object radii
+POLYGON_DIGITS = 11
 """Digits after the point that a search is given of polygons (see `support_cuts`)."""
-EXACT = 1e-9
+EXACT_MAP = 1e-9
 """Largest distance between a piece's corner, or normal, as a map moves it, and another's."""
 WIDENED = 1e-8
 MOST_MAPS = 128
 ALONE = np.eye(3)[None]  # the symmetry that every object has, (1, 3, 3)
-ASIDE = (0.37, 0.11)
+OFF_MIRRORS = (0.37, 0.11)
 """Shares of the ways to a piece's first two corners at which its point q is, off all mirrors."""
 REPLAY = "grasp_core.optimizing.replay_kernel"
 TWISTS = "grasp_core.optimizing.twists_kernel"
@@ -82,20 +82,20 @@ class Grounds(Declared):
     """Points whose plane coordinates are zero, (p, 3)."""
     frames: Annotated[Array, Shape("p", 3, 2)]
     """Orthonormal columns that span the planes, (p, 3, 2)."""
-    corners: Annotated[Array, Shape("p", ROOM, 2)]
+    corners: Annotated[Array, Shape("p", CORNER_ROOM, 2)]
     """Corners in plane coordinates, in order, zero where there are fewer, (p, 24, 2)."""
-    counts: Annotated[Indices, Shape("p", whole=True, least=3, most=ROOM)]
+    counts: Annotated[Indices, Shape("p", whole=True, least=3, most=CORNER_ROOM)]
     """How many corners each has, (p,)."""
 
     def _is_consistent(self) -> bool:
         """Return whether these are convex polygons in planes, at about unit size."""
-        if not 0 < len(self.counts) <= MOST_PIECES:
+        if not 0 < len(self.counts) <= MOST_POLYGONS:
             return False
         axes = np.concatenate([self.frames, self.normals[:, :, None]], axis=2)
         square = axes.transpose(0, 2, 1) @ axes
         sizes = max(float(np.abs(self.origins).max()), float(np.abs(self.corners).max()))
-        upright = np.abs(square - np.eye(3)).max() <= UNIT and sizes <= LARGEST
-        return bool(upright) and all(convex_polygon(each, UNIT) for each in self.polygons())
+        upright = np.abs(square - np.eye(3)).max() <= UNIT_SHAPE and sizes <= LARGEST_COORDINATE
+        return bool(upright) and all(convex_polygon(each, UNIT_SHAPE) for each in self.polygons())
 
     def polygons(self) -> list[Array]:
         """Return the corners of each polygon in its plane, (k, 2) each."""
@@ -132,12 +132,12 @@ def grounds_of(body: Polyhedron, clearance: float) -> Grounds:
 def grounds_on(pieces: Sequence[FacePiece]) -> tuple[Grounds, Indices]:
     """Return convex pieces as polygons of few corners, and the place of each one's piece, (p,)."""
     parts = [(k, part) for k, piece in enumerate(pieces) for part in _small(piece.corners)]
-    if not 0 < len(parts) <= MOST_PIECES:
+    if not 0 < len(parts) <= MOST_POLYGONS:
         raise InputError(
-            f"expected an object whose faces have 1 to {MOST_PIECES} convex pieces with room for a "
-            f"contact, got {len(parts)}; take an object with fewer faces"
+            f"expected an object whose faces have 1 to {MOST_POLYGONS} convex pieces with room for "
+            f"a contact, got {len(parts)}; take an object with fewer faces"
         )
-    corners = np.zeros((len(parts), ROOM, 2))
+    corners = np.zeros((len(parts), CORNER_ROOM, 2))
     for rows, (_, part) in zip(corners, parts, strict=True):
         rows[: len(part)] = part
     own = np.array([k for k, _ in parts])
@@ -164,7 +164,7 @@ def exact_maps(body: Polyhedron, grounds: Grounds, measure: Measure = FERRARI_CA
     """Return symmetries that map pieces and loads exactly enough, (g, 3, 3); only 1 if no group."""
     found = symmetries(body)
     every = np.concatenate([ALONE, found.rotations[1:], found.reflections])
-    every = every[measure.keeps(every, EXACT)]
+    every = every[measure.keeps(every, EXACT_MAP)]
     kept = np.array([each for each in every if _images(each[None], grounds)[0].min() >= 0])
     return kept if len(kept) <= MOST_MAPS and fitting(kept, grounds, measure) else ALONE
 
@@ -174,13 +174,13 @@ def fitting(maps: Array, grounds: Grounds, measure: Measure = FERRARI_CANNY) -> 
     if len(maps) > MOST_MAPS or np.abs(maps[0] - np.eye(3)).max() > 0.0:
         return False
     square = maps @ maps.transpose(0, 2, 1) - np.eye(3)
-    if np.abs(square).max() > EXACT or (_images(maps, grounds) < 0).any():
+    if np.abs(square).max() > EXACT_MAP or (_images(maps, grounds) < 0).any():
         return False
-    if not measure.keeps(maps, EXACT).all():
+    if not measure.keeps(maps, EXACT_MAP).all():
         return False
     products = np.einsum("aij,bjk->abik", maps, maps)
     return all(
-        np.abs(products[a][:, None] - maps[None]).max(axis=(2, 3)).min(axis=1).max() <= EXACT
+        np.abs(products[a][:, None] - maps[None]).max(axis=(2, 3)).min(axis=1).max() <= EXACT_MAP
         for a in range(len(maps))
     )
 
@@ -192,12 +192,12 @@ def _images(maps: Array, grounds: Grounds) -> Indices:
     found = np.full((len(maps), len(in_space)), -1)
     turned = grounds.normals @ maps.transpose(0, 2, 1)
     apart = np.abs(turned[:, :, None] - grounds.normals[None, None]).max(axis=3)
-    for g, p, q in np.argwhere(apart <= EXACT).tolist():
+    for g, p, q in np.argwhere(apart <= EXACT_MAP).tolist():
         if len(in_space[p]) == len(in_space[q]):
             corners = in_space[p] @ maps[g].T
             off = np.abs(corners[:, None] - in_space[q][None]).max(axis=2)
             nearest = off.argmin(axis=1)
-            near = off[np.arange(len(corners)), nearest].max() <= EXACT
+            near = off[np.arange(len(corners)), nearest].max() <= EXACT_MAP
             if near and len(set(nearest.tolist())) == len(corners):
                 found[g, p] = q
     return found
@@ -217,14 +217,14 @@ def first_nodes(
         corners = np.where((counts > 0)[..., None, None], grounds.corners, 0.0)
         return corners, counts.astype(np.int64), np.zeros((1, FINGERS), dtype=np.int64)
     if len(maps) == 1:
-        corners = np.broadcast_to(grounds.corners, (1, FINGERS, pieces, ROOM, 2)).copy()
+        corners = np.broadcast_to(grounds.corners, (1, FINGERS, pieces, CORNER_ROOM, 2)).copy()
         counts = np.broadcast_to(grounds.counts, (1, FINGERS, pieces)).copy()
         return corners, counts, np.ones((1, FINGERS), dtype=np.int64)
     images = _images(maps, grounds)
     # a symmetry's inverse is one as well, so that the images of a piece are its orbit
     leaders = images.min(axis=0)
     firsts = np.flatnonzero(leaders == np.arange(pieces))
-    corners = np.zeros((len(firsts), FINGERS, pieces, ROOM, 2))
+    corners = np.zeros((len(firsts), FINGERS, pieces, CORNER_ROOM, 2))
     counts = np.zeros((len(firsts), FINGERS, pieces), dtype=np.int64)
     fresh = np.ones((len(firsts), FINGERS), dtype=np.int64)
     fresh[:, 0] = 0
@@ -242,7 +242,7 @@ def _nearest_part(grounds: Grounds, keeping: Array, piece: int) -> tuple[Array, 
     clip = compiled(REPLAY).clip
     polygon, count = grounds.corners[piece].copy(), int(grounds.counts[piece])
     middle = polygon[:count].mean(axis=0)
-    aside = sum(share * (polygon[k] - middle) for k, share in enumerate(ASIDE))
+    aside = sum(share * (polygon[k] - middle) for k, share in enumerate(OFF_MIRRORS))
     q = grounds.places(piece, (middle + aside)[None])[0]
     for turn in keeping[1:]:
         # (1): 2 x.(hq - q) <= |hq|^2 - |q|^2 with x = o + F p

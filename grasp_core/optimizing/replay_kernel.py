@@ -16,15 +16,15 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy, longer
 from grasp_core.compiled import loop
-from grasp_core.optimizing.contact_places import ROOM
+from grasp_core.optimizing.contact_places import CORNER_ROOM
 from grasp_core.values import FINGERS
 
 BY_PIECES, BY_LINE = 16, 32
 """What a node does, added to a finger: it divides its pieces, or its polygon. Below these numbers
 are questions, the sums of 2**i over the fingers i that may answer."""
-SLOPES = 6  # numbers that say how a contact of a piece answers a twist, see `slopes`
-LAST_DIGIT = 2.0**-52  # share of an edge by which a point that answers is moved back at first
-AT_FIRST, DEEPEST = 16, 4096
+SLOPE_NUMBERS = 6  # numbers that say how a contact of a piece answers a twist, see `slopes`
+MOVED_BACK = 2.0**-52  # share of an edge by which a point that answers is moved back at first
+AT_FIRST, MOST_WAITING = 16, 4096
 """Number of nodes for which there is room at first, and the largest number that may wait."""
 
 
@@ -51,7 +51,8 @@ class Nodes(NamedTuple):
 def vacant(deep: int, pieces: int) -> Nodes:
     """Make room for nodes of which none waits."""
     return Nodes(
-        np.zeros((deep, FINGERS, pieces, ROOM, 2)), np.zeros((deep, FINGERS, pieces), np.int64),
+        np.zeros((deep, FINGERS, pieces, CORNER_ROOM, 2)),
+        np.zeros((deep, FINGERS, pieces), np.int64),
         np.zeros((deep, FINGERS), np.int64), np.zeros(deep, np.int64), np.zeros(1, np.int64),
     )  # fmt: skip
 
@@ -84,7 +85,7 @@ def branch(nodes: Nodes, deed: int, asked: Array, friction: float, t: float) -> 
 
     Polygons are cut to where that finger answers; what is asked of each piece are its `slopes`.
     """
-    node, rest = nodes.top[0] - 1, np.empty((ROOM, 2))
+    node, rest = nodes.top[0] - 1, np.empty((CORNER_ROOM, 2))
     place = node
     for i in range(FINGERS):
         place += (deed >> i) & 1
@@ -125,7 +126,11 @@ def split(nodes: Nodes, deed: int, line: Array) -> None:
 @loop("numpy")
 def clip(corners: Array, count: int, line: Array, side: float) -> int:
     """Cut a polygon to side * (line0 a + line1 b - line2) <= 0; return how many corners it has."""
-    heights, crossings, out = np.empty(ROOM), np.empty((ROOM, 2)), np.empty((ROOM, 2))
+    heights, crossings, out = (
+        np.empty(CORNER_ROOM),
+        np.empty((CORNER_ROOM, 2)),
+        np.empty((CORNER_ROOM, 2)),
+    )
     for k in range(count):
         heights[k] = -side * (line[0] * corners[k, 0] + line[1] * corners[k, 1] - line[2])
     for k in range(count):
@@ -152,7 +157,7 @@ def outline(
     for k in range(count):
         reached = heights[k] >= t
         crossed = reached != (heights[(k + 1) % count] >= t)
-        if kept + reached + crossed > ROOM:
+        if kept + reached + crossed > CORNER_ROOM:
             copy(corners[:count], out)
             return count
         if reached:
@@ -174,7 +179,7 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
     An answer to the twist k is a support of at least answers[k].
     """
     nodes, place = vacant(AT_FIRST, len(pieces.normals)), 0
-    answered = np.empty((len(pieces.normals), SLOPES))
+    answered = np.empty((len(pieces.normals), SLOPE_NUMBERS))
     for case in range(len(first)):
         copy(first[case], nodes.corners[0])
         copy(first_counts[case], nodes.counts[0])
@@ -185,7 +190,7 @@ def replay(  # noqa: PLR0913, PLR0917 - the arrays of a tree
             if place >= len(deeds) or nodes.above[node] >= most_cuts:
                 return False
             if nodes.top[0] + FINGERS >= len(nodes.above):
-                if len(nodes.above) >= DEEPEST:
+                if len(nodes.above) >= MOST_WAITING:
                     return False
                 nodes = doubled(nodes)
             nodes.above[node] += 1
@@ -269,13 +274,13 @@ def support(at: Array, a: float, b: float, friction: float) -> float:
 @loop("numpy")
 def cut(corners: Array, count: int, at: Array, friction: float, t: float, out: Array) -> int:
     """Fill in what is left of a polygon where the support reaches t; return how many corners."""
-    heights, reached = np.empty(ROOM), 0
+    heights, reached = np.empty(CORNER_ROOM), 0
     for k in range(count):
         heights[k] = support(at, corners[k, 0], corners[k, 1], friction)
         reached += heights[k] >= t
     if reached == 0:
         return 0
-    crossings = np.empty((ROOM, 2))
+    crossings = np.empty((CORNER_ROOM, 2))
     for k in range(count):
         after = (k + 1) % count
         if (heights[k] >= t) != (heights[after] >= t):
@@ -300,7 +305,7 @@ def _cross(low: Array, high: Array, at: Array, friction: float, t: float, out: A
     half = square * (u0 * v0 + u1 * v1) + c * b
     leading = square * (v0 * v0 + v1 * v1) - b * b
     share = min(-constant / (half + np.sqrt(max(half * half - leading * constant, 0.0))), 1.0)
-    back = LAST_DIGIT
+    back = MOVED_BACK
     while share > 0.0 and support(at, low[0] + share * da, low[1] + share * db, friction) >= t:
         share, back = share - back, 2.0 * back
     share = share if share > 0.0 else 0.0  # also where there is no number

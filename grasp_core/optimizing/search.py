@@ -27,8 +27,8 @@ from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.compiled import compiled
 from grasp_core.optimizing.contact_places import (
     ALONE,
+    POLYGON_DIGITS,
     REPLAY,
-    SEARCH_DIGITS,
     TWISTS,
     Grounds,
     first_nodes,
@@ -40,7 +40,7 @@ from grasp_core.solvers.ties import few_digits, first_best, on_grid
 from grasp_core.stopping import Stop
 from grasp_core.values import FINGERS
 
-Nodes: TypeAlias = tuple[Array, Indices, Indices]
+OpenNodes: TypeAlias = tuple[Array, Indices, Indices]
 """Where fingers may be at each of some nodes, as `first_nodes` returns them: corners (n, 4, p,
 any, 2), how many count (n, 4, p), and which fingers are fresh (n, 4)."""
 POOL = 512
@@ -49,7 +49,7 @@ DEEP, FIRST_ROOM = 24, 256
 """Nodes that may wait in a part at first, and nodes for which its tree has room: most parts are
 small, and clearing more memory took longer than searching them. Room is doubled where it is full.
 """
-KERNEL = "grasp_core.optimizing.search_kernel"
+SEARCH_KERNEL = "grasp_core.optimizing.search_kernel"
 PART_DEPTH = 7
 """Nodes with several children above a node that becomes a part of its own: a full tree has at least
 128 such parts, four waves of them."""
@@ -57,12 +57,12 @@ PART_NODES = 4000
 """Nodes after which a part leaves those that wait to parts of their own: some parts have a
 hundred times as many as most, and one thread would search them while others wait."""
 MOST_DEPTH = 10**9
-MOST_NODES = 10**10
+MOST_SEARCHED = 10**10
 """Nodes after which a search ends as undivided: a core visits about 1e4 in a second."""
 WAVE = 32
 """Parts that are searched from the same twists: more threads would find nothing to do, and twists
 that a part finds are of no use to the others of its wave."""
-KEPT = 384
+TWISTS_HANDED_ON = 384
 """Twists that a wave hands on at most: three quarters of a pool, so that as many of the old ones
 stay."""
 BUDGET = 2000
@@ -70,8 +70,8 @@ BUDGET = 2000
 MUCH = 1.1
 """Ratio of qualities from which on contacts are a better start for other thresholds, where the
 measure is not the usual one and the first contacts may be poor."""
-ASIDE = 1.4  # factor that keeps loads of round sizes away from powers of two
-SETTLED = 1.0 - 1e-6  # share of a threshold below which contacts count as refuted
+OFF_POWERS = 1.4  # factor that keeps loads of round sizes away from powers of two
+REFUTED_SHARE = 1.0 - 1e-6  # share of a threshold below which contacts count as refuted
 EXACT_GAP = 1e-5
 """Gap between the bounds of the measure of contacts that may be better: a tenth of the smallest gap
 that a search may be asked for."""
@@ -84,7 +84,7 @@ ROUNDED_UP = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class RatedContacts:
     """Contacts whose quality, or multiple of a task's loads, is known."""
 
     pieces: tuple[int, ...]  # the piece of each contact, (4,)
@@ -101,9 +101,9 @@ class Part:
     stack: Any
     tree: Any
     pool: Any
-    found: list[Found] = field(default_factory=list[Found])
+    found: list[RatedContacts] = field(default_factory=list[RatedContacts])
     finished: bool = False
-    left: list[Nodes] = field(default_factory=list[Nodes])
+    left: list[OpenNodes] = field(default_factory=list[OpenNodes])
     """Nodes that are left to parts of their own, in the order of the tree."""
 
 
@@ -116,7 +116,7 @@ def leave(part: Part) -> None:
     stack.top[0] = place
 
 
-def part_from(path: tuple[int, ...], first: Nodes, pool: Any) -> Part:
+def part_from(path: tuple[int, ...], first: OpenNodes, pool: Any) -> Part:
     """Return a part that begins with nodes and the twists of a pool."""
     corners, counts, fresh = first
     stack = compiled(REPLAY).vacant(max(DEEP, len(corners) + FINGERS + 1), counts.shape[2])
@@ -125,7 +125,7 @@ def part_from(path: tuple[int, ...], first: Nodes, pool: Any) -> Part:
     stack.corners[:n, :, :, : corners.shape[3]] = corners[::-1]
     stack.counts[:n], stack.fresh[:n] = counts[::-1], fresh[::-1]
     stack.top[0] = n
-    tree = compiled(KERNEL).Tree(
+    tree = compiled(SEARCH_KERNEL).Tree(
         np.zeros(FIRST_ROOM, np.int64), np.zeros(FIRST_ROOM, np.int64),
         np.zeros((FIRST_ROOM, 6)), np.zeros((FIRST_ROOM, 3)), np.zeros(3, np.int64),
     )  # fmt: skip
@@ -150,7 +150,7 @@ def enlarge(part: Part) -> None:
 
 def joined(parts: Sequence[Part]) -> dict[str, Any]:
     """Put the trees of parts into one, as arrays of a `CutTree`: a child's in its place."""
-    splice, lines_from = int(compiled(KERNEL).SPLICE), int(compiled(REPLAY).BY_PIECES)
+    splice, lines_from = int(compiled(SEARCH_KERNEL).SPLICE), int(compiled(REPLAY).BY_PIECES)
     sizes = np.array([part.tree.sizes for part in parts], dtype=np.int64)
     starts = np.cumsum(sizes, axis=0) - sizes
     runs = list[tuple[tuple[int, ...], Indices, Indices]]()
@@ -187,11 +187,15 @@ class Searching:
         self.searched = Slack.of(friction, len(maps), measure, SEARCHED_BELOW)
         kernel = compiled(TWISTS)
         each = (grounds.normals, grounds.origins, grounds.frames)
-        numbers = (on_grid(every, SEARCH_DIGITS) for every in each)
+        numbers = (on_grid(every, POLYGON_DIGITS) for every in each)
         self.pieces = compiled(REPLAY).Pieces(*numbers, float(friction))
-        kinds = {"ferrari-canny": kernel.USUAL, "weight": kernel.WEIGHT, "task": kernel.TASK}
-        scale = math.ldexp(1.0, math.frexp(ASIDE * measure.size)[1])
-        loads = scale * on_grid(measure.loads / scale, SEARCH_DIGITS)
+        kinds = {
+            "ferrari-canny": kernel.QUALITY_DEMAND,
+            "weight": kernel.WEIGHT_DEMAND,
+            "task": kernel.TASK_DEMAND,
+        }
+        scale = math.ldexp(1.0, math.frexp(OFF_POWERS * measure.size)[1])
+        loads = scale * on_grid(measure.loads / scale, POLYGON_DIGITS)
         self.demand = kernel.Demand(int(kinds[measure.name]), loads)
         self.pool = kernel.Pool(
             np.zeros((POOL, 6)), np.zeros(POOL), np.zeros((len(grounds.counts), 6, POOL)),
@@ -202,7 +206,7 @@ class Searching:
         """Learn unit twists, (n, 6), that polygons resist little; the best one proves a bound."""
         grounds, loads = self.grounds, self.measure.loads
         on, at = np.repeat(np.arange(len(grounds.counts)), grounds.counts), grounds.polygons()
-        corners = on_grid(grounds.places(on, np.vstack(at)), SEARCH_DIGITS)
+        corners = on_grid(grounds.places(on, np.vstack(at)), POLYGON_DIGITS)
         # a task's loads themselves, the other way, ask for most
         found = np.vstack([-loads, rng.normal(size=(COUNT, 6))])
         found = on_grid(found / np.linalg.norm(found, axis=1, keepdims=True))
@@ -229,21 +233,21 @@ class Searching:
         for y in twists:
             compiled(TWISTS).learn(pool, self.pieces, self.demand, np.array(y), now)
 
-    def refute(self, bound: float, known: float = math.inf) -> tuple[bool, list[Found]]:
+    def refute(self, bound: float, known: float = math.inf) -> tuple[bool, list[RatedContacts]]:
         """Try to lower the bound; return whether that came about, and contacts above the known."""
         threshold = bound - self.searched.raised
         corners, counts, fresh = self.first
-        trunk = part_from((), (on_grid(corners, SEARCH_DIGITS), counts, fresh), self.pool)
+        trunk = part_from((), (on_grid(corners, POLYGON_DIGITS), counts, fresh), self.pool)
         self._search(trunk, threshold, known, PART_DEPTH)
-        wave, parts, better = [trunk], [trunk], list[Found]()
+        wave, parts, better = [trunk], [trunk], list[RatedContacts]()
         # nodes that wait, with their paths and the pools that they begin with
-        waiting = deque[tuple[tuple[int, ...], Nodes, Any]]()
+        waiting = deque[tuple[tuple[int, ...], OpenNodes, Any]]()
         with ThreadPoolExecutor(self.jobs) as threads:
             while True:
                 self.nodes += sum(int(part.tree.sizes[0]) for part in wave)
                 better += [found for part in wave for found in part.found]
                 # a wave ends, as each of its parts leaves all that waits after `PART_NODES`
-                if self.nodes > MOST_NODES or not all(part.finished for part in wave):
+                if self.nodes > MOST_SEARCHED or not all(part.finished for part in wave):
                     return False, better
                 for part in wave:
                     pool = self.pool if part is trunk else part.pool
@@ -266,8 +270,8 @@ class Searching:
 
     def _search(self, part: Part, threshold: float, known: float, depth: int) -> None:
         """Search a part; nodes at a depth are left, and all that wait after `PART_NODES`."""
-        kernel, found_at = compiled(KERNEL), -1
-        work = kernel.Work(
+        kernel, found_at = compiled(SEARCH_KERNEL), -1
+        work = kernel.NodeRoom(
             np.zeros((FINGERS, POOL)), np.zeros((FINGERS, POOL)), np.zeros(POOL), np.zeros(POOL),
             np.zeros(FINGERS), np.zeros((FINGERS, 2)), np.zeros(FINGERS, np.int64),
             np.zeros((len(self.grounds.counts), 6)), np.full(1, -1),
@@ -280,14 +284,14 @@ class Searching:
             before = int(part.tree.sizes[0])
             why = kernel.run(search, BUDGET, depth if before < PART_NODES else -1)
             self.stop.spend(int(part.tree.sizes[0]) - before)
-            if why in {kernel.DONE, kernel.LOST}:
+            if why in {kernel.DONE, kernel.UNDIVIDABLE}:
                 part.finished = why == kernel.DONE
                 break
-            if why == kernel.FULL:
+            if why == kernel.NO_ROOM:
                 enlarge(part)
-            elif why == kernel.PART:
+            elif why == kernel.OWN_PART:
                 leave(part)
-            elif why == kernel.FOUND:
+            elif why == kernel.CONTACTS_FOUND:
                 if not self._is_refuted(part, work, threshold, known):
                     break
                 size = int(part.tree.sizes[0])
@@ -303,16 +307,16 @@ class Searching:
             part.found.append(found)
             if not self.measure.is_usual and found.quality.lower > MUCH * known:
                 return False
-        if found.quality.upper >= SETTLED * threshold:
+        if found.quality.upper >= REFUTED_SHARE * threshold:
             return False
         now = int(part.tree.sizes[0])
         self.learn(on_grid(found.quality.direction[None]), part.pool, now)
         return True
 
-    def measured(self, on: Indices, at: Array) -> Found:
+    def measured(self, on: Indices, at: Array) -> RatedContacts:
         """Bound the measure of contacts on pieces, (4,), at plane coordinates, (4, 2)."""
         quality = measured_set(self.wrenches(on, at), self.measure, EXACT_GAP)
-        return Found(tuple(int(p) for p in on), np.array(at), quality)
+        return RatedContacts(tuple(int(p) for p in on), np.array(at), quality)
 
     def wrenches(self, on: Indices, at: Array) -> WrenchSet:
         """Return the wrenches of contacts on pieces, (4,), at plane coordinates, on a grid."""
@@ -323,7 +327,7 @@ class Searching:
 
     def _hand_on(self, wave: Sequence[Part]) -> None:
         """Add the newest twists of each part to those that the next wave begins with."""
-        each = max(1, KEPT // len(wave))
+        each = max(1, TWISTS_HANDED_ON // len(wave))
         for part in wave:
             size = int(part.pool.size[0])
             newest = np.argsort(-part.pool.used[:size], kind="stable")[:each]

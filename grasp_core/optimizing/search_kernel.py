@@ -13,7 +13,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
-from grasp_core.optimizing.contact_places import ROOM
+from grasp_core.optimizing.contact_places import CORNER_ROOM
 from grasp_core.optimizing.replay_kernel import (
     BY_LINE,
     BY_PIECES,
@@ -28,22 +28,22 @@ from grasp_core.optimizing.twists_kernel import Demand, Pool, area, descend, ext
 from grasp_core.values import FINGERS
 
 SPLICE = 64  # what a node does that is a part of its own
-LEAST = 1e-7  # extent of a polygon, in object radii, below which it is not divided
+LEAST_EXTENT = 1e-7  # extent of a polygon, in object radii, below which it is not divided
 SEVERAL = 2.0
 """Extent that counts for a finger with several pieces, larger than that of any piece."""
 ALL = -1  # says that all fingers have changed
-THIN = 0.03
+EXTENT_WEIGHT = 0.03
 """Weight of a polygon's squared extent beside its area, so that thin ones count."""
 MOST_LEFT = 0.9
 """Share of a finger's polygons above which an answer among several makes no headway."""
 SHRUNK = 0.97  # cost of a question with one answer, up to which it is asked
-DONE, PAUSED, FULL, PART, FOUND, LOST = 0, 1, 2, 3, 4, 5
+DONE, PAUSED, NO_ROOM, OWN_PART, CONTACTS_FOUND, UNDIVIDABLE = 0, 1, 2, 3, 4, 5
 """Why a run ends: nothing left, budget of nodes spent, no room in the tree, a node that is to be a
 part of its own, contacts that may reach the threshold, a node too small to be divided."""
 ASKED_ABOVE = 1.05
 """Cost of a question up to which it is asked rather than dividing a polygon, which costs 1.41. It
 was measured: after a division more twists have a single answer."""
-STEPS, CLOSE_STEPS = 40, 120  # steps of descents for a node, and for its middle
+NODE_STEPS, MIDDLE_STEPS = 40, 120  # steps of descents for a node, and for its middle
 
 
 class Tree(NamedTuple):
@@ -56,7 +56,7 @@ class Tree(NamedTuple):
     sizes: Indices  # how many nodes, twists and lines there are, (3,)
 
 
-class Work(NamedTuple):
+class NodeRoom(NamedTuple):
     """Room for what is known about the node at work."""
 
     reach: Array  # largest support of each finger under each twist, (4, c)
@@ -78,7 +78,7 @@ class Search(NamedTuple):
     stack: Nodes  # those above a node count that have several children
     pool: Pool
     tree: Tree
-    work: Work
+    work: NodeRoom
     t: float  # the multiple of the loads that no contacts are to resist
     demand: Demand
     spare: float  # how far below t times a twist's demand a support still counts as an answer
@@ -115,7 +115,7 @@ def divide(search: Search) -> bool:
     stack, tree = search.stack, search.tree
     node = stack.top[0] - 1
     chosen, live, size = _largest(stack, node)
-    if size < LEAST:
+    if size < LEAST_EXTENT:
         return False
     line = tree.lines[tree.sizes[2]]
     line[:] = 0.0
@@ -221,7 +221,7 @@ def look(search: Search, node: int, i: int, first: int, last: int) -> None:
 @loop("numpy")
 def _weight(corners: Array, count: int, ends: Indices) -> float:
     long = extent(corners, count, ends)
-    return area(corners, count) + THIN * long * long
+    return area(corners, count) + EXTENT_WEIGHT * long * long
 
 
 @loop("numpy")
@@ -272,7 +272,7 @@ def _measured(search: Search, node: int, k: int) -> float:
     """
     pieces, stack, work, t = search.pieces, search.stack, search.work, answer_to(search, k)
     cost, answers, stays = 0.0, 0, False
-    rest, ends = np.empty((ROOM, 2)), np.empty(2, np.int64)
+    rest, ends = np.empty((CORNER_ROOM, 2)), np.empty(2, np.int64)
     answering = _answering(search, node, k)
     copy(search.pool.asked[:, :, k], work.asked)
     for i in range(FINGERS):
@@ -323,12 +323,12 @@ def run(search: Search, budget: int, part_depth: int) -> int:
             return DONE
         node = stack.top[0] - 1
         if is_full(stack, tree):
-            return FULL
+            return NO_ROOM
         if stack.above[node] >= part_depth:
             note(tree, SPLICE, 0)
-            return PART
+            return OWN_PART
         if not _visit(search, node, tree.sizes[0]):
-            return LOST if search.work.on[0] < 0 else FOUND
+            return UNDIVIDABLE if search.work.on[0] < 0 else CONTACTS_FOUND
     return PAUSED
 
 
@@ -375,7 +375,7 @@ def _lowered(search: Search, node: int, now: int) -> float:
         found = multiple(found + search.spare, search.pool.demands[k])
         if found < least:
             least, first = found, k
-    room = FINGERS * ROOM
+    room = FINGERS * CORNER_ROOM
     points, on, m = np.empty((room, 3)), np.empty(room, np.int64), 0
     for i in range(FINGERS):
         p = work.on[i]
@@ -387,7 +387,7 @@ def _lowered(search: Search, node: int, now: int) -> float:
             _place(pieces, p, stack.corners[node, i, p, v], points[m])
             on[m] = p
             m += 1
-    return _descended(search, node, points[:m], on, (first, least), STEPS, now)
+    return _descended(search, node, points[:m], on, (first, least), NODE_STEPS, now)
 
 
 @loop("numpy", once=True)
@@ -406,7 +406,7 @@ def _middle_lowered(search: Search, node: int, now: int) -> float:
         found = multiple(found + search.spare, pool.demands[k])
         if found < near:
             near, nearest = found, k
-    return _descended(search, node, points, on, (nearest, near), CLOSE_STEPS, now)
+    return _descended(search, node, points, on, (nearest, near), MIDDLE_STEPS, now)
 
 
 @loop("numpy")

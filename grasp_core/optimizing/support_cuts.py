@@ -58,7 +58,7 @@ It refutes a threshold that is lower by `SEARCHED_BELOW`, more than all of these
 answers in the replay answers in the search. No proof rests on that: the replay decides.
 
 Symmetries. See `contact_places`: contacts can be moved by a symmetry, at the cost of its error. It
-takes the place of rounding in (3) and (4): `INEXACT` is added to `ROUNDING`.
+takes the place of rounding in (3) and (4): `INEXACT` is added to `MEASURE_ROUNDING`.
 
 Files. A proof about a whole object is kept as an npz file, which needs no pickles. Its arrays are
 those of `CutTree` and of its `Grounds`, by name, and three more: `format` is the text "graspproof
@@ -87,7 +87,7 @@ from grasp_core.optimizing.contact_places import REPLAY, Grounds, first_nodes, f
 from grasp_core.quality.measures import FERRARI_CANNY, Measure
 from grasp_core.values import FINGERS
 
-ROUNDING = 1e-9
+MEASURE_ROUNDING = 1e-9
 """How far rounding can lift a measure above the threshold, over 1 + mu: the derivation needs less
 than a tenth of it."""
 MOST_CUTS = 10_000
@@ -99,7 +99,8 @@ INEXACT = 1e-7
 """How far errors of symmetries can lift a measure, over 1 + mu (see `contact_places`)."""
 TWIST_SLACK = 1e-12
 """How far unit twists may be from length one: their lengths are rounded by less than 1e-15, and a
-wrench is shorter than 8 (1 + mu), so that a support is off by a hundredth of `ROUNDING` at most."""
+wrench is shorter than 8 (1 + mu), so that a support is off by a hundredth of `MEASURE_ROUNDING` at
+most."""
 LONGEST_TWIST = 2.0
 """Longest twist for the Ferrari-Canny quality, the size for which rounding is bounded."""
 LEAST_THRESHOLD, MOST_THRESHOLD = 1e-6, 1e3
@@ -121,7 +122,7 @@ class Slack(NamedTuple):
     @classmethod
     def of(cls, friction: float, maps: int, measure: Measure, more: float = 0.0) -> "Slack":
         """Return the slack of proofs about a measure."""
-        lost = ROUNDING + (INEXACT if maps > 1 else 0.0)
+        lost = MEASURE_ROUNDING + (INEXACT if maps > 1 else 0.0)
         slack = (1.0 + friction) * lost + (1.0 + friction) * more
         return cls(slack, 0.0) if measure.is_usual else cls(0.0, slack)
 
@@ -205,14 +206,14 @@ class CutTree(Declared):
         )  # fmt: skip
 
 
-USUAL, OTHER, FORMAT = 1, 2, "graspproof cut tree"
+USUAL_SCHEMA, OTHER_SCHEMA, FORMAT = 1, 2, "graspproof cut tree"
 """Schema of files for the Ferrari-Canny quality, and for other measures; what both say they are."""
-MOST_BYTES = 2**30
+MOST_PROOF_BYTES = 2**30
 OF_LOADS = ("measure", "loads")
 OF_GROUNDS = tuple(each.name for each in fields(Grounds))
 OF_TREE = tuple(each.name for each in fields(CutTree)
                 if each.name not in {"grounds", "measure", "owners"})  # fmt: skip
-SMALL = {"deeds": np.uint8, "asked": np.int32, "faces": np.int32, "counts": np.int32}
+SMALL_TYPES = {"deeds": np.uint8, "asked": np.int32, "faces": np.int32, "counts": np.int32}
 """Types that hold the whole numbers of the tree in less room."""
 
 
@@ -225,10 +226,14 @@ def write_proof(path: Path, proof: CutTree) -> Path:
         )
     arrays: dict[str, Any] = {name: getattr(proof.grounds, name) for name in OF_GROUNDS}
     arrays |= {name: getattr(proof, name) for name in OF_TREE}
-    arrays |= {name: arrays[name].astype(kind) for name, kind in SMALL.items()}
-    arrays |= {"format": FORMAT, "bound": proof.bound, "schema": USUAL}
+    arrays |= {name: arrays[name].astype(kind) for name, kind in SMALL_TYPES.items()}
+    arrays |= {"format": FORMAT, "bound": proof.bound, "schema": USUAL_SCHEMA}
     if not proof.measure.is_usual:
-        arrays |= {"schema": OTHER, "measure": proof.measure.name, "loads": proof.measure.loads}
+        arrays |= {
+            "schema": OTHER_SCHEMA,
+            "measure": proof.measure.name,
+            "loads": proof.measure.loads,
+        }
     stream = io.BytesIO()
     np.savez_compressed(stream, allow_pickle=False, **arrays)
     return write_parts(path, [stream.getvalue()])
@@ -237,20 +242,23 @@ def write_proof(path: Path, proof: CutTree) -> Path:
 def read_proof(path: Path) -> CutTree:
     """Read a proof that `write_proof` has written; `CutTree.verify` then checks what it claims."""
     arrays = _arrays(path)
-    schemas = [kind for kind in (USUAL, OTHER) if np.array_equal(arrays["schema"], kind)]
+    schemas = [
+        kind for kind in (USUAL_SCHEMA, OTHER_SCHEMA) if np.array_equal(arrays["schema"], kind)
+    ]
     if str(arrays["format"]) != FORMAT or not schemas:
         raise InputError(
-            f"{path}: expected the text {FORMAT!r} and schema {USUAL} or {OTHER}; write it again"
+            f"{path}: expected the text {FORMAT!r} and schema {USUAL_SCHEMA} or {OTHER_SCHEMA}; "
+            "write it again"
         )
     with about(path):
         grounds = Grounds(**{name: arrays[name] for name in OF_GROUNDS})
         measure = FERRARI_CANNY
-        if schemas == [OTHER]:
+        if schemas == [OTHER_SCHEMA]:
             name: Any = str(arrays["measure"])
             measure = Measure(name, arrays["loads"])
             if measure.is_usual:
                 raise InputError(
-                    f"expected measure 'weight' or 'task' with schema {OTHER}, got {name}"
+                    f"expected measure 'weight' or 'task' with schema {OTHER_SCHEMA}, got {name}"
                 )
         # arrays of no axes become numbers
         parts: dict[str, Any] = {name: arrays[name][()] for name in OF_TREE}
@@ -261,16 +269,16 @@ def read_proof(path: Path) -> CutTree:
 
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
-    data = read_bytes(path, MOST_BYTES)
+    data = read_bytes(path, MOST_PROOF_BYTES)
     wanted = (*OF_GROUNDS, *OF_TREE, "schema", "format", "bound")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             claimed = sum(each.file_size for each in archive.infolist())
-        if claimed > MOST_BYTES:
-            raise InputError(f"{path}: its arrays take {claimed} bytes, over {MOST_BYTES}")
+        if claimed > MOST_PROOF_BYTES:
+            raise InputError(f"{path}: its arrays take {claimed} bytes, over {MOST_PROOF_BYTES}")
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             found = {name: archive[name] for name in wanted}
-            if np.array_equal(found["schema"], OTHER):
+            if np.array_equal(found["schema"], OTHER_SCHEMA):
                 found |= {name: archive[name] for name in OF_LOADS}
             return found
     except InputError:

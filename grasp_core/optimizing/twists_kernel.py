@@ -11,7 +11,7 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.arrays_kernel import copy
 from grasp_core.compiled import loop
-from grasp_core.optimizing.replay_kernel import SLOPES, Pieces, slopes
+from grasp_core.optimizing.replay_kernel import SLOPE_NUMBERS, Pieces, slopes
 
 
 @loop("numpy")
@@ -42,7 +42,7 @@ OVER = 1.0 + 4e-16  # factor that makes rounded unit twists at least one long
 SETTLING = 5  # steps without progress after which a descent aims less far
 FIRST_AIM, LAST_AIM = 0.2, 0.004
 """Share of the value that a step aims below the best one, at first and before a descent ends."""
-USUAL, WEIGHT, TASK = 0, 1, 2  # kinds of demands
+QUALITY_DEMAND, WEIGHT_DEMAND, TASK_DEMAND = 0, 1, 2  # kinds of demands
 SMALL_DEMAND = 1e-2
 """Demand below which descents take this one, and twists with negative support are compared by it.
 """
@@ -52,7 +52,8 @@ class Demand(NamedTuple):
     """The loads whose largest resisted multiple is sought."""
 
     kind: int
-    """Whose length is at most one (`USUAL` for wrenches, `WEIGHT` for forces), or of a `TASK`."""
+    """Whose length is at most one (`QUALITY_DEMAND` for wrenches, `WEIGHT_DEMAND` for forces), or
+    of a `TASK_DEMAND`."""
     loads: Array  # loads of a task, (m, 6)
 
 
@@ -85,7 +86,7 @@ def learn(pool: Pool, pieces: Pieces, demand: Demand, y: Array, now: int) -> int
     for j in range(TWIST):
         pool.twists[place, j] = y[j] / length * OVER
     pool.demands[place] = demanded(demand, pool.twists[place], np.empty(TWIST))
-    at = np.empty(SLOPES)
+    at = np.empty(SLOPE_NUMBERS)
     for p in range(len(pieces.normals)):
         slopes(pieces, p, pool.twists[place], at)
         copy(at, pool.asked[p, :, place])
@@ -101,9 +102,9 @@ def demanded(demand: Demand, y: Array, hardest: Array) -> float:
     across it.
     """
     hardest[:] = 0.0
-    if demand.kind == USUAL:
+    if demand.kind == QUALITY_DEMAND:
         return 1.0
-    if demand.kind == WEIGHT:
+    if demand.kind == WEIGHT_DEMAND:
         long = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
         if long > 0.0:
             for j in range(3):
@@ -208,7 +209,7 @@ def descend(
         length = np.sqrt(length)
         for j in range(TWIST):
             at[j] /= length
-    if demand.kind == USUAL:
+    if demand.kind == QUALITY_DEMAND:
         return best
     found = highest(pieces, points, on, y, slope)
     return multiple(found + spare, demanded(demand, y, hardest))
@@ -221,7 +222,7 @@ def _steepest(
 ) -> float:  # fmt: skip
     """Return the multiple that a twist allows, asked for a little at least; fill in its slope."""
     found = highest(pieces, points, on, y, slope)
-    if demand.kind == USUAL:
+    if demand.kind == QUALITY_DEMAND:
         return found
     asked = demanded(demand, y, hardest)
     if asked < SMALL_DEMAND:

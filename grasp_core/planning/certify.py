@@ -46,7 +46,7 @@ from grasp_core.values import (
     four,
 )
 
-BALANCED = 1e-6
+WITNESS_SLACK = 1e-6
 """Largest wrench by which witness forces may miss balance, for normal parts that sum to one and an
 object of size one: forces written with six digits meet it."""
 
@@ -127,12 +127,12 @@ def witness_faults(
     missed = np.linalg.norm(wrenches, axis=-1)
     rules = {
         "the normal parts of the witness forces do not sum to one": (
-            np.abs(along.sum(axis=-1) - 1.0) <= BALANCED
+            np.abs(along.sum(axis=-1) - 1.0) <= WITNESS_SLACK
         ),
         "a witness force is outside its friction cone": (
-            (along > 0.0).all(axis=-1) & (across <= friction * along + BALANCED).all(axis=-1)
+            (along > 0.0).all(axis=-1) & (across <= friction * along + WITNESS_SLACK).all(axis=-1)
         ),
-        "the witness forces do not balance": missed <= BALANCED,
+        "the witness forces do not balance": missed <= WITNESS_SLACK,
     }
     kept = np.stack(list(rules.values()), axis=1).tolist()
     faults = [next((fault for fault, fits in zip(rules, row, strict=True) if not fits), None)
@@ -150,7 +150,7 @@ def check_witness(body: Polyhedron, grasp: Grasp, friction: float) -> None:
     contacts = (grasp.positions - body.center_of_mass) / body.radius
     witness = points[None], grasp.normals[None], grasp.witness.forces[None]
     (fault,) = witness_faults(*witness, friction, [grasp.family])
-    if np.abs(points - contacts).max() > BALANCED:
+    if np.abs(points - contacts).max() > WITNESS_SLACK:
         fault = "the witness lines do not pass through the contacts"
     if grasp.family != "regulus" and _beside_foci(body, grasp):
         fault = "the witness lines do not pass through the focus points"
@@ -165,7 +165,7 @@ def _beside_foci(body: Polyhedron, grasp: Grasp) -> bool:
         return True
     foci = np.repeat(grasp.focus_points, len(grasp.contacts) // count, axis=0)
     misses = np.cross(foci - grasp.witness.points, grasp.witness.directions)
-    return bool(np.linalg.norm(misses, axis=1).max() > BALANCED * body.radius)
+    return bool(np.linalg.norm(misses, axis=1).max() > WITNESS_SLACK * body.radius)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,7 +202,7 @@ PAIRED = ("p", "r")
 """Letters of the ids of pencils and reguli, whose fingers (0, 1) and (2, 3) form pairs."""
 ORDER, UNMIRRORED = list(range(FINGERS)), np.ones(3)
 """The order of the fingers, and the signs of the coordinates, where nothing is translated."""
-Place: TypeAlias = tuple[int, str]
+FingerPlace: TypeAlias = tuple[int, str]
 """The face on which a finger stands, by its number on the object as it was given, and the half of
 the face, `a` or `b`; empty for a whole face."""
 
@@ -266,7 +266,7 @@ def _named(found: Certified, on: Standard) -> tuple[str, Sequence[int], list[int
     return name, [places[finger][0] for finger in order], order
 
 
-def _place(on: Standard, face: int) -> Place:
+def _place(on: Standard, face: int) -> FingerPlace:
     owner = on.owners[face]
     if face == owner:
         return on.faces[owner], ""

@@ -38,11 +38,11 @@ from grasp_core.values import (
 
 LARGEST_LEAN = math.radians(20.0)
 """Largest angle between a given normal and the normal where the contact is put [rad]."""
-SURROUNDINGS = 0.05
+PATCH_RADIUS = 0.05
 """Radius of the face around a contact on a curved surface, relative to the object's size."""
-CORNERS = 16
+PATCH_CORNERS = 16
 """Corners of the face around a contact on a curved surface."""
-NEARER = 1e-9
+NEARER_FACE = 1e-9
 """Distance, relative to the object's size, by which a face must be nearer than an earlier one to
 replace it: a contact on an edge goes to the first of its faces with a fitting normal."""
 LARGEST_MOVE = 0.02
@@ -65,7 +65,7 @@ def seat(body: Polyhedron, positions: ArrayLike, normals: ArrayLike) -> Seated:
     inward = frozen_units(normals, (FINGERS, 3), "normals")
     facets = facets_of(body)
     found = list[Nearest]()
-    reach, margin = LARGEST_MOVE * body.radius, NEARER * body.radius
+    reach, margin = LARGEST_MOVE * body.radius, NEARER_FACE * body.radius
     for finger, (point, normal) in enumerate(zip(points, inward, strict=True)):
         nearest = nearest_like(facets, point, normal, lean=LARGEST_LEAN, reach=reach, margin=margin)
         if nearest is None:
@@ -171,8 +171,8 @@ def nearest_like(
 
 def _around(body: Polyhedron, triangle: int, contact: Contact) -> Face:
     """Make a round face around a contact on a triangle, in the triangle's plane."""
-    radius = SURROUNDINGS * body.radius
-    polygon = contact.position + radius * circle(CORNERS) @ plane_frame(contact.normal).T
+    radius = PATCH_RADIUS * body.radius
+    polygon = contact.position + radius * circle(PATCH_CORNERS) @ plane_frame(contact.normal).T
     return Face(
         normal=contact.normal,
         centroid=contact.position,

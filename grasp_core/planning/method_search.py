@@ -38,9 +38,9 @@ from grasp_core.families.placing import (
     MIXED,
     MOST_CHOICES,
     Attempt,
-    Cones,
     Construction,
-    Settling,
+    ContactPlacing,
+    FourCones,
     chosen_shapes,
     on_true_surface,
     point_regions,
@@ -71,9 +71,9 @@ TOGETHER = 32
 """Number of blocks of quadruples searched at once: a million take some hundred megabytes."""
 MOST_ATTEMPTS = 512
 """Number of attempts that are made together at most."""
-SAME_MERIT = 1e-5
+BEATEN_SHARE = 1e-5
 """Share by which a grasp must beat the worst one kept: symmetric objects hold many equal ones."""
-SAME_CONTACTS = 1e-6
+ONE_GRASP = 1e-6
 """Distance between contacts below which two grasps count as one, in object radii."""
 
 
@@ -192,8 +192,8 @@ class FamilySearch:
     """Whether to end the search with what was found by then."""
 
     @cached_property
-    def _settling(self) -> Settling:
-        return Settling(self.construction, self.shapes)
+    def _settling(self) -> ContactPlacing:
+        return ContactPlacing(self.construction, self.shapes)
 
     @property
     def least(self) -> float:
@@ -202,7 +202,7 @@ class FamilySearch:
         if full and (self.construction.limits is None or not best):
             return math.inf
         worst = best[-1].placement.merit if full else -math.inf
-        return max(worst * (1.0 + SAME_MERIT), self.construction.least)
+        return max(worst * (1.0 + BEATEN_SHARE), self.construction.least)
 
     def found_in(self, blocks: Blocks, places: range) -> Iterator[list[Certified]]:
         """Yield the grasps on each quadruple of some blocks, to be kept before the next ones."""
@@ -369,17 +369,17 @@ def _without_duplicates(found: list[Certified]) -> list[Certified]:
     for one in sorted(found, key=best_first):
         here = one.placement.positions[np.argsort(one.faces)]
         if all(
-            np.abs(here - other.placement.positions[np.argsort(other.faces)]).max() >= SAME_CONTACTS
+            np.abs(here - other.placement.positions[np.argsort(other.faces)]).max() >= ONE_GRASP
             for other in kept
         ):
             kept.append(one)
     return kept
 
 
-Pieces: TypeAlias = tuple[FacePiece, ...]
-Answer: TypeAlias = tuple[Pieces, Placement | Absence | Undecided]
+FourPieces: TypeAlias = tuple[FacePiece, ...]
+FreeAnswer: TypeAlias = tuple[FourPieces, Placement | Absence | Undecided]
 """Convex pieces of four faces, and what the free method says about them."""
-Placed: TypeAlias = tuple[Pieces, Placement]
+PlacedPieces: TypeAlias = tuple[FourPieces, Placement]
 """Convex pieces of four faces, and contacts on them."""
 
 
@@ -438,7 +438,9 @@ class _FreeSearch:
             found.update(zip(alike, known, strict=True))
         return found
 
-    def placed_on(self, faces: FaceQuadruple, known: ClosureCertificate | None) -> Placed | None:
+    def placed_on(
+        self, faces: FaceQuadruple, known: ClosureCertificate | None
+    ) -> PlacedPieces | None:
         """Find contacts on four faces, or record why there are none; `known` is of their hulls."""
         on, gathered = self.on, self.gathered
         chosen = chosen_shapes(on.shapes, faces)
@@ -467,7 +469,7 @@ class _FreeSearch:
 
     def _answers(
         self, faces: FaceQuadruple, shapes: Sequence[FaceShape], known: ClosureCertificate | None
-    ) -> list[Answer]:
+    ) -> list[FreeAnswer]:
         """Collect answers for the convex pieces of four faces; a placement can only be the last.
 
         Together the answers decide the faces, unless one is `Undecided`. The convex hulls come
@@ -483,7 +485,7 @@ class _FreeSearch:
         placed = isinstance(whole, Placement)
         at = whole.positions if placed else np.array([hull.origin for hull in hulls])
         most = MOST_CHOICES * self.request.max_face_parts
-        answers: list[Answer] = []
+        answers: list[FreeAnswer] = []
         for pieces in choices_near(shapes, at, most):
             tally["solved"] += 1
             answers.append((pieces, self._place(pieces, rng, restarts=0)))
@@ -502,15 +504,15 @@ class _FreeSearch:
         return answers
 
     def _on_triangles(
-        self, faces: FaceQuadruple, shapes: Sequence[FaceShape], pieces: Pieces,
+        self, faces: FaceQuadruple, shapes: Sequence[FaceShape], pieces: FourPieces,
         answer: Placement | Absence | Undecided,
-    ) -> Placed | None:  # fmt: skip
+    ) -> PlacedPieces | None:  # fmt: skip
         """Contacts on the triangles of curved patches; planes without a grasp prove nothing."""
         if isinstance(answer, Placement):
             cones = [ForceCone(piece.normal, 0.0) for piece in pieces]
             rng = self._rng(faces)
 
-            def place(facets: Pieces) -> Placement | None:
+            def place(facets: FourPieces) -> Placement | None:
                 found = self._place(facets, rng, restarts=0)
                 return found if isinstance(found, Placement) else None
 
@@ -523,12 +525,12 @@ class _FreeSearch:
     def _rng(self, faces: FaceQuadruple) -> np.random.Generator:
         return np.random.default_rng([self.request.seed, *faces])
 
-    def _friction(self, pieces: Pieces) -> float:
+    def _friction(self, pieces: FourPieces) -> float:
         theta, spread = self.request.theta, max(piece.spread for piece in pieces)
         return math.tan(theta - spread if spread < theta else LEAST_SPAN_ANGLE)
 
     def _place(
-        self, pieces: Pieces, rng: np.random.Generator, restarts: int = RESTARTS,
+        self, pieces: FourPieces, rng: np.random.Generator, restarts: int = RESTARTS,
         known: ClosureCertificate | None = None,
     ) -> Placement | Absence | Undecided:  # fmt: skip
         try:
@@ -540,7 +542,7 @@ class _FreeSearch:
             return Undecided(1.0)
 
     def certified(
-        self, faces: FaceQuadruple, placed: Placed, choices: tuple[Cones, ...]
+        self, faces: FaceQuadruple, placed: PlacedPieces, choices: tuple[FourCones, ...]
     ) -> Certified | None:
         """Certify contacts, with regions if a construction offers them around these forces."""
         request, (pieces, placement) = self.request, placed
@@ -558,7 +560,11 @@ class _FreeSearch:
 
 
 def _upgraded(
-    faces: FaceQuadruple, pieces: Pieces, construction: Construction, cones: Cones, friction: float
+    faces: FaceQuadruple,
+    pieces: FourPieces,
+    construction: Construction,
+    cones: FourCones,
+    friction: float,
 ) -> Certified | None:
     shapes: list[FaceShape | None] = [None] * (max(faces) + 1)
     for face, piece in zip(faces, pieces, strict=True):

@@ -34,15 +34,15 @@ from grasp_core.planning.certify import Certified, LateFigures, to_grasp
 from grasp_core.planning.method_search import FamilySearch, Gathered, MethodSearch, found_on
 from grasp_core.planning.quadruples import Blocks, PlannedCones, all_blocks, kept, spanning_blocks
 from grasp_core.planning.reach import Finger, reach
-from grasp_core.planning.result import FAMILIES, Outcomes, PlanRequest
+from grasp_core.planning.result import FAMILIES, Ended, Outcomes, PlanRequest
 from grasp_core.processes import Processes
 from grasp_core.small_objects import fitted
 from grasp_core.solvers.ties import SAME_SHARE, first_best, ranks
-from grasp_core.stopping import never, until
+from grasp_core.stopping import Stop, until
 from grasp_core.values import FINGERS, FaceQuadruple, four
 
 Item = TypeVar("Item")
-Progress: TypeAlias = Callable[[int, int, int], None]
+PlanProgress: TypeAlias = Callable[[int, int, int], None]
 """Called with (quadruples finished, all quadruples, grasps so far) after each quadruple tried."""
 BATCH, LIMITED_BATCH = 1024, 64
 """Number of face quadruples that are decided together, and with a limit on the grasps."""
@@ -68,11 +68,11 @@ class Batch:
     again: bool = False
 
 
-Part: TypeAlias = Block | Batch
+SearchPart: TypeAlias = Block | Batch
 
 
 @dataclass(slots=True, eq=False)
-class Found:
+class PartFound:
     """What a part of a search holds."""
 
     gathered: Gathered  # proofs and counts, complete once all grasps were taken
@@ -81,7 +81,7 @@ class Found:
     """Processor time of another process [s]; zero for parts found in this process."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class PlanSearch:
     """The search for grasps of one object: what is asked for, and what each method has found."""
 
@@ -92,15 +92,16 @@ class PlanSearch:
     """The search of each method that is asked for; the free method comes last."""
     workers: Processes | None = None
     """Other processes that search parts; None where this one is alone."""
-    stop: Callable[[], bool] = never
+    stop: Stop = field(default_factory=Stop)
     """Whether to end the search with what was found by then."""
+    ended: Ended = "done"
     unranked: Counter[str] = field(default_factory=Counter[str])
     """Numbers of grasps without a figure to rank by, by the reason."""
 
     @classmethod
     def of(
         cls, body: Polyhedron, request: PlanRequest, workers: Processes | None = None,
-        stop: Callable[[], bool] = never,
+        stop: Stop | None = None,
     ) -> "PlanSearch":  # fmt: skip
         """Put an object into standard order, with faces cut as requested, and set up its search."""
         on = in_standard_order(body, request)
@@ -110,9 +111,9 @@ class PlanSearch:
             for method in METHODS
             if method in request.families
         }
-        return cls(body, on, request, methods, workers, stop)
+        return cls(body, on, request, methods, workers, Stop() if stop is None else stop)
 
-    def run(self, progress: Progress | None = None) -> Iterator[Certified]:
+    def run(self, progress: PlanProgress | None = None) -> Iterator[Certified]:
         """Yield each certified grasp in the order of the methods, on the standard object."""
         total, found, done = len(self.methods) * self.on.quadruples, 0, 0
         for done, grasps in self._steps():
@@ -143,7 +144,7 @@ class PlanSearch:
                 found = zip(sizes[method], every, strict=False)
             else:
                 steps = self._constructed(method, range(len(sizes[method])), search)
-                found = iter([(self.on.quadruples, Found(Gathered(), steps))])
+                found = iter([(self.on.quadruples, PartFound(Gathered(), steps))])
             for done, grasps in self._taken(found, search):
                 yield dealt_with + min(done, self.on.quadruples), grasps
             if self.stop():
@@ -171,7 +172,7 @@ class PlanSearch:
             undecided.update({faces: open_yet[faces] for faces in open_yet if faces not in known})
 
     def _taken(
-        self, found: Iterable[tuple[int, Found]], search: MethodSearch
+        self, found: Iterable[tuple[int, PartFound]], search: MethodSearch
     ) -> Iterator[tuple[int, list[Certified]]]:
         """Keep the grasps that parts hold, each given with its size, until limit or stop.
 
@@ -191,7 +192,7 @@ class PlanSearch:
             yield done, []  # also where bounds leave nothing to try
         search.seconds += time.process_time() - start
 
-    def each_found(self, parts: Iterable[Part]) -> Iterator[Found]:
+    def each_found(self, parts: Iterable[SearchPart]) -> Iterator[PartFound]:
         """Yield what each part holds, in order."""
         if self.workers is None:
             return map(self.found, parts)
@@ -203,26 +204,26 @@ class PlanSearch:
         """Have another process set up the search anew."""
         return PlanSearch.of, (self.body, self.request)
 
-    def found_elsewhere(self, part: Part) -> Found:
+    def found_elsewhere(self, part: SearchPart) -> PartFound:
         """Search one part to its end in another process, which tells its time."""
         begun, found = time.process_time(), self.found_at_once(part)
         return replace(found, seconds=time.process_time() - begun)
 
-    def found(self, part: Part) -> Found:
+    def found(self, part: SearchPart) -> PartFound:
         """Search one part; it is gone through while its grasps are taken."""
         gathered = Gathered()
         if isinstance(part, Block):
             # with no limit, no grasp raises the threshold: nothing is kept here
             search = MethodSearch(part.family, gathered=gathered)
             places = range(part.place, part.place + 1)
-            return Found(gathered, self._constructed(part.family, places, search))
+            return PartFound(gathered, self._constructed(part.family, places, search))
         tried = found_on(self.on, part.quadruples, self.request, gathered, part.again, self.stop)
-        return Found(gathered, ([one] if one else [] for one in tried))
+        return PartFound(gathered, ([one] if one else [] for one in tried))
 
-    def found_at_once(self, part: Part) -> Found:
+    def found_at_once(self, part: SearchPart) -> PartFound:
         """Search one part and take all its grasps."""
         found = self.found(part)
-        return Found(found.gathered, list(found.grasps))
+        return PartFound(found.gathered, list(found.grasps))
 
     def _constructed(
         self, family: Family, places: range, search: MethodSearch
@@ -339,14 +340,14 @@ def _without_room(on: Standard) -> int:
     return math.comb(whole, FINGERS) - math.comb(roomy, FINGERS) + shared
 
 
-PUSH_N = 10.0
+PAYLOAD_PUSH_N = 10.0
 """Largest push of a finger under which payloads are compared [N]; less for small objects."""
 TIP_RADIUS = 0.1
 """Radius of fingertips whose size is not given, in object radii: that of scenes."""
 
 
 def chosen(
-    search: PlanSearch, stop: Callable[[], bool], progress: Callable[[int, int], None] | None = None
+    search: PlanSearch, stop: Stop, progress: Callable[[int, int], None] | None = None
 ) -> list[Certified]:
     """Select the grasps to return, the best first; by radius, families take turns.
 
@@ -363,11 +364,15 @@ def chosen(
         wanted = min(len(every), request.limit or len(every))
         order = list(_told(until(stop, islice(_far_apart(every), wanted)), wanted, progress))
         order += sorted(set(range(len(every))) - set(order))
-        return [every[place] for place in order[:wanted]]
-    measure, same = _measure(search)
-    figures = list(_told(map(measure, until(stop, every)), len(every), progress))
-    ranked = _in_order(every[: len(figures)], figures, same)
-    return [*ranked, *every[len(figures) :]][: request.limit]
+        best = [every[place] for place in order[:wanted]]
+    else:
+        measure, same = _measure(search)
+        figures = list(_told(map(measure, until(stop, every)), len(every), progress))
+        ranked = _in_order(every[: len(figures)], figures, same)
+        best = [*ranked, *every[len(figures) :]][: request.limit]
+    if search.ended == "done" and stop():
+        search.ended = stop.why
+    return best
 
 
 def _told(
@@ -425,7 +430,7 @@ def carried(
         springs(fitted(STIFFNESS_N_PER_M, body.radius), count), np.full(count, tip),
     )  # fmt: skip
     try:
-        return searched(start, any_direction(1.0), fitted(PUSH_N, body.radius, 2)).scale
+        return searched(start, any_direction(1.0), fitted(PAYLOAD_PUSH_N, body.radius, 2)).scale
     except NoForcesError:
         return 0.0
 

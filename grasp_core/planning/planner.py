@@ -9,84 +9,66 @@ and finds grasps on them or proves that there are none.
 
 import math
 import time
+import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
-from typing import cast
+from typing import Any
 
 from grasp_core.cones.spanning import count_spanning
+from grasp_core.errors import InputError
 from grasp_core.families.placements import LEAST_RADIUS
 from grasp_core.frames import kept_angle
-from grasp_core.kinds import Count, function, value_of
-from grasp_core.names import METHODS, ConeKind, Method, RankBy
+from grasp_core.kinds import Count, function, instance, value_of
+from grasp_core.names import Method, RankBy
 from grasp_core.objects.planar_faces import MAX_FACES
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.certify import Certified, absence_as_given, faces_as_given, to_grasp
-from grasp_core.planning.plan_search import PlanSearch, Progress, chosen, worth_starting
+from grasp_core.planning.plan_search import PlanProgress, PlanSearch, chosen, worth_starting
 from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE
 from grasp_core.planning.reach import Finger
-from grasp_core.planning.result import Ended, Outcomes, Plan, PlanCounts, PlanRequest, check_request
+from grasp_core.planning.result import Outcomes, Plan, PlanCounts, PlanRequest, check_request
+from grasp_core.planning.settings import PlanSettings
 from grasp_core.processes import local_processes
+from grasp_core.settings import extended
 from grasp_core.stopping import Stop
 from grasp_core.values import Grasp
 
 
-def plan(  # noqa: PLR0913 - the contract's keywords
+def plan(  # noqa: PLR0913 - the five settings that most plans need are keywords too
     body: Polyhedron,
-    friction: float = 0.5,
+    friction: float | None = None,
     *,
-    families: Sequence[Method] | Method = METHODS,
-    theta_deg: float | None = None,
-    cones: ConeKind = "tilted",
+    families: Sequence[Method] | Method | None = None,
     limit: int | None = None,
-    rank_by: RankBy = "radius",
-    seed: int = 0,
-    max_face_parts: int = 1,
-    complete: bool = False,
+    rank_by: RankBy | None = None,
     finger: Finger | None = None,
-    edge_clearance_m: float = 0.0,
-    share_faces_m: float | None = None,
-    time_limit_s: float | None = None,
-    progress: Progress | None = None,
+    settings: PlanSettings | None = None,
+    progress: PlanProgress | None = None,
     jobs: int = 1,
+    **deprecated: Any,
 ) -> Plan:
     """Find the four-finger force-closure grasps of an object.
 
     Args:
         body: The object.
-        friction: Coulomb coefficient at every contact.
+        friction: Coulomb coefficient at every contact. For this and the next three arguments, None
+            takes what `settings` say.
         families: Methods to try: constructions of the paper, and `free`, the method without a fixed
             type. Beside constructions `free` gets the quadruples that they leave over.
-        theta_deg: Half-angle of the friction cones to plan with [deg]; atan(friction) when
-            None, and never more than that.
-        cones: `normal` keeps force cones around the normals, as in the paper; `tilted` also tries
-            cones that lean away from the normals.
         limit: Keep at most this many grasps, the best ones.
-        rank_by: What makes a grasp better. By `radius`, families take turns, each with its largest
-            discs first. Reguli and free grasps have no discs: the first ones found count, and free
-            ones only if the others are too few. By `friction-margin` (the least critical
-            friction), `ferrari-canny` (the largest quality), `payload` (the largest mass in any
-            orientation under one squeeze with pushes up to 10 N; grasps that no such squeeze holds
-            come last), `placement` (the largest proved chance of closure where the object is off by
-            2 mm and 2 degrees, see `placement_probability`; those without a bound come last, and
-            `Plan.unranked` says why) and `diverse` (each next one is the farthest from those before
-            it) all grasps that are found compete. For objects with a radius below 25 mm, the 2 mm
-            are as much less as the radius, the 10 N as its square.
-        seed: Seed of the free method's restarts.
-        max_face_parts: Most parts into which the free method may cut the faces of one quadruple.
-        complete: Decide the quadruples that would stay undecided, with up to 20,000 parts each.
+        rank_by: What the best grasps have, by the names of `grasp_core.names.RANKINGS`. By
+            `radius`, families take turns, each with its largest discs first. Reguli and free grasps
+            have no discs: the first ones found count, and free ones only if the others are too few.
+            By the other rankings all grasps that are found compete; those without a figure come
+            last, and `Plan.unranked` says why.
         finger: Keep only grasps that such fingers reach on straight free lines.
-        edge_clearance_m: Distance of contacts and their regions from all edges of their faces [m].
-            Faces are cut back by this much, by somewhat more at corners that turn inwards; absence
-            is then proved for what is left of the faces.
-        share_faces_m: Let two fingers stand on one face, at least this far apart [m]; each face is
-            cut once for that, across its longest direction.
-        time_limit_s: Time after which planning ends with what is found by then, within some
-            seconds [s]. `Plan.ended` then says so: a clock decided which grasps are in the plan.
+        settings: All settings of the plan; the usual ones if None.
         progress: Called after each quadruple that is tried.
         jobs: Largest number of processes. Only searches for all grasps of objects with many faces
             use more than one; the plan does not depend on it, except for `Plan.seconds`.
+        deprecated: Other settings by their names, which `settings` takes now.
 
     Returns:
         The certified grasps, the best first, or a sentence why there are none, with counts.
@@ -95,30 +77,90 @@ def plan(  # noqa: PLR0913 - the contract's keywords
         InputError: An argument is out of range, or the object has too many faces.
         SolverError: A program was neither solved nor proved infeasible.
     """
-    request = PlanRequest(
-        friction, _listed(families), theta_deg, cones, limit, rank_by, max_face_parts, complete,
-        edge_clearance_m, share_faces_m, seed, time_limit_s, finger,
-    )  # fmt: skip
+    given = {
+        "friction": friction, "families": families, "limit": limit, "rank_by": rank_by,
+        "finger": finger,
+    }  # fmt: skip
+    request = requested("plan", settings, given, deprecated)
+    check_request(body, request)
     if progress is not None:
         function(progress, "progress")
     jobs = value_of(Count, jobs, "jobs")
-    return search_plan(body, request, Stop(seconds=request.time_limit_s), progress, jobs=jobs)
+    stop = Stop(seconds=request.time_limit_s)
+    search = search_grasps(body, request, stop, progress, jobs=jobs)
+    best = chosen(search, stop)
+    return put_together(search, best)
 
 
+def iter_grasps(
+    body: Polyhedron,
+    friction: float | None = None,
+    *,
+    families: Sequence[Method] | Method | None = None,
+    finger: Finger | None = None,
+    settings: PlanSettings | None = None,
+    **deprecated: Any,
+) -> Iterator[Grasp]:
+    """Like `plan`, but yields each grasp as soon as it is certified, in no particular order.
+
+    Raises:
+        InputError: An argument is out of range, `settings` ask for the best grasps, by a limit or a
+            ranking, or the object has too many faces.
+        SolverError: A program was neither solved nor proved infeasible.
+    """
+    given = {"friction": friction, "families": families, "finger": finger}
+    request = requested("iter_grasps", settings, given, deprecated)
+    if request.limit is not None or request.rank_by != "radius":
+        raise InputError(
+            "iter_grasps: settings.limit and settings.rank_by choose the best of all grasps, which "
+            "come in no order here; leave them out, or use plan"
+        )
+    check_request(body, request)
+    search = PlanSearch.of(body, request, stop=Stop(seconds=request.time_limit_s))
+    return (to_grasp(body, request.friction, each, search.on) for each in search.run())
+
+
+def requested(
+    name: str, settings: PlanSettings | None, given: Mapping[str, Any], old: Mapping[str, Any]
+) -> PlanRequest:
+    """Make a request of settings, of keywords that are not None, and of `old` ones with a warning.
+
+    The caller of the function `name`, which calls this one, is warned.
+    """
+    if settings is None:
+        settings = PlanSettings()
+    instance(settings, PlanSettings, "settings")
+    for word, value in old.items():
+        if word not in DEPRECATED:
+            raise TypeError(f"{name}() got an unexpected keyword argument {word!r}")
+        warnings.warn(
+            f"{name}({word}=...) will go; write settings=PlanSettings({word}={value!r})",
+            DeprecationWarning, stacklevel=3,
+        )  # fmt: skip
+    more = {word: value for word, value in given.items() if value is not None} | dict(old)
+    if isinstance(more.get("families"), str):
+        more["families"] = (more["families"],)
+    return extended(PlanRequest, settings, **more)
+
+
+DEPRECATED = (
+    "theta_deg", "cones", "seed", "max_face_parts", "complete", "edge_clearance_m",
+    "share_faces_m", "time_limit_s",
+)  # fmt: skip
+"""Settings that were keywords of `plan` themselves."""
 MADE_S = 2e-4
 """Time in which a grasp that is found is put into the object's frame [s]."""
 
 
-def search_plan(
-    body: Polyhedron, request: PlanRequest, stop: Stop, progress: Progress | None = None,
-    ranked: Callable[[int, int], None] | None = None, jobs: int = 1, after_s: float = MADE_S,
-) -> Plan:  # fmt: skip
-    """Plan what is requested, until told to stop; `ranked` is called with (ranked, to be ranked).
+def search_grasps(
+    body: Polyhedron, request: PlanRequest, stop: Stop, progress: PlanProgress | None = None,
+    *, jobs: int = 1, after_s: float = MADE_S,
+) -> PlanSearch:  # fmt: skip
+    """Search for all grasps that are requested, until told to stop.
 
     The time limit of the request does not count: `stop` does, which phases after it may share. The
     search leaves the time `after_s` for each grasp of the plan [s].
     """
-    check_request(body, request)
     # other rankings measure every grasp that is found, and need time of their own
     searching = stop.part(1 if request.rank_by == "radius" else 2)
     most = math.inf if request.limit is None else request.limit
@@ -128,43 +170,9 @@ def search_plan(
         for found, _ in enumerate(search.run(progress)):
             if found < most:
                 searching.reserve(after_s)
-    cut = searching()
-    best = chosen(search, stop, ranked)
-    ended = searching.why if cut or (stop() and request.rank_by != "radius") else "done"
-    return _planned(search, best, ended)
-
-
-def iter_grasps(  # noqa: PLR0913 - as `plan`
-    body: Polyhedron,
-    friction: float = 0.5,
-    *,
-    families: Sequence[Method] | Method = METHODS,
-    theta_deg: float | None = None,
-    cones: ConeKind = "tilted",
-    seed: int = 0,
-    max_face_parts: int = 1,
-    finger: Finger | None = None,
-    edge_clearance_m: float = 0.0,
-    share_faces_m: float | None = None,
-) -> Iterator[Grasp]:
-    """Like `plan`, but yields each grasp as soon as it is certified, in no particular order.
-
-    Raises:
-        InputError: An argument is out of range, or the object has too many faces.
-        SolverError: A program was neither solved nor proved infeasible.
-    """
-    request = PlanRequest(
-        friction, _listed(families), theta_deg, cones, seed=seed, max_face_parts=max_face_parts,
-        finger=finger, edge_clearance_m=edge_clearance_m, share_faces_m=share_faces_m,
-    )  # fmt: skip
-    check_request(body, request)
-    search = PlanSearch.of(body, request)
-    return (to_grasp(body, friction, each, search.on) for each in search.run())
-
-
-def _listed(families: Sequence[Method] | Method) -> tuple[Method, ...]:
-    """Return methods as a tuple, also a single one; `PlanRequest` checks them."""
-    return (families,) if isinstance(families, str) else cast("tuple[Method, ...]", families)
+    if searching():
+        search.ended = searching.why
+    return search
 
 
 CUT_SHORT = (
@@ -174,7 +182,7 @@ CUT_SHORT = (
 """Why a plan that a clock or an interrupt ended has no grasp."""
 
 
-def _planned(search: PlanSearch, best: Sequence[Certified], ended: Ended) -> Plan:
+def put_together(search: PlanSearch, best: Sequence[Certified]) -> Plan:
     """Put together a plan from what a search found, with the best grasps."""
     body, on, request, methods = search.body, search.on, search.request, search.methods
     start = time.process_time()
@@ -189,7 +197,7 @@ def _planned(search: PlanSearch, best: Sequence[Certified], ended: Ended) -> Pla
         {method: each.counts for method, each in methods.items()},
     )
     known, every = search.outcomes, methods.values()
-    absence = CUT_SHORT if ended != "done" else _absence(body, request, counts, known)
+    absence = CUT_SHORT if search.ended != "done" else _absence(body, request, counts, known)
     given = partial(faces_as_given, on=on)
     return Plan(
         body=body,
@@ -199,7 +207,7 @@ def _planned(search: PlanSearch, best: Sequence[Certified], ended: Ended) -> Pla
         seed=request.seed,
         counts=counts,
         outcomes=known,
-        ended=ended,
+        ended=search.ended,
         absence=None if grasps else absence,
         absences={
             given(faces): tuple(absence_as_given(proof, on) for proof in proofs)

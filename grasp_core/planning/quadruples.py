@@ -39,8 +39,8 @@ from grasp_core.families.disc_bounds import (
     distances,
     widths_apart,
 )
-from grasp_core.families.placements import LEAST_RADIUS, Corners, Placement
-from grasp_core.families.placing import Attempt, Cones, Construction
+from grasp_core.families.placements import LEAST_RADIUS, FaceCorners, Placement
+from grasp_core.families.placing import Attempt, Construction, FourCones
 from grasp_core.objects.face_pieces import FacePiece, Shapes
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.solvers.ties import coarse, graded
@@ -135,7 +135,7 @@ class PlannedCones:
         return usable_half_angles(self.theta, np.array([face.spread for face in self.body.faces]))
 
     @cached_property
-    def _corners(self) -> Corners:
+    def _corners(self) -> FaceCorners:
         return corners_of(self.body)
 
 
@@ -146,7 +146,7 @@ def usable_half_angles(theta: float, spreads: Array) -> Array:
 
 def cones_around(
     placed: Sequence[tuple[Sequence[FacePiece], Placement]], theta: float
-) -> list[tuple[Cones, ...]]:
+) -> list[tuple[FourCones, ...]]:
     """Choose tilted cones: towards the faces' or the object's middle, or around the forces."""
     normals = np.array([[piece.normal for piece in pieces] for pieces, _ in placed])
     spreads = np.array([[piece.spread for piece in pieces] for pieces, _ in placed])
@@ -249,7 +249,7 @@ class ConedQuadruples:
                 found.append(attempt)
         return tuple(found)
 
-    def _cones(self, row: int, kind: int) -> Cones:
+    def _cones(self, row: int, kind: int) -> FourCones:
         half_angle = float(self.half_angles[row, kind])
         axes = frozen_copy(self.axes[row, kind])
         return four(trusted(ForceCone, axis=axis, half_angle=half_angle) for axis in axes)

@@ -36,7 +36,7 @@ FARTHEST_APPROACH = 1e3
 """Longest free line of a finger, in object radii."""
 COMPLETE_PARTS = 20_000
 """Parts into which `complete` may cut the faces of one quadruple."""
-MOST_FACES = 1000
+MOST_PLANNED_FACES = 1000
 """Most faces to plan with: tables of pairs and of spanning triples take some hundred megabytes."""
 
 
@@ -87,10 +87,10 @@ def check_request(body: Polyhedron, request: PlanRequest) -> None:
         farthest, where = FARTHEST_APPROACH * size, ", a thousand radii"
         number(finger.approach_m, "finger.approach_m", le=farthest, where=where)
     faces = len(body.faces)
-    if faces > MOST_FACES:
+    if faces > MOST_PLANNED_FACES:
         raise InputError(
-            f"{body.name} has {faces} planar faces, over the limit of {MOST_FACES}; load it with "
-            "patches for faces (--faces patches)"
+            f"{body.name} has {faces} planar faces, over the limit of {MOST_PLANNED_FACES}; "
+            "load it with patches for faces (--faces patches)"
         )
     needed = {
         "a limit (--limit)": request.limit is None,

@@ -29,7 +29,7 @@ class PlanSettings(Settings):
     limit: Count | None = None
     """Keep at most this many grasps, the best ones; if not given, all."""
     rank_by: RankBy = "radius"
-    """What the best grasps have; see `grasp_core.kinds.RANKINGS`."""
+    """What the best grasps have; see `grasp_core.names.RANKINGS`."""
     max_face_parts: Count = 1
     """Number of parts into which the family `free` may divide the four faces while it is undecided.
     """

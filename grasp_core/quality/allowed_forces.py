@@ -33,29 +33,29 @@ from grasp_core.closure.wrench_sets import contact_program
 from grasp_core.errors import SolverError
 from grasp_core.solvers.conic import minimize
 
-ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
+SUM_ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 """Rounding of sums of products, relative to the sizes of their terms."""
-MOVED = 8.0 * float(np.finfo(np.float64).eps)
+MOVED_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 """Rounding of arms and loads that are moved from afar, relative to the sizes of their terms."""
-BALANCED = 1e-9
+ALLOWED_IMBALANCE = 1e-9
 """Largest part of forces by which they may miss balance, although (1) may allow more."""
 PUSHING = 1e-3
 """Least push, over the largest, of contacts that can push where all do so as much as they can."""
-CAUTION = 2.0
+FORCES_CAUTION = 2.0
 """How much more than rounding the search leaves to it, as forces are turned into the object's frame
 and back."""
 
 
-class Load(NamedTuple):
+class AskedLoad(NamedTuple):
     """A wrench, and torques of joints that come with it, as those of links that turn with it do."""
 
     wrench: Array  # at unit size over the largest push, (6,)
     torques: Array  # over the joints' limits, (joints,)
     felt: float  # size of the terms of which the wrench is made
 
-    def times(self, multiple: float) -> "Load":
+    def times(self, multiple: float) -> "AskedLoad":
         """Return a multiple of the load."""
-        return Load(multiple * self.wrench, multiple * self.torques, multiple * self.felt)
+        return AskedLoad(multiple * self.wrench, multiple * self.torques, multiple * self.felt)
 
 
 class Mixture(NamedTuple):
@@ -87,7 +87,7 @@ class AllowedForces:
         joints = np.linalg.norm(self.shares, axis=1)
         return np.concatenate([1.0 + self.friction, np.ones(self.count), joints, joints])
 
-    def rooms(self, forces: Array, load: Load) -> Array:
+    def rooms(self, forces: Array, load: AskedLoad) -> Array:
         """Compute the room to each cone, to the largest push, and to both torques, (rows,)."""
         torques = self.carried + load.torques + self.shares @ forces.ravel()
         pushes, across = forces[:, 0], np.linalg.norm(forces[:, 1:], axis=1)
@@ -100,7 +100,7 @@ class AllowedForces:
         if key not in self._ranges:
             able = np.where((self.acting & pushing[:, None]).ravel(), self.G, 0.0)
             left, sizes, right = np.linalg.svd(able, full_matrices=False)
-            known = sizes > max(RANK, 2.0 * ROUNDING * self.far * self.count)
+            known = sizes > max(RANK, 2.0 * SUM_ROUNDING * self.far * self.count)
             left, sizes, right = left[:, known], sizes[known], right[known]
             self._ranges[key] = left, sizes, (right.T / sizes) @ left.T
         return self._ranges[key]
@@ -109,19 +109,19 @@ class AllowedForces:
     def _ranges(self) -> dict[bytes, tuple[Array, Array, Array]]:
         return {}
 
-    def needed(self, forces: Array, load: Load, rounding: float = 1.0) -> Array:
+    def needed(self, forces: Array, load: AskedLoad, rounding: float = 1.0) -> Array:
         """Return the room that forces need to prove by (1) that a load is balanced, (rows,).
 
         It is infinite where the load is out of range, or the forces are far from balance.
         """
         pushing: NDArray[np.bool_] = np.asarray(forces.any(axis=1), dtype=np.bool_)
-        lost = rounding * ROUNDING
+        lost = rounding * SUM_ROUNDING
         ways, sizes, _ = self.range_of(pushing)
         left, total = self.G @ forces.ravel() + load.wrench, float(np.abs(forces).sum())
-        rounded = lost * total + rounding * MOVED * (self.far * total + load.felt)
+        rounded = lost * total + rounding * MOVED_ROUNDING * (self.far * total + load.felt)
         within = ways.T @ left
         beyond, missed = np.linalg.norm(left - ways @ within), np.linalg.norm(within)
-        if not (beyond <= rounded and missed <= BALANCED * total + rounded):
+        if not (beyond <= rounded and missed <= ALLOWED_IMBALANCE * total + rounded):
             return np.full(len(self.rates), np.inf)
         # half of sigma is left to rounding of it
         least = 0.5 * float(sizes.min(initial=np.inf))
@@ -131,7 +131,7 @@ class AllowedForces:
         needed[2 * self.count :] += lost
         return needed
 
-    def balance(self, forces: Array, load: Load) -> bool:
+    def balance(self, forces: Array, load: AskedLoad) -> bool:
         """Return whether forces prove by (1) that a load is balanced within all limits."""
         acting, lost = np.where(self.acting, forces, 0.0), np.where(self.acting, 0.0, forces)
         if not acting.any():
@@ -139,11 +139,11 @@ class AllowedForces:
                 (self.rooms(acting, load) >= 0.0).all()
             )
         return bool(
-            float(np.abs(lost).sum()) <= ROUNDING * float(np.abs(acting).sum())
+            float(np.abs(lost).sum()) <= SUM_ROUNDING * float(np.abs(acting).sum())
             and (self.rooms(acting, load) >= self.needed(acting, load)).all()
         )
 
-    def deepest(self, load: Load | None, pushing: NDArray[np.bool_]) -> Mixture | None:
+    def deepest(self, load: AskedLoad | None, pushing: NDArray[np.bool_]) -> Mixture | None:
         """Find forces with the most room that balance nothing, or a multiple of a unit load.
 
         None where the forces of contacts that may push, (k,), have no room at all.
@@ -174,7 +174,7 @@ class AllowedForces:
     def _at_rest(self) -> Mixture | None:
         return self.deepest(None, np.ones(self.count, dtype=bool))
 
-    def anchors(self, load: Load) -> Iterator[tuple[Mixture, NDArray[np.bool_]]]:
+    def anchors(self, load: AskedLoad) -> Iterator[tuple[Mixture, NDArray[np.bool_]]]:
         """Find forces g of (2) with room, and the contacts that push, (k,), fewer each time."""
         pushing = np.ones(self.count, dtype=bool)
         if self._at_rest is not None:
@@ -190,7 +190,7 @@ class AllowedForces:
                 return
             pushing = fewer
 
-    def settled(self, found: Mixture, load: Load) -> Mixture:
+    def settled(self, found: Mixture, load: AskedLoad) -> Mixture:
         """Find a multiple of a unit load that is balanced by (1), the most near that of a program.
 
         No forces, and the multiple zero, where none is proved.
@@ -203,7 +203,7 @@ class AllowedForces:
                 continue
             # the room of a mixture is no less than the mixture of rooms, but for rounding
             lacks = lacking > 0.0
-            share = float((lacking[lacks] / (lacking + room)[lacks]).max(initial=ROUNDING))
+            share = float((lacking[lacks] / (lacking + room)[lacks]).max(initial=SUM_ROUNDING))
             for grown in (share, min(2.0 * share, 1.0)):
                 mixed = Mixture(
                     *((1.0 - grown) * a + grown * b for a, b in zip(*ends, strict=True))
@@ -212,13 +212,13 @@ class AllowedForces:
                     return mixed
         return Mixture(np.zeros(self.acting.shape), 0.0)
 
-    def _rooms(self, mixed: Mixture, load: Load) -> Array:
+    def _rooms(self, mixed: Mixture, load: AskedLoad) -> Array:
         return self.rooms(mixed.forces, load.times(mixed.multiple))
 
-    def _needed(self, mixed: Mixture, load: Load) -> Array:
-        return self.needed(mixed.forces, load.times(mixed.multiple), CAUTION)
+    def _needed(self, mixed: Mixture, load: AskedLoad) -> Array:
+        return self.needed(mixed.forces, load.times(mixed.multiple), FORCES_CAUTION)
 
-    def _balanced(self, found: Mixture, load: Load, pushing: NDArray[np.bool_]) -> Mixture:
+    def _balanced(self, found: Mixture, load: AskedLoad, pushing: NDArray[np.bool_]) -> Mixture:
         """Correct the forces of contacts that push by (1), and leave the others out."""
         multiple, chosen = max(found.multiple, 0.0), self.acting & pushing[:, None]
         forces = np.where(chosen, found.forces, 0.0)

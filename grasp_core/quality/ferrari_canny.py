@@ -35,10 +35,11 @@ next to their ridges, then every ray meets some simplex. A simplex that is liste
 twice, in whatever order its corners are: it adds nothing.
 
 *One ray.* So all rests on counting the simplices on a ray t u, |u| = 1, without an error. By
-rounding, sums of products may be off by `LOST` of the lengths of their factors; every comparison
-below is made with this much against the claim. With h the height of the highest of all points along
-n, every point x of any simplex has n.x <= h, and none is farther away than the farthest point R. So
-the ray crosses none beyond T, the least of R and of h / n.u where n.u > 0, and a simplex only if
+rounding, sums of products may be off by `PRODUCT_ERROR` of the lengths of their factors; every
+comparison below is made with this much against the claim. With h the height of the highest of all
+points along n, every point x of any simplex has n.x <= h, and none is farther away than the
+farthest point R. So the ray crosses none beyond T, the least of R and of h / n.u where n.u > 0, and
+a simplex only if
 
     l <= T n.u.                                                                             (4)
 
@@ -68,7 +69,7 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array, Figure, Indices, Shape
+from grasp_core.arrays import Array, Indices, ProofNumber, Shape
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import Norm, WrenchSet, nearest_wrench
 from grasp_core.compiled import compiled
@@ -76,12 +77,12 @@ from grasp_core.declared import Declared, declared, trusted
 from grasp_core.kinds import value_of
 from grasp_core.values import Contact, Grasp
 
-GAP = 1e-4
+QUALITY_GAP = 1e-4
 """Default of the largest relative gap (upper - lower) / upper between the bounds of a quality."""
-FINEST_GAP = 1e-7
+FINEST_QUALITY_GAP = 1e-7
 """Smallest gap that may be asked for: below it, rounding of the planes of tiny simplices costs more
 than they gain."""
-QualityGap = Annotated[float, Interval(ge=FINEST_GAP, lt=1.0)]
+QualityGap = Annotated[float, Interval(ge=FINEST_QUALITY_GAP, lt=1.0)]
 MOST_SIMPLICES, MOST_POINTS = 60_000, 4096
 """Simplices and corners at which the polytope stops growing; its bounds hold all the same, farther
 apart."""
@@ -89,20 +90,20 @@ CHECK_SLACK = 1e-12
 """Slack of the plain-arithmetic checks, relative to the longest wrench."""
 MOST_SLACK = 1e-6
 """Largest slack of a quality, however long wrenches are [N]."""
-KERNEL = "grasp_core.quality.ferrari_canny_kernel"
+QUALITY_KERNEL = "grasp_core.quality.ferrari_canny_kernel"
 UnitTwist = Annotated[Array, Shape(WRENCH, units=True)]
 """A velocity and an angular velocity, of length one, with torques over a torque scale, (6,)."""
-LOST = 64.0 * float(np.finfo(np.float64).eps)
+PRODUCT_ERROR = 64.0 * float(np.finfo(np.float64).eps)
 """Error of a sum of six products, relative to the lengths of the two vectors: ten times what it
 can be, with room for normals that are scaled to length one."""
-RAYS = np.cos(np.arange(1.0, 61.0)).reshape(10, 6)
+COUNTING_RAYS = np.cos(np.arange(1.0, 61.0)).reshape(10, 6)
 """Rays along which simplices may be counted, of any length: cosines of whole numbers are in no
 relation to anything that is meant."""
-FLATTEST = 1e-30
+FLATTEST_SIMPLEX = 1e-30
 """Least singular value, over the largest, by which rows of X are divided."""
-BLOCK = 2**15
+HEIGHTS_AT_ONCE = 2**15
 """Number of heights compared at a time: as many as fit into a processor's cache."""
-TINY = 1e-300
+SMALLEST_DIVISOR = 1e-300
 """Smallest number that is divided by: a normal may have length zero."""
 LARGEST_KEY = 2**62
 """Largest integer that may name a ridge, with one digit for each of its corners."""
@@ -133,9 +134,9 @@ class InnerPolytope(Declared):
         lowest, highest = self._heights(points)
         radius = float(lowest.min())
         farthest = float(np.linalg.norm(points, axis=1).max())
-        if not radius > LOST * farthest:
+        if not radius > PRODUCT_ERROR * farthest:
             return -np.inf
-        for ray in _units(RAYS[:, : points.shape[1]]):
+        for ray in _units(COUNTING_RAYS[:, : points.shape[1]]):
             crossed = self._crossed(points, lowest, highest, ray)
             if crossed is not None:
                 return radius if crossed % 2 == 1 else -np.inf
@@ -145,7 +146,7 @@ class InnerPolytope(Declared):
         """Return heights of each simplex's lowest corner and of the highest point, (m,) each."""
         count = len(self.corners)
         lowest, highest = np.empty(count), np.empty(count)
-        step = max(BLOCK // len(points), 1)
+        step = max(HEIGHTS_AT_ONCE // len(points), 1)
         for start in range(0, count, step):
             block = slice(start, start + step)
             heights = points @ _units(self.normals[block]).T
@@ -171,20 +172,20 @@ class InnerPolytope(Declared):
     def _crossed(self, points: Array, lowest: Array, highest: Array, ray: Array) -> int | None:
         """Count the simplices that a ray from zero crosses; None where one of them is doubtful."""
         farthest = float(np.linalg.norm(points, axis=1).max())
-        lost = LOST * farthest
+        lost = PRODUCT_ERROR * farthest
         along = _units(self.normals) @ ray
-        ahead = along > LOST
-        ends = (highest[ahead] + lost) / (along[ahead] - LOST)
+        ahead = along > PRODUCT_ERROR
+        ends = (highest[ahead] + lost) / (along[ahead] - PRODUCT_ERROR)
         end = float(ends.min(initial=farthest))
         near = lowest <= end * along + 4.0 * lost  # (4): both sides are off by two at most
         cells = points[self.corners[near]].transpose(0, 2, 1)
         # X near the inverses, (m, 6, 6); of flat cells, something as large
         left, sizes, right = np.linalg.svd(cells)
-        sizes = np.maximum(sizes, FLATTEST * np.maximum(sizes[:, :1], TINY))
+        sizes = np.maximum(sizes, FLATTEST_SIMPLEX * np.maximum(sizes[:, :1], SMALLEST_DIVISOR))
         inverses = np.asarray(right.transpose(0, 2, 1) / sizes[:, None] @ left.transpose(0, 2, 1))
         shares = inverses @ ray
         # the most that shares can sum to, in (5)
-        most = (along[near] + LOST) / np.maximum(lowest[near] - lost, TINY)
+        most = (along[near] + PRODUCT_ERROR) / np.maximum(lowest[near] - lost, SMALLEST_DIVISOR)
         missed = _miss(cells, inverses, shares, most)
         crossed = _cross(cells, inverses, shares)
         return int(crossed.sum()) if (missed | crossed).all() else None
@@ -193,7 +194,7 @@ class InnerPolytope(Declared):
 def _miss(cells: Array, inverses: Array, shares: Array, most: Array) -> NDArray[np.bool_]:
     """Return which cells the ray misses for certain, by (5), (m,)."""
     y = inverses[np.arange(len(cells)), shares.argmin(axis=1)]
-    lost = LOST * np.linalg.norm(y, axis=1)
+    lost = PRODUCT_ERROR * np.linalg.norm(y, axis=1)
     lowest = np.einsum("mi,mij->mj", y, cells).min(axis=1)
     lowest -= lost * np.linalg.norm(cells, axis=1).max(axis=1)
     missed: NDArray[np.bool_] = shares.min(axis=1) + lost < np.minimum(lowest, 0.0) * most
@@ -204,25 +205,25 @@ def _cross(cells: Array, inverses: Array, shares: Array) -> NDArray[np.bool_]:
     """Return which cells the ray crosses for certain, by (6), (m,)."""
     rows, columns = np.linalg.norm(inverses, axis=2), np.linalg.norm(cells, axis=1)
     off = np.abs(inverses @ cells - np.eye(cells.shape[1]))
-    off += LOST * rows[:, :, None] * columns[:, None]
+    off += PRODUCT_ERROR * rows[:, :, None] * columns[:, None]
     e = off.sum(axis=2).max(axis=1)
-    doubtful = 2.0 * (e * np.abs(shares).max(axis=1) + LOST * rows.max(axis=1))
+    doubtful = 2.0 * (e * np.abs(shares).max(axis=1) + PRODUCT_ERROR * rows.max(axis=1))
     crossed: NDArray[np.bool_] = (e <= 0.5) & (shares.min(axis=1) > doubtful)  # noqa: PLR2004
     return crossed
 
 
 def _units(normals: Array) -> Array:
     squares = np.einsum("mj,mj->m", normals, normals)
-    return normals / np.sqrt(np.maximum(squares, TINY))[:, None]
+    return normals / np.sqrt(np.maximum(squares, SMALLEST_DIVISOR))[:, None]
 
 
 @declared
 class FerrariCanny(Declared):
     """Bounds of a quality, with the direction and the polytope, or forces, that prove them."""
 
-    lower: Figure
+    lower: ProofNumber
     """Lower bound of the quality [N]."""
-    upper: Figure
+    upper: ProofNumber
     """Upper bound of the quality [N]."""
     wrenches: WrenchSet
     """The set of wrenches to whose largest inscribed ball the quality refers."""
@@ -287,7 +288,7 @@ def ferrari_canny(
     center: ArrayLike = (0.0, 0.0, 0.0),
     torque_scale: float,
     norm: Norm = "l1",
-    gap: float = GAP,
+    gap: float = QUALITY_GAP,
     torsion_m: ArrayLike = 0.0,
 ) -> FerrariCanny:
     """Bound the largest wrench that bounded contact forces resist in every direction.
@@ -321,11 +322,11 @@ def ferrari_canny(
     return wrench_set_quality(wrenches, gap)
 
 
-def wrench_set_quality(wrenches: WrenchSet, gap: float = GAP) -> FerrariCanny:
+def wrench_set_quality(wrenches: WrenchSet, gap: float = QUALITY_GAP) -> FerrariCanny:
     """Bound the signed distance of zero from the border of a wrench set, with proofs."""
-    kernel = compiled(KERNEL)
+    kernel = compiled(QUALITY_KERNEL)
     linf = wrenches.norm == "linf"
-    cones = kernel.Cones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
+    cones = kernel.SetCones(np.array(wrenches.G, order="C"), np.array(wrenches.friction), linf)
     status, forces, corners, normals, weakest = kernel.grow(
         cones, wrenches.edges(), gap, MOST_SIMPLICES, MOST_POINTS
     )

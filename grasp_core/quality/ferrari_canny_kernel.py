@@ -31,20 +31,20 @@ D = 6
 """Number of coordinates of each point of the hull."""
 DEAD = 1e300
 """Offset that marks a simplex as removed."""
-SINGULAR = 1e-13
+LEAST_FIRST_PIVOT = 1e-13
 """Smallest pivot accepted while the first simplex is built, whose points are widely spread."""
-TINY = 1e-300
+SMALLEST_DIVISOR = 1e-300
 """Smallest square that is divided by: a simplex may be folded flat."""
 FLATNESS = 1e-9
 """Points closer than this to a common plane, relative to their extent, span nothing more."""
-ABOVE = 1e-12
+IN_SIGHT = 1e-12
 """Height from which on a point sees a simplex, relative to the extent: some thousand roundings."""
-GROWN, OUTSIDE, FLAT, LOST = 0, 1, 2, 3
+GROWN, ZERO_OUTSIDE, IN_A_PLANE, BROKEN_HULL = 0, 1, 2, 3
 """How growing ends: with a polytope around zero, with zero outside, with all points in a plane, or
 with a hull that rounding has broken."""
 
 
-class Cones(NamedTuple):
+class SetCones(NamedTuple):
     """The friction cones of the contacts, whose wrenches make up the set."""
 
     G: Array
@@ -57,7 +57,7 @@ class Cones(NamedTuple):
 
 @loop()
 def grow(
-    cones: Cones, edges: Array, gap: float, most_simplices: int, most_points: int
+    cones: SetCones, edges: Array, gap: float, most_simplices: int, most_points: int
 ) -> tuple[int, Array, Indices, Array, Array]:
     """Grow a polytope inside the set of wrenches, around zero if that is inside, up to a gap.
 
@@ -75,7 +75,7 @@ def grow(
     )  # fmt: skip
     slack = _begin(cones.G, edges, forces, points)
     if slack < 0.0 or not _enclose(hull, points):
-        return FLAT, forces[:0], hull.corners[:0], hull.normals[:0], weakest
+        return IN_A_PLANE, forces[:0], hull.corners[:0], hull.normals[:0], weakest
     count = D + 1
     while True:  # each turn adds a point, up to `most_points`
         nearest = _lowest(hull)
@@ -93,7 +93,7 @@ def grow(
         seen = hull.seen[:found]
         _raise(hull, seen, count, slack)
         if not _join(hull, seen, slack):
-            return LOST, forces[:0], hull.corners[:0], hull.normals[:0], weakest
+            return BROKEN_HULL, forces[:0], hull.corners[:0], hull.normals[:0], weakest
         for f in seen:
             hull.offsets[f] = DEAD
             hull.free[hull.counts[1]] = f
@@ -101,12 +101,12 @@ def grow(
         count += 1
     inside = upper > slack and hull.offsets[_lowest(hull)] > 0.0
     live = np.flatnonzero(hull.offsets[: hull.counts[0]] < DEAD)
-    status = GROWN if inside else OUTSIDE
+    status = GROWN if inside else ZERO_OUTSIDE
     return status, forces[:count].copy(), hull.corners[live], hull.normals[live], weakest
 
 
 @loop(once=True)
-def _support(cones: Cones, y: Array, force: Array) -> float:
+def _support(cones: SetCones, y: Array, force: Array) -> float:
     """Return the support of the set in direction y, and fill in the local forces that attain it."""
     total, best, at = 0.0, -np.inf, np.zeros(4)
     width = cones.G.shape[1] // len(cones.friction)
@@ -175,7 +175,7 @@ def _begin(G: Array, edges: Array, forces: Array, points: Array) -> float:
     extent = 0.0
     for j in range(D):
         extent = max(extent, points[: D + 1, j].max() - points[: D + 1, j].min())
-    return ABOVE * extent
+    return IN_SIGHT * extent
 
 
 class Hull(NamedTuple):
@@ -237,7 +237,7 @@ def _eliminate(A: Array) -> bool:
             if abs(A[k, i]) > abs(A[best, i]):
                 best = k
         pivot = A[best, i]
-        if abs(pivot) <= SINGULAR:
+        if abs(pivot) <= LEAST_FIRST_PIVOT:
             return False
         for j in range(A.shape[1]):
             A[i, j], A[best, j] = A[best, j], A[i, j]
@@ -325,7 +325,7 @@ def _normalize(normals: Array, offsets: Array, i: int) -> None:
     square = 0.0
     for j in range(D):
         square += normals[i, j] * normals[i, j]
-    shrink = 1.0 / np.sqrt(max(square, TINY))
+    shrink = 1.0 / np.sqrt(max(square, SMALLEST_DIVISOR))
     for j in range(D):
         normals[i, j] *= shrink
     offsets[i] *= shrink

@@ -55,7 +55,7 @@ from typing import Annotated, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_core.arrays import Array, Figure, Shape, frozen
+from grasp_core.arrays import Array, ProofNumber, Shape, frozen
 from grasp_core.closure.contacts import WRENCH
 from grasp_core.closure.wrench_sets import WrenchSet, contact_program, into_cones
 from grasp_core.declared import Declared, declared
@@ -64,7 +64,7 @@ from grasp_core.kinds import LARGEST, SMALLEST, one_of
 from grasp_core.names import MeasureName
 from grasp_core.quality.ferrari_canny import (
     CHECK_SLACK,
-    GAP,
+    QUALITY_GAP,
     FerrariCanny,
     UnitTwist,
     are_allowed,
@@ -80,7 +80,7 @@ measures thousands of contacts."""
 SMALL_DEMAND = 1e-2
 """Demand of a unit twist below which a twist with negative support is compared as if it had this
 one: it refutes every multiple, and none better than others do."""
-THIN = 1e-3
+SMALL_LENGTH = 1e-3
 """Length of (2) over the object's radius: what (2) then gives away, 5e-7 for twists that turn and
 move alike, is less than the gap between a ball's bounds, and rounding is far from it still."""
 STEEP = 1e3
@@ -182,10 +182,10 @@ FERRARI_CANNY = Measure("ferrari-canny")
 class ResistedLoads(Declared):
     """Bounds of the largest multiple of a set of loads that contacts resist, with their proofs."""
 
-    lower: Figure
+    lower: ProofNumber
     """Multiple that is resisted; -1 where none is shown to be, not even zero, as for contacts that
     are not in force closure. There is no ball then, and there are no forces."""
-    upper: Figure
+    upper: ProofNumber
     """Multiple beyond which not all loads are resisted."""
     measure: Measure
     """The loads."""
@@ -241,14 +241,18 @@ class ResistedLoads(Declared):
 
 def thin(wrenches: WrenchSet) -> WrenchSet:
     """Return the same wrenches with torques over a thousandth of the length, as in (2)."""
-    return replace(wrenches, G=np.vstack([wrenches.G[:3], wrenches.G[3:] / THIN]))
+    return replace(wrenches, G=np.vstack([wrenches.G[:3], wrenches.G[3:] / SMALL_LENGTH]))
 
 
-def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> ResistedLoads:
+def resisted_loads(
+    wrenches: WrenchSet, measure: Measure, gap: float = QUALITY_GAP
+) -> ResistedLoads:
     """Bound the largest multiple of a set of loads that contacts resist, with proofs."""
     if measure.name == "weight":
         ball = wrench_set_quality(thin(wrenches), gap)
-        direction, upper = _least(wrenches, measure, [ball.direction / np.repeat([1.0, THIN], 3)])
+        direction, upper = _least(
+            wrenches, measure, [ball.direction / np.repeat([1.0, SMALL_LENGTH], 3)]
+        )
         if ball.lower <= 0.0:
             return ResistedLoads(NONE_SHOWN, upper, measure, wrenches, direction, None, None)
         lower = min(ball.lower, upper)
@@ -267,7 +271,7 @@ def resisted_loads(wrenches: WrenchSet, measure: Measure, gap: float = GAP) -> R
 
 
 def measured_set(
-    wrenches: WrenchSet, measure: Measure, gap: float = GAP
+    wrenches: WrenchSet, measure: Measure, gap: float = QUALITY_GAP
 ) -> FerrariCanny | ResistedLoads:
     """Bound any measure of contacts, also the usual one (see `resisted_loads`)."""
     usual = measure.is_usual

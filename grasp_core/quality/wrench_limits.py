@@ -46,7 +46,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from grasp_core.arrays import Amount, Array, Figure, Points, Shape, Wrench, cross, frozen
+from grasp_core.arrays import Amount, Array, Points, ProofNumber, Shape, Wrench, cross, frozen
 from grasp_core.closure.contacts import (
     LOCAL,
     WRENCH,
@@ -65,7 +65,7 @@ from grasp_core.closure.wrench_sets import WrenchSet, contact_program
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError, SolverError
 from grasp_core.kinds import LARGEST, SMALLEST, Quantity, value_of
-from grasp_core.quality.allowed_forces import ROUNDING, AllowedForces, Load, Mixture
+from grasp_core.quality.allowed_forces import SUM_ROUNDING, AllowedForces, AskedLoad, Mixture
 from grasp_core.quality.ferrari_canny import wrench_set_quality
 from grasp_core.quality.motors import Motors, motors_for
 from grasp_core.solvers.conic import minimize
@@ -74,10 +74,10 @@ from grasp_core.values import Contact, Grasp
 
 MOST_OFF = 1e-6
 """Largest error of the facet's power."""
-SETTLED = 1e-3
+LEAST_GAIN = 1e-3
 """The search for the weakest wrench ends when a step lowers the limit by less than this share."""
 MAX_STEPS = 30
-STARTS = 3
+SEARCH_STARTS = 3
 """How many of the weakest axis wrenches the search starts from, where there are motors."""
 WEAKEST_GAP = 0.01
 """Gap of the quality whose direction the search for the weakest wrench starts from."""
@@ -195,22 +195,26 @@ class WrenchBody:
         twist[:3] += np.linalg.norm(facet[3:]) * np.linalg.norm(self.middle)
         terms = float((twist @ np.abs(self.G) + sizes @ np.abs(self.levers)).sum())
         pushed = self.max_normal_force * (1.0 + float(self.bounded.friction.max())) * terms
-        return ROUNDING * (pushed + float(sizes @ self.motors.limits))
+        return SUM_ROUNDING * (pushed + float(sizes @ self.motors.limits))
 
     def bound(
         self, wrench: Array, facet: Array, multipliers: Array, rounding: float = 1.0
     ) -> float:
         """Return the multiple of a wrench that is not exceeded, by (3); infinite without power."""
-        power = -float(facet @ wrench) - rounding * ROUNDING * float(np.abs(facet) @ np.abs(wrench))
+        power = -float(facet @ wrench) - rounding * SUM_ROUNDING * float(
+            np.abs(facet) @ np.abs(wrench)
+        )
         support = self.support(facet, multipliers) + rounding * self.lost(facet, multipliers)
         return max(support, 0.0) / power if power > 0.0 else np.inf
 
-    def load(self, wrench: Array, carried: Array) -> Load:
+    def load(self, wrench: Array, carried: Array) -> AskedLoad:
         """Return a wrench and the torques [N m] that joints carry with it, (joints,), as a load."""
         force, torque = np.linalg.norm(wrench.reshape(2, 3), axis=1).tolist()
         moved = (torque + 2.0 * float(np.linalg.norm(self.middle)) * force) / self.size
         unit = self.about_middle(wrench) / self.max_normal_force
-        return Load(unit, carried / self.motors.limits, (force + moved) / self.max_normal_force)
+        return AskedLoad(
+            unit, carried / self.motors.limits, (force + moved) / self.max_normal_force
+        )
 
     def settled(self, found: Farthest, wrench: Array, carried: Array) -> Mixture:
         """Find the multiple of a wrench next to the largest that local forces prove."""
@@ -241,7 +245,7 @@ class WrenchLimit(Declared):
     limit: Amount
     """Largest multiple of `wrench` that is resisted; `forces` prove it by balancing that multiple.
     """
-    upper: Figure
+    upper: ProofNumber
     """Multiple above which the wrench is not resisted: the support of `facet`, in plain arithmetic,
     and its rounding."""
     forces: Points
@@ -414,13 +418,15 @@ def weakest_from(
     starts, ends = [limit_of(body, -quality.direction * scale)], list[WrenchLimit]()
     if len(body.levers):
         every = list(limits)
-        starts += [every[at] for at in smallest_first([each.limit for each in every])[:STARTS]]
+        starts += [
+            every[at] for at in smallest_first([each.limit for each in every])[:SEARCH_STARTS]
+        ]
     for best in starts:
         for _ in range(MAX_STEPS):
             # (4): the wrench that the limiting facet points at, by the scaled product of wrenches
             facing = -best.facet * scale**2
             found = limit_of(body, facing / float(np.linalg.norm(facing / scale)))
-            if found.limit > best.limit * (1.0 - SETTLED):
+            if found.limit > best.limit * (1.0 - LEAST_GAIN):
                 break
             best = found
         ends.append(best)

@@ -47,14 +47,14 @@ from grasp_core.provenance import versions
 from grasp_core.settings import extended
 
 SCHEMA = 2
-ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
+GRASP_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
 """Ids of grasps in files: they also name scene files, so they have no dots or slashes."""
 RECORDED = MeshLimits(max_triangles=2_000_000, max_faces=50_000, max_parts=640)
 """Limits for the meshes in grasps files: ten times the usual, for users who raised a limit."""
 
 
 @declared
-class Mesh(Declared):
+class SavedMesh(Declared):
     """The triangles of an object in a file."""
 
     vertices_m: Annotated[Array, Shape(None, 3)]
@@ -68,7 +68,7 @@ class RecordedObject(Declared):
     name: str
     source_sha256: str
     content_sha256: str
-    mesh: Mesh
+    mesh: SavedMesh
     center_of_mass_m: Point
     surface: Surface = field(default_factory=Surface)
     patches: PatchLimits | None = None
@@ -77,8 +77,9 @@ class RecordedObject(Declared):
     def of(cls, body: Polyhedron) -> "RecordedObject":
         """Record an object."""
         return cls(
-            body.name, body.source_sha256, body.content_sha256, Mesh(body.vertices, body.triangles),
-            body.center_of_mass, body.surface, body.patches,
+            body.name, body.source_sha256, body.content_sha256,
+            SavedMesh(body.vertices, body.triangles), body.center_of_mass, body.surface,
+            body.patches,
         )  # fmt: skip
 
     def body(self) -> Polyhedron:
@@ -101,7 +102,7 @@ class RecordedObject(Declared):
 
 
 @declared
-class GraspsFile(RecordFile):
+class SavedGrasps(RecordFile):
     """Grasps of an object, with its mesh and what is known of all sets of its faces."""
 
     FILE = GRASPS
@@ -114,7 +115,7 @@ class GraspsFile(RecordFile):
 def plan_to_json(body: Polyhedron, plan: Plan) -> str:
     """Write a plan as the text of a `grasps.json`; equal plans give equal text."""
     find_critical_frictions(plan.grasps)
-    said = GraspsFile(RecordedObject.of(body), plan).document()
+    said = SavedGrasps(RecordedObject.of(body), plan).document()
     said["versions"] = said["versions"] or versions()
     said["grasps"] = said.pop("grasps")  # last in the file, a line each
     return text_of(said)
@@ -130,7 +131,7 @@ def grasps_from_json(text: str) -> Plan:
         raise InputError("versions: missing; add those of the packages that made the grasps")
     for place, grasp in enumerate(plan.grasps):
         with about(f"grasps[{place}]"):
-            if not ID.fullmatch(grasp.id):
+            if not GRASP_ID.fullmatch(grasp.id):
                 raise InputError(
                     "id: expected up to 100 letters, digits, '_' and '-', as it names files as "
                     f"well, got {shown(grasp.id)}"
@@ -196,14 +197,14 @@ NEARLY_UNIT = 1e-3
 """How far the length of a normal may be from 1: rounding of a file with three digits."""
 UNIT_ROUNDING = 1e-15
 """How far rounding takes the length of a unit vector from 1."""
-SAME_POINT = 1e-9
+SAME_CONTACT_POINT = 1e-9
 """Distance below which contacts are at one point, over the numbers in the file: rounding."""
 
 CenterSource: TypeAlias = Literal["file", "mean contact", "center of mass"]
 ScaleSource: TypeAlias = Literal["flag", "file", "farthest contact", "object radius"]
 
 Coordinates = Annotated[Array, Shape(3, least=-LARGEST_LENGTH_M, most=LARGEST_LENGTH_M)]
-Length = Annotated[float, Interval(gt=0.0, le=LARGEST_LENGTH_M)]
+SavedLength = Annotated[float, Interval(gt=0.0, le=LARGEST_LENGTH_M)]
 
 
 @declared
@@ -222,7 +223,7 @@ GivenContacts = Annotated[tuple[GivenContact, ...], Len(FEWEST_CONTACTS, MOST_CO
 
 
 @declared
-class GivenGrasp(Declared):
+class SavedGrasp(Declared):
     """A grasp in a file."""
 
     contacts: GivenContacts
@@ -237,13 +238,13 @@ class ContactsFile(Declared):
 
     contacts: GivenContacts | None = None
     """The contacts of the only grasp, in place of `grasps`."""
-    grasps: Annotated[tuple[GivenGrasp, ...], Len(1, MOST_GRASPS)] | None = None
+    grasps: Annotated[tuple[SavedGrasp, ...], Len(1, MOST_GRASPS)] | None = None
     """Several grasps, in place of `contacts`."""
     friction: FrictionOrZero | None = None
     """Coulomb coefficient of contacts without their own."""
     center_m: Coordinates | None = None
     """Point about which torques are taken; if not given, the mean contact of each grasp."""
-    torque_scale_m: Length | None = None
+    torque_scale_m: SavedLength | None = None
     """Length that makes a torque comparable with a force; if not given, the largest distance of a
     contact from the point about which torques are taken."""
 
@@ -343,7 +344,7 @@ def _contact_set(
     center = positions.mean(axis=0) if given is None else given
     extent = float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
     largest = float(max(np.abs(positions).max(), np.abs(center).max()))
-    if extent <= SAME_POINT * largest:
+    if extent <= SAME_CONTACT_POINT * largest:
         raise InputError(
             f"{where}: all contacts lie within {extent:.2g} m of one point, at coordinates of "
             f"{largest:.2g} m; move the contacts apart or the frame's origin nearer"

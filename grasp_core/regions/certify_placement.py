@@ -26,14 +26,14 @@ from numpy.typing import ArrayLike
 from grasp_core.arrays import Array, Shape, frozen, frozen_each
 from grasp_core.geometry.polygons import clip, tidy
 from grasp_core.kinds import LARGEST, Friction, MaxCones, number, value_of
-from grasp_core.objects.face_pieces import THINNEST, FacePiece
+from grasp_core.objects.face_pieces import LEAST_INRADIUS, FacePiece
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.planar_faces import planar_slack
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.regions.certify_regions import Unit, pieces_under
+from grasp_core.regions.certify_regions import RegionUnit, room_under
 from grasp_core.regions.growth import Sites, search_cover, twist_axes
 from grasp_core.regions.placement import (
-    SIDES,
+    DISC_SIDES,
     Misplacement,
     PlacementProbability,
     bound,
@@ -47,24 +47,24 @@ from grasp_core.values import FINGERS, Grasp, four
 OFF_M, OFF_RAD = 2e-3, math.radians(2.0)
 """Standard deviations of place and turn that rankings and datasets count on; that of the place is
 less for small objects."""
-CONES = 4000
+PLACEMENT_CONES = 4000
 """Default for the largest number of cones in one proof."""
 PRISMS = ((4.5, 4.0), (4.0, 3.2), (3.5, 2.6))
 """Half-widths E and half-lengths S of the prisms that are tried, in deviations of fingers beside
 their lines and of slides along them."""
-BEHIND = 3.0
+APPROACH_LENGTH = 3.0
 """Distance from which fingers come, in half-lengths of the longest prism."""
-HALVINGS = 5
+ANGLE_HALVINGS = 5
 """Number of times that the angle between no friction and all of it is halved."""
-ENOUGH = 0.005
+SMALL_CHANCE = 0.005
 """Chance of too large turns below which a smaller one is not sought."""
 IN_FRONT = 1e-9
 """Height above a face from which the surface is in the way of fingers, in object radii."""
-NARROWED = 1e-4
+EDGE_MOVED = 1e-4
 """Distance by which an edge is moved inwards rather than that another edge is added, in levers of
 the contacts, since each edge costs chance."""
 IN_FRONT_ROW = np.array([[0.0, 0.0, -1.0]])
-ROUNDED = 1e-9
+CHANCE_ROUNDING = 1e-9
 """Chance by which the bound is lowered, since other processors round it otherwise."""
 
 Deviations = Annotated[Array, Shape(3, least=0.0)]
@@ -80,7 +80,7 @@ def placement_probability(
     pose_sigma_rad: float | Sequence[float] = 0.0,
     pose_covariance: ArrayLike | None = None,
     contact_sigma_m: float = 0.0,
-    max_cones: int = CONES,
+    max_cones: int = PLACEMENT_CONES,
 ) -> PlacementProbability | None:
     """Prove a lower bound of the chance that a grasp is closed when it is not placed exactly.
 
@@ -130,7 +130,7 @@ def misplacement(
 
 
 def placement_bound(
-    body: Polyhedron, grasp: Grasp, off: Misplacement, cones: int = CONES
+    body: Polyhedron, grasp: Grasp, off: Misplacement, cones: int = PLACEMENT_CONES
 ) -> PlacementProbability | str:
     """Return the best bound of all prisms and frictions that are tried, or why there is none.
 
@@ -140,8 +140,8 @@ def placement_bound(
     check_on_faces(body, grasp)
     if body.patches is not None:
         return "the surface is curved, where nothing is proved of misplaced contacts"
-    unit = Unit(body, grasp.positions)
-    pieces = pieces_under(body, grasp, unit, 0.0)
+    unit = RegionUnit(body, grasp.positions)
+    pieces = room_under(body, grasp, unit, 0.0)
     if pieces is None:
         return "a contact is on a part of its face that is too narrow"
     # contacts may be off their faces by rounding
@@ -152,7 +152,7 @@ def placement_bound(
     slides = np.linalg.norm(np.hstack([normals, -np.cross(normals, d)]) @ off.root, axis=1)
     turned = float(np.linalg.norm(off.root[3:], 2))
     slides = np.hypot(slides, turned**2 * np.linalg.norm(d, axis=1))  # of second order too
-    height = BEHIND * PRISMS[0][1] * float(slides.max()) / unit.scale
+    height = APPROACH_LENGTH * PRISMS[0][1] * float(slides.max()) / unit.scale
     surface = unit.at(body.vertices)[body.triangles]
     slack = planar_slack(float(np.ptp(body.vertices, axis=0).max()), body.surface.flatness_m)
     slack /= unit.scale
@@ -163,8 +163,7 @@ def placement_bound(
     if hidden := [str(finger) for finger, corners in enumerate(seen) if not len(corners)]:
         return f"other parts of the object may hide a contact from finger {' and '.join(hidden)}"
     landings = [
-        unit.back(piece.origin + corners @ piece.frame.T)
-        for piece, corners in zip(pieces, seen, strict=True)
+        unit.back(piece.places(corners)) for piece, corners in zip(pieces, seen, strict=True)
     ]
     lean, depth = max(p.spread for p in pieces), max(p.depth for p in pieces) + slack
     made = partial(
@@ -180,15 +179,15 @@ def placement_bound(
             np.array([np.column_stack([p.normal, p.frame]) for p in pieces]),
             np.full(FINGERS, off.friction),
             np.zeros((FINGERS, 1, 2)),
-            np.full(FINGERS, shift / math.cos(math.pi / SIDES) / unit.scale),
+            np.full(FINGERS, shift / math.cos(math.pi / DISC_SIDES) / unit.scale),
             slide / unit.scale + depth / math.cos(off.turn),
         )
         for least, cover in _covers(sites, math.atan(off.friction) - lean, cones):
             found = made(lower=0.0, slides=slide, shift=shift, least_friction=least, cover=cover)
-            found = replace(found, lower=max(0.0, bound(found) - ROUNDED))
+            found = replace(found, lower=max(0.0, bound(found) - CHANCE_ROUNDING))
             if best is None or found.lower > best.lower:
                 best = found
-            if chance_of_turning(found) <= ENOUGH:
+            if chance_of_turning(found) <= SMALL_CHANCE:
                 return best
     return best or f"no proof of closure around the contacts was found with {cones} cones"
 
@@ -206,7 +205,7 @@ def usual_bound(body: Polyhedron, grasp: Grasp, friction: float) -> PlacementPro
 def _covers(sites: Sites, angle: float, cones: int) -> Iterator[tuple[float, TwistCover]]:
     """Yield covers with less and less friction, from the tangent of half an angle on."""
     least, most = 0.0, angle
-    for _ in range(HALVINGS):
+    for _ in range(ANGLE_HALVINGS):
         middle = 0.5 * (least + most)
         friction = math.tan(middle)
         here = sites._replace(friction=np.full(FINGERS, friction))
@@ -237,12 +236,12 @@ def _seen(
         sides = at - np.roll(at, 1, axis=0)
         across = np.column_stack([-sides[:, 1], sides[:, 0]])
         ways = np.vstack([at - y, across, -across])
-        ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), THINNEST)
+        ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), LEAST_INRADIUS)
         ways = np.vstack([piece.E, ways])
         along = ways @ at.T
         limits = np.maximum((along - slope * above).min(1), along.min(1) - slope * height)
         left, moved = limits - ways @ y, piece.b - limits[: len(piece.b)]
-        best = first_best(-moved) if moved.min() <= NARROWED else first_best(left, 0.0)
+        best = first_best(-moved) if moved.min() <= EDGE_MOVED else first_best(left, 0.0)
         if left[best] <= 0.0:
             return np.empty((0, 2))
         corners = tidy(clip(corners, ways[best : best + 1], limits[best : best + 1]))

@@ -28,26 +28,26 @@ from grasp_core.geometry.polygons import (
     with_fewer_corners,
 )
 from grasp_core.kinds import Friction, MaxCones, Reserve, number, value_of
-from grasp_core.objects.face_pieces import FacePiece, inscribed_radius, piece_of
+from grasp_core.objects.face_pieces import FacePiece, deepest, inscribed_radius, piece_of
 from grasp_core.objects.on_faces import check_on_faces
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.regions.growth import (
-    Grounds,
     Proved,
+    RegionTask,
     better_centers,
     larger_inside,
     largest_discs,
     shared_out,
 )
-from grasp_core.regions.proof import PLACED, CertifiedRegions
-from grasp_core.solvers.ties import coarse, first_best, on_grid
+from grasp_core.regions.proof import PLACE_SLACK, CertifiedRegions
+from grasp_core.solvers.ties import coarse, on_grid
 from grasp_core.values import ContactRegion, Grasp, four
 
-CONES = 10_000
+REGION_CONES = 10_000
 """Default for the largest number of cones in one proof, which takes half a second."""
 UNIT_DIGITS, PLACE_DIGITS = 6, 8
 """Digits after the point of the unit and its origin [object radii], and of centres."""
-NARROWED = 1e-3
+DISC_PRECISION = 1e-3
 """Precision of the largest discs in grown polygons, relative to the proved radius."""
 
 
@@ -59,7 +59,7 @@ def certify_regions(
     reserve: float = 0.0,
     recenter: bool = False,
     clearance: float = 0.0,
-    max_cones: int = CONES,
+    max_cones: int = REGION_CONES,
 ) -> CertifiedRegions | None:
     """Find independent regions around the contacts of a grasp, as large as can be proved.
 
@@ -95,34 +95,34 @@ def certify_regions(
         raise InputError(
             f"grasp {grasp.id} is not in force closure at friction {left:.6g}; raise the friction"
         )
-    unit = Unit(body, positions)
-    pieces = pieces_under(body, grasp, unit, clearance)
+    unit = RegionUnit(body, positions)
+    pieces = room_under(body, grasp, unit, clearance)
     # where the surface leans more than the friction angle nothing can be proved
     least = math.atan(left) - max(body.faces[face].spread for face in grasp.faces)
     if pieces is None or least <= 0.0:
         return None
     leaning = [math.tan(math.atan(left) - p.spread) if p.spread else left for p in pieces]
-    grounds = Grounds(pieces, np.array(leaning), max_cones)
+    task = RegionTask(pieces, np.array(leaning), max_cones)
     ys = np.array([
         nearest_point(piece.corners, on_grid(piece.in_plane(x), PLACE_DIGITS))
         for piece, x in zip(pieces, unit.at(positions), strict=True)
     ])  # fmt: skip
-    proved = largest_discs(grounds, ys)
+    proved = largest_discs(task, ys)
     if recenter:
-        moved = largest_discs(grounds, better_centers(grounds, ys))
-        proved = larger_inside(grounds, moved, proved)
+        moved = largest_discs(task, better_centers(task, ys))
+        proved = larger_inside(task, moved, proved)
     if proved is None:
         return None
-    polygons = shared_out(grounds, proved)
+    polygons = shared_out(task, proved)
     if min(map(len, polygons)) < 3:  # noqa: PLR2004 - not polygons
         return None
-    found = _placed(grounds, proved, polygons, unit)
+    found = _placed(task, proved, polygons, unit)
     if not found.verify():
         raise SolverError(f"grasp {grasp.id}: its regions failed their own check; please report it")
     return found
 
 
-class Unit:
+class RegionUnit:
     """A unit of length and an origin that make the contacts' longest lever about one.
 
     Both are rounded to few digits, so that places in this unit do not depend on the last digits of
@@ -145,8 +145,8 @@ class Unit:
         return self.origin + self.scale * points
 
 
-def pieces_under(
-    body: Polyhedron, grasp: Grasp, unit: Unit, clearance: float
+def room_under(
+    body: Polyhedron, grasp: Grasp, unit: RegionUnit, clearance: float
 ) -> tuple[FacePiece, ...] | None:
     """Return the pieces that contacts are deepest in, clear of edges; None if one is too narrow."""
     found = list[FacePiece]()
@@ -155,17 +155,18 @@ def pieces_under(
         normal = face.normal / np.linalg.norm(face.normal)  # files round normals
         every = [piece_of(index, normal, unit.at(corners)) for corners in face.pieces]
         point = unit.at(contact.position)
-        whole = every[first_best([piece.inset(point) for piece in every], SAME_CORNER)]
+        whole = deepest(every, point)
         corners = tidy(clip(whole.corners, whole.E, whole.b - clearance / unit.scale))
         if len(corners) < 3:  # noqa: PLR2004 - not a polygon
             return None
-        places = whole.origin + corners @ whole.frame.T
-        found.append(piece_of(index, normal, places, face.spread, face.depth / unit.scale))
+        found.append(
+            piece_of(index, normal, whole.places(corners), face.spread, face.depth / unit.scale)
+        )
     return tuple(found)
 
 
 def _placed(
-    grounds: Grounds, proved: Proved, polygons: list[Array], unit: Unit
+    task: RegionTask, proved: Proved, polygons: list[Array], unit: RegionUnit
 ) -> CertifiedRegions:
     """Return polygons as regions in the object's frame, with their proof."""
     trimmed = list[Array]()
@@ -173,38 +174,38 @@ def _placed(
         fewer = with_fewer_corners(polygon)
         E, b = edge_rows(fewer)
         trimmed.append(fewer if (E @ y <= b).all() else polygon)  # else the centre would be lost
-    centers = unit.back(grounds.points(proved.ys))
-    opened = _open_choice(grounds, proved, unit)
+    centers = unit.back(task.points(proved.ys))
+    opened = _open_choice(task, proved, unit)
     choice = None if opened is None else opened.positions
     return CertifiedRegions(
         regions=four(
             ContactRegion(
                 "certified",
-                unit.back(piece.origin + polygon @ piece.frame.T),
+                unit.back(piece.places(polygon)),
                 unit.scale * inscribed_radius(*edge_rows(polygon)),
             )
-            for piece, polygon in zip(grounds.pieces, trimmed, strict=True)
+            for piece, polygon in zip(task.pieces, trimmed, strict=True)
         ),
-        borders=four(unit.back(grounds.places(i)) for i in range(len(grounds.pieces))),
-        radius=unit.scale * _radius_held(grounds, proved, trimmed),
+        borders=four(unit.back(task.places(i)) for i in range(len(task.pieces))),
+        radius=unit.scale * _radius_held(task, proved, trimmed),
         centers=centers,
         limit=math.inf if choice is None else float(np.linalg.norm(choice - centers, axis=1).max()),
         open_choice=choice,
         open_wrench=None if opened is None else opened.separating_wrench,
-        friction=grounds.friction,
+        friction=task.friction,
         origin=unit.origin,
-        normals=np.array([piece.normal for piece in grounds.pieces]),
-        depths=unit.scale * np.array([piece.depth for piece in grounds.pieces]),
+        normals=np.array([piece.normal for piece in task.pieces]),
+        depths=unit.scale * np.array([piece.depth for piece in task.pieces]),
         cover=proved.cover,
         scale=unit.scale,
     )
 
 
-def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> float:
+def _radius_held(task: RegionTask, proved: Proved, polygons: list[Array]) -> float:
     """Return the largest radius, up to the proved one, of discs that fit into the polygons."""
     pairs = [
-        (convex_polygon(polygon, PLACED), convex_polygon(piece.corners, PLACED), y)
-        for piece, polygon, y in zip(grounds.pieces, polygons, proved.ys, strict=True)
+        (convex_polygon(polygon, PLACE_SLACK), convex_polygon(piece.corners, PLACE_SLACK), y)
+        for piece, polygon, y in zip(task.pieces, polygons, proved.ys, strict=True)
     ]
 
     def held(radius: float) -> bool:
@@ -216,26 +217,25 @@ def _radius_held(grounds: Grounds, proved: Proved, polygons: list[Array]) -> flo
     if held(proved.radius):
         return proved.radius
     low, high = 0.0, proved.radius
-    while high - low > NARROWED * proved.radius:  # halved ten times
+    while high - low > DISC_PRECISION * proved.radius:  # halved ten times
         middle = 0.5 * (low + high)
         low, high = (middle, high) if held(middle) else (low, middle)
     return low
 
 
-def _open_choice(grounds: Grounds, proved: Proved, unit: Unit) -> ClosureCertificate | None:
+def _open_choice(task: RegionTask, proved: Proved, unit: RegionUnit) -> ClosureCertificate | None:
     """Return the proof, in the object's frame, that contacts on the pieces are not closed.
 
     Nothing is claimed about patches, as curved surfaces are not planes.
     """
-    if proved.choice is None or any(piece.depth or piece.spread for piece in grounds.pieces):
+    if proved.choice is None or any(piece.depth or piece.spread for piece in task.pieces):
         return None
     on_pieces = all(
-        piece.inset(x) >= -SAME_CORNER
-        for piece, x in zip(grounds.pieces, proved.choice, strict=True)
+        piece.inset(x) >= -SAME_CORNER for piece, x in zip(task.pieces, proved.choice, strict=True)
     )
-    normals = np.array([piece.normal for piece in grounds.pieces])
+    normals = np.array([piece.normal for piece in task.pieces])
     try:
-        found = force_closure(unit.back(proved.choice), normals, grounds.friction)
+        found = force_closure(unit.back(proved.choice), normals, task.friction)
     except UndecidedError:
         return None
     return found if on_pieces and not found.closed else None

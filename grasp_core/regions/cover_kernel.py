@@ -22,17 +22,17 @@ import numpy as np
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.regions.growth import AHEAD, Sites
-from grasp_core.regions.proof import LEAF, TWIST
+from grasp_core.regions.growth import LEAST_POWER, Sites
+from grasp_core.regions.proof import TWIST, UNDIVIDED
 
-MOTIONS = 6
-STEPS = 40
+TWIST_SIZE = 6
+MOST_PLACE_STEPS = 40
 """Largest number of steps towards the place where a contact resists a twist least."""
-RAYS = TWIST
-ROUNDS = 30  # of the choice of forces, at most
+CONE_RAYS = TWIST
+FORCE_ROUNDS = 30  # of the choice of forces, at most
 ANSWERS = 3
 """Number of forces per contact that are tried as the best one for given weights."""
-EVEN = 0.02
+EVEN_WEIGHT = 0.02
 """Weight added to each ray in the choice of the edge to cut, so that all edges are cut in time."""
 CLEAR_OF_CONE = 1e-12
 """Share of the friction that contact forces leave unused, so that rounding does no harm."""
@@ -109,10 +109,10 @@ def resists(motion: Array, sites: Sites, i: int, shift: Array) -> bool:
         shift[0], shift[1], shift[2] = 0.0, -motion[2] / motion[5], motion[1] / motion[5]
         if holds(sites, i, shift[1], shift[2]) and velocity(motion, shift)[0] <= 0.0:
             return False
-    for step in range(STEPS):
+    for step in range(MOST_PLACE_STEPS):
         _, q, r = velocity(motion, (out, x, y))
         least, out_ahead, x_ahead, y_ahead = lowest(motion, sites, i, longest(q, r, most))
-        if least > AHEAD:
+        if least > LEAST_POWER:
             return True
         share = 2.0 / (step + 2.0)
         out += share * (out_ahead - out)
@@ -137,11 +137,12 @@ def is_open(motions: Array, sites: Sites, shifts: Array) -> bool:
     return True
 
 
-class Tree(NamedTuple):
+class CoverTree(NamedTuple):
     """The outcome of a search for at most n cones; `search` fills in the arrays.
 
-    For each cone there is the number of the edge that divides it, or `LEAF`, (n,), and forces along
-    the frames, (n, k, 3). At shifts along the frames, (k, 3), contacts do not resist some twist.
+    For each cone there is the number of the edge that divides it, or `UNDIVIDED`, (n,), and forces
+    along the frames, (n, k, 3). At shifts along the frames, (k, 3), contacts do not resist some
+    twist.
     """
 
     codes: Indices
@@ -156,7 +157,7 @@ def pivot(ids: Indices, weights: Array, motions: Array, i: int, most: float) -> 
     There its power is the same wherever the contact is.
     """
     f, g, along = 0.0, 0.0, 0.0
-    for place in range(RAYS):
+    for place in range(CONE_RAYS):
         f += weights[place] * motions[ids[place], i, 3]
         g += weights[place] * motions[ids[place], i, 4]
         along += weights[place] * motions[ids[place], i, 5]
@@ -176,7 +177,7 @@ def answer(
     mean_f, mean_g = 0.0, 0.0
     for turn in range(ANSWERS):
         total, slope_f, slope_g = 0.0, 0.0, 0.0
-        for place in range(RAYS):
+        for place in range(CONE_RAYS):
             if weights[place] > 0.0:
                 motion = motions[ids[place], i]
                 power, out, x, y = lowest(motion, sites, i, (f, g))
@@ -201,7 +202,7 @@ def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: A
     least, needed = np.inf, 0.0
     for i in range(len(forces)):
         needed += forces[i, 0] * clear[i]
-    for place in range(RAYS):
+    for place in range(CONE_RAYS):
         total = 0.0
         for i in range(len(forces)):
             along = forces[i, 0]
@@ -216,7 +217,7 @@ def together(ids: Indices, motions: Array, sites: Sites, forces: Array, clear: A
 def dot(u: Array, v: Array) -> float:
     """Return the inner product of two lists of six numbers, added in the same order everywhere."""
     total = 0.0
-    for place in range(RAYS):
+    for place in range(CONE_RAYS):
         total += u[place] * v[place]
     return total
 
@@ -225,12 +226,12 @@ def dot(u: Array, v: Array) -> float:
 def reweigh(regrets: Array, powers: Array, weights: Array) -> None:
     """Move weight to rays by the power they have lacked so far; the last round counts twice."""
     mean, total = dot(weights, powers), 0.0
-    for place in range(RAYS):
+    for place in range(CONE_RAYS):
         regrets[place] = max(0.0, regrets[place] + mean - powers[place])
         weights[place] = max(0.0, regrets[place] + mean - powers[place])
         total += weights[place]
     if total <= 0.0:
-        weights[:] = 1.0 / RAYS
+        weights[:] = 1.0 / CONE_RAYS
     else:
         weights /= total
 
@@ -243,19 +244,19 @@ def find_forces(
 
     It stops once no force has power for the weights: those of a twist that may be unresisted.
     """
-    regrets, powers = np.zeros(RAYS), np.empty(RAYS)
-    weights[:] = 1.0 / RAYS
+    regrets, powers = np.zeros(CONE_RAYS), np.empty(CONE_RAYS)
+    weights[:] = 1.0 / CONE_RAYS
     forces[:] = 0.0
-    for turn in range(ROUNDS):
+    for turn in range(FORCE_ROUNDS):
         best, contact, f, g = -np.inf, 0, 0.0, 0.0
         for i in range(len(forces)):
             found = answer(ids, weights, motions, sites, i)
             if found[0] > best:
                 contact = i
                 best, f, g = found
-        if best <= AHEAD:
+        if best <= LEAST_POWER:
             return False
-        for place in range(RAYS):
+        for place in range(CONE_RAYS):
             powers[place] = lowest(motions[ids[place], contact], sites, contact, (f, g))[0]
         # later answers count more
         forces[contact, 0] += turn + 1.0
@@ -270,11 +271,11 @@ def find_forces(
 @loop("numpy")
 def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Array) -> None:
     """Fill in how the twist of a ray moves each contact, for a twist of length one."""
-    twist = np.empty(RAYS)
-    for part in range(RAYS):
+    twist = np.empty(CONE_RAYS)
+    for part in range(CONE_RAYS):
         twist[part] = dot(rays[ray], axes[:, part])
     length = math.sqrt(dot(twist, twist))
-    for part in range(RAYS):
+    for part in range(CONE_RAYS):
         twist[part] /= length
     a0, a1, a2, b0, b1, b2 = twist
     for i in range(len(sites.points)):
@@ -291,16 +292,16 @@ def fill_motions(ray: int, rays: Array, sites: Sites, axes: Array, motions: Arra
 def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, int]:
     """Return number and ends of the edge to divide: a long one between rays of large weight."""
     longest, chosen, number, first, last = -1.0, 0, 0, 0, 0
-    lengths = np.empty(RAYS)
-    for i in range(RAYS):
+    lengths = np.empty(CONE_RAYS)
+    for i in range(CONE_RAYS):
         lengths[i] = math.sqrt(dot(rays[ids[i]], rays[ids[i]]))
-    for i in range(RAYS):
-        for j in range(i + 1, RAYS):
+    for i in range(CONE_RAYS):
+        for j in range(i + 1, CONE_RAYS):
             length = 0.0
-            for part in range(RAYS):
+            for part in range(CONE_RAYS):
                 gap = rays[ids[i], part] / lengths[i] - rays[ids[j], part] / lengths[j]
                 length += gap * gap
-            length *= (weights[i] + EVEN) * (weights[j] + EVEN)
+            length *= (weights[i] + EVEN_WEIGHT) * (weights[j] + EVEN_WEIGHT)
             if length > longest:
                 longest, chosen, first, last = length, number, ids[i], ids[j]
             number += 1
@@ -308,26 +309,26 @@ def edge_to_cut(ids: Indices, rays: Array, weights: Array) -> tuple[int, int, in
 
 
 @loop("numpy")
-def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> tuple[int, int]:
+def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: CoverTree) -> tuple[int, int]:
     """Divide cones until each is covered, a twist is unresisted, or there are too many cones.
 
     Gives how the search ended, and the number of cones.
     """
     most, clear = needs
-    rays = np.zeros((2 * RAYS + most, RAYS))
-    motions = np.empty((2 * RAYS + most, len(sites.points), MOTIONS))
-    cones, weights = np.empty((most, RAYS), dtype=np.int64), np.empty(RAYS)
+    rays = np.zeros((2 * CONE_RAYS + most, CONE_RAYS))
+    motions = np.empty((2 * CONE_RAYS + most, len(sites.points), TWIST_SIZE))
+    cones, weights = np.empty((most, CONE_RAYS), dtype=np.int64), np.empty(CONE_RAYS)
     # the first rays are the axes and their opposites, which span the orthants
-    for ray in range(2 * RAYS):
+    for ray in range(2 * CONE_RAYS):
         rays[ray, ray // 2] = 1.0 - 2.0 * (ray % 2)
         fill_motions(ray, rays, sites, axes, motions)
-    for signs in range(1 << RAYS):
-        for j in range(RAYS):
+    for signs in range(1 << CONE_RAYS):
+        for j in range(CONE_RAYS):
             cones[signs, j] = 2 * j + (signs >> j & 1)
     bad = np.empty(motions.shape[1:])
-    count, made, done = 1 << RAYS, 2 * RAYS, 0
+    count, made, done = 1 << CONE_RAYS, 2 * CONE_RAYS, 0
     while done < count:
-        tree.codes[done] = LEAF
+        tree.codes[done] = UNDIVIDED
         if not find_forces(cones[done], motions, sites, clear, tree.forces[done], weights):
             if count + 2 > most:
                 return UNDECIDED, done
@@ -338,12 +339,12 @@ def search(sites: Sites, axes: Array, needs: tuple[int, Array], tree: Tree) -> t
                 rays[made, d] = rays[a, d] + rays[b, d]
             fill_motions(made, rays, sites, axes, motions)
             bad[:] = 0.0
-            for place in range(RAYS):
+            for place in range(CONE_RAYS):
                 bad += weights[place] * motions[cones[done, place]]
             # (5): a twist that no contact resists
             if is_open(motions[made], sites, tree.shifts) or is_open(bad, sites, tree.shifts):
                 return REFUTED, done
-            for j in range(RAYS):
+            for j in range(CONE_RAYS):
                 end = cones[done, j]
                 cones[count, j] = made if end == a else end
                 cones[count + 1, j] = made if end == b else end

@@ -52,11 +52,11 @@ from grasp_core.geometry.polygons import (
     tidy,
 )
 from grasp_core.objects.face_pieces import FacePiece
-from grasp_core.regions.proof import LEAF, TWIST, TwistCover, power_of, slack_of, summed
+from grasp_core.regions.proof import TWIST, UNDIVIDED, TwistCover, power_of, slack_of, summed
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from grasp_core.solvers.ties import GRID_DIGITS, coarse, first_best, nearest_optimum, on_grid
 
-AHEAD = 1e-8
+LEAST_POWER = 1e-8
 """Least power of a force that counts, relative to its size and the farthest place: more than
 rounding sites to a grid can change it."""
 
@@ -83,7 +83,7 @@ class Sites(NamedTuple):
         aside = np.sqrt(np.einsum("kcj,kcj->kc", self.corners, self.corners)).max(axis=1)
         places = np.sqrt(np.einsum("kj,kj->k", self.points, self.points))
         farthest = 1.0 + float((places + aside + self.radii + self.depths).max())
-        return AHEAD * farthest * (1.0 + self.friction)
+        return LEAST_POWER * farthest * (1.0 + self.friction)
 
     def lowest(self, i: int, slopes: Array) -> Array:
         """Find the least values of functions with slopes (..., 2) over a contact's site, (...,)."""
@@ -102,22 +102,22 @@ def stacked_corners(polygons: list[Array]) -> Array:
     ])  # fmt: skip
 
 
-KERNEL = "grasp_core.regions.cover_kernel"
+COVER_KERNEL = "grasp_core.regions.cover_kernel"
 DIAGONAL = 1e-12
 """Number added to the diagonal of a product of motions, so that it has a triangular factor."""
 FINENESS = 0.02  # relative precision to which the largest radius is found
-FIRST_RADIUS, LEAST_RADIUS = 0.05, 1e-6
+FIRST_PROVED, LEAST_PROVED = 0.05, 1e-6
 """Radii at which the search begins and at which it gives up, relative to the levers of the
 contacts."""
 COARSE = 16  # factor by which the first attempts have fewer cones
-FAST, SLOW = 2.0, 1.1
+FAST_GROWTH, SLOW_GROWTH = 2.0, 1.1
 """Factors by which the radius grows, in the first attempts and in the others."""
 OPEN_NEAR = 0.04
 """Distance from the proved radius up to which an open choice is sought, relative to it."""
 REFUTING = 4
 """Factor by which attempts to find contacts that are not closed have fewer cones."""
 REACH_DIGITS = 10  # digits after the point to which the largest radius to try is rounded
-SIDES = 16  # number of sides of the polygon around a disc that extends beyond its face
+DISC_SIDES = 16  # number of sides of the polygon around a disc that extends beyond its face
 
 
 def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | None, Array | None]:
@@ -126,9 +126,9 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | No
     Otherwise contacts, (k, 3), may be found that leave a twist unresisted except for rounding.
     """
     # the search sees sites on a grid, so that it ends alike on all machines
-    kernel, told = compiled(KERNEL), sites.on_grid()
+    kernel, told = compiled(COVER_KERNEL), sites.on_grid()
     k, most = len(sites.points), max(cones, 1 << TWIST)
-    tree = kernel.Tree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
+    tree = kernel.CoverTree(np.zeros(most, np.int64), np.zeros((most, k, 3)), np.zeros((k, 3)))
     ended, count = kernel.search(told, axes, (most, told.clear()), tree)
     # (5), translated from shifts along the frames to places
     if ended == kernel.REFUTED:
@@ -136,7 +136,7 @@ def search_cover(sites: Sites, axes: Array, cones: int) -> tuple[TwistCover | No
     if ended != kernel.COVERED:
         return None, None
     codes = tree.codes[:count]
-    forces = tree.forces[:count][codes == LEAF]
+    forces = tree.forces[:count][codes == UNDIVIDED]
     return TwistCover(axes, codes, np.einsum("kij,mkj->mki", sites.frames, forces)), None
 
 
@@ -157,7 +157,7 @@ def twist_axes(points: Array, frames: Array, friction: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Grounds:
+class RegionTask:
     """The pieces that contacts may stand on, at unit size, with friction and the effort allowed."""
 
     pieces: tuple[FacePiece, ...]
@@ -175,8 +175,7 @@ class Grounds:
 
     def places(self, i: int) -> Array:
         """Return the corners of a piece in space, (c, 3)."""
-        piece = self.pieces[i]
-        return piece.origin + piece.corners @ piece.frame.T
+        return self.pieces[i].places(self.pieces[i].corners)
 
     def around(self, ys: Array, polygons: Sequence[Array], radii: Array) -> Sites:
         """Make sites of polygons (c, 2), in the planes, widened by radii."""
@@ -197,7 +196,7 @@ class Grounds:
                 radii[i] = radius
                 polygons.append(y[None])
             else:
-                polygons.append(clip_to_disc(piece.corners, y, radius, SIDES))
+                polygons.append(clip_to_disc(piece.corners, y, radius, DISC_SIDES))
         return self.around(ys, polygons, radii)
 
 
@@ -212,26 +211,26 @@ class Proved:
     """Contacts that are not force-closed, in slightly larger discs, (k, 3); None if not found."""
 
 
-def largest_discs(grounds: Grounds, ys: Array, first: float = FIRST_RADIUS) -> Proved | None:
+def largest_discs(task: RegionTask, ys: Array, first: float = FIRST_PROVED) -> Proved | None:
     """Find the largest equal discs, up to whole faces, that a cover proves, or None."""
-    search = _Search(grounds, ys)
-    search.widen(grounds.cones // COARSE, first, FAST, SLOW - 1.0)
-    search.widen(grounds.cones, SLOW * search.lower or first, SLOW, FINENESS)
+    search = _Search(task, ys)
+    search.widen(task.cones // COARSE, first, FAST_GROWTH, SLOW_GROWTH - 1.0)
+    search.widen(task.cones, SLOW_GROWTH * search.lower or first, SLOW_GROWTH, FINENESS)
     if search.cover is None:
         return None
-    search.refute(grounds.cones // REFUTING)
+    search.refute(task.cones // REFUTING)
     return Proved(ys, search.lower, search.cover, search.choice)
 
 
 class _Search:
     """Radii proved so far, and radii refuted, in a search for the largest discs."""
 
-    def __init__(self, grounds: Grounds, ys: Array) -> None:
-        self.grounds, self.ys = grounds, ys
-        self.axes = twist_axes(grounds.points(ys), grounds.frames, grounds.friction)
+    def __init__(self, task: RegionTask, ys: Array) -> None:
+        self.task, self.ys = task, ys
+        self.axes = twist_axes(task.points(ys), task.frames, task.friction)
         holding = max(
             float(np.linalg.norm(piece.corners - y, axis=1).max())
-            for piece, y in zip(grounds.pieces, ys, strict=True)
+            for piece, y in zip(task.pieces, ys, strict=True)
         )
         self.reach = coarse(holding, REACH_DIGITS)  # discs hold the whole pieces, or slightly more
         self.lower = 0.0
@@ -243,11 +242,11 @@ class _Search:
         """Try a radius, then radii growing by a factor, then bisect."""
         upper, radius = self.limit, min(radius, 0.5 * (self.lower + self.limit))
         # radii grow by a factor up to the reach, or the interval is halved or quartered
-        while radius >= LEAST_RADIUS and upper - self.lower > fineness * self.lower:
+        while radius >= LEAST_PROVED and upper - self.lower > fineness * self.lower:
             radius = min(radius, self.reach)
             if radius <= self.lower:
                 break
-            cover, choice = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
+            cover, choice = search_cover(self.task.discs(self.ys, radius), self.axes, cones)
             if cover is not None:
                 self.lower, self.cover = radius, cover
             else:
@@ -265,7 +264,7 @@ class _Search:
         # each turn halves the interval, or doubles what is searched of it, up to the reach
         while self.limit - below > OPEN_NEAR * self.lower and min(radius, self.reach) > below:
             radius = min(radius, self.reach)
-            _, choice = search_cover(self.grounds.discs(self.ys, radius), self.axes, cones)
+            _, choice = search_cover(self.task.discs(self.ys, radius), self.axes, cones)
             if choice is not None:
                 self.limit, self.choice = radius, choice
             else:
@@ -275,32 +274,32 @@ class _Search:
 
 
 SHARINGS = 2  # number of times that spare power is shared out among the contacts
-MARGIN = 4.0
+POWER_LEFT = 4.0
 """Power that polygons leave over, as a multiple of the slack with which the proof is checked."""
-MOVES = 12  # of all centres, at most
+MOST_CENTRE_MOVES = 12  # of all centres, at most
 MOVING = 8
 """Factor by which covers have fewer cones while centres move than are allowed in the end."""
 WORTH = 1.005
 """Least growth of the radius, as a factor, at which centres are moved once more."""
-FARTHEST = 1.0  # largest distance that a centre moves at once, in radii
+LONGEST_MOVE = 1.0  # largest distance that a centre moves at once, in radii
 MOVED_DIGITS = 6  # digits after the point that moved centres keep
 STOPPING = 3.0
 """Rays count in the program if they would stop a radius up to this factor of the present one."""
 
 
-def shared_out(grounds: Grounds, proved: Proved) -> list[Array]:
+def shared_out(task: RegionTask, proved: Proved) -> list[Array]:
     """Grow polygons around discs as far as their proof allows, in the planes, (c, 2) each."""
     polygons, ys = list[Array](), proved.ys
-    sites = grounds.discs(ys, proved.radius)
+    sites = task.discs(ys, proved.radius)
     for _ in range(SHARINGS):
-        polygons = _given_away(grounds, ys, sites, proved.cover)
+        polygons = _given_away(task, ys, sites, proved.cover)
         if min(map(len, polygons)) == 0:
             break  # thinner than the slack of the check
-        sites = grounds.around(ys, polygons, np.zeros(len(ys)))
+        sites = task.around(ys, polygons, np.zeros(len(ys)))
     return polygons
 
 
-def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
+def _given_away(task: RegionTask, ys: Array, sites: Sites, cover: TwistCover) -> list[Array]:
     """Cut the pieces by all half-planes (1), after sharing out the spare power once."""
     each = range(len(ys))
     rows, limits = [list[Array]() for _ in each], [list[Array]() for _ in each]
@@ -308,15 +307,13 @@ def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) ->
         twists, lengths = rays @ cover.axes, summed(rays, cover.axes)
         spare, slopes, lowest = np.zeros(lengths.shape), list[Array](), list[Array]()
         forces = cover.forces[where].swapaxes(0, 1)
-        for i, (piece, point, F) in enumerate(
-            zip(grounds.pieces, sites.points, forces, strict=True)
-        ):
+        for i, (piece, point, F) in enumerate(zip(task.pieces, sites.points, forces, strict=True)):
             slope, at_origin = power_of(F, twists)
             slopes.append(slope @ piece.frame)
             lowest.append(sites.lowest(i, slopes[i]))
             spare += at_origin + slope @ point + lowest[i]
             spare -= piece.depth * np.abs(slope @ piece.normal)
-            spare -= MARGIN * lengths * slack_of(F, grounds.places(i))[:, None]
+            spare -= POWER_LEFT * lengths * slack_of(F, task.places(i))[:, None]
         sharing = np.maximum((forces != 0.0).any(axis=2).sum(axis=0), 1)[:, None]
         for i in each:
             sizes = np.linalg.norm(slopes[i], axis=2)
@@ -327,7 +324,7 @@ def _given_away(grounds: Grounds, ys: Array, sites: Sites, cover: TwistCover) ->
             limits[i].append(-kept)
     return [
         y + tidy(_inside(piece.corners - y, np.concatenate(r), np.concatenate(b)))
-        for piece, y, r, b in zip(grounds.pieces, ys, rows, limits, strict=True)
+        for piece, y, r, b in zip(task.pieces, ys, rows, limits, strict=True)
     ]
 
 
@@ -344,13 +341,13 @@ def _inside(polygon: Array, rows: Array, limits: Array) -> Array:
     return polygon
 
 
-def better_centers(grounds: Grounds, ys: Array) -> Array:
+def better_centers(task: RegionTask, ys: Array) -> Array:
     """Find centres with larger discs, or return the same where no radius is proved around them."""
-    coarse = replace(grounds, cones=grounds.cones // MOVING)
+    coarse = replace(task, cones=task.cones // MOVING)
     best = largest_discs(coarse, ys)
     if best is None:
         return ys
-    for _ in range(MOVES):
+    for _ in range(MOST_CENTRE_MOVES):
         moved = _best_for_forces(coarse, best)
         found = None if moved is None else largest_discs(coarse, moved, best.radius)
         if found is None or inside_faces(coarse, found) < WORTH * inside_faces(coarse, best):
@@ -359,31 +356,31 @@ def better_centers(grounds: Grounds, ys: Array) -> Array:
     return best.ys
 
 
-def larger_inside(grounds: Grounds, one: Proved | None, other: Proved | None) -> Proved | None:
+def larger_inside(task: RegionTask, one: Proved | None, other: Proved | None) -> Proved | None:
     """Return whichever of two sets of discs has the larger discs inside the faces."""
     if one is None or other is None:
         return other if one is None else one
-    return (one, other)[first_best([inside_faces(grounds, each) for each in (one, other)])]
+    return (one, other)[first_best([inside_faces(task, each) for each in (one, other)])]
 
 
-def inside_faces(grounds: Grounds, proved: Proved) -> float:
+def inside_faces(task: RegionTask, proved: Proved) -> float:
     """Return the largest radius of discs that are proved and lie inside the faces."""
-    depths = [(p.b - p.E @ y).min() for p, y in zip(grounds.pieces, proved.ys, strict=True)]
+    depths = [(p.b - p.E @ y).min() for p, y in zip(task.pieces, proved.ys, strict=True)]
     return min(proved.radius, *map(float, depths))
 
 
-def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
+def _best_for_forces(task: RegionTask, proved: Proved) -> Array | None:
     """Find the best centres near the present ones for a cover's forces, or None."""
     k = len(proved.ys)
     rows, limits = list[Array](), list[Array]()
-    points = grounds.points(proved.ys)
+    points = task.points(proved.ys)
     for where, rays in proved.cover.leaves():
         twists = rays @ proved.cover.axes
         twists = (twists / np.linalg.norm(twists, axis=2, keepdims=True)).reshape(-1, 6)
         powers, falls, moves = np.zeros(len(twists)), np.zeros(len(twists)), list[Array]()
         forces = proved.cover.forces[where]
         sizes = np.sqrt(np.einsum("mki,mki->m", forces, forces))[:, None]
-        for piece, point, F in zip(grounds.pieces, points, forces.swapaxes(0, 1), strict=True):
+        for piece, point, F in zip(task.pieces, points, forces.swapaxes(0, 1), strict=True):
             each = np.repeat(F / sizes, rays.shape[1], axis=0)
             slope, at_origin = power_of(each, twists[:, None])
             slope, across = slope[:, 0], slope[:, 0] @ piece.frame
@@ -395,14 +392,14 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
         rows.append(np.column_stack([-np.hstack(moves), falls])[near])
         limits.append(powers[near])
     # (3), for the same moves
-    for i, (piece, y) in enumerate(zip(grounds.pieces, proved.ys, strict=True)):
+    for i, (piece, y) in enumerate(zip(task.pieces, proved.ys, strict=True)):
         edges = np.zeros((len(piece.E), 2 * k + 1))
         edges[:, 2 * i : 2 * i + 2], edges[:, -1] = piece.E, 1.0
         rows.append(edges)
         limits.append(piece.b - piece.E @ y)
     box = np.eye(2 * k, 2 * k + 1)
     rows += [box, -box]
-    limits += [np.full(2 * k, FARTHEST * proved.radius)] * 2
+    limits += [np.full(2 * k, LONGEST_MOVE * proved.radius)] * 2
     c = np.zeros(2 * k + 1)
     c[-1] = 1.0
     program = LinearProgram(c, np.vstack(rows), np.concatenate(limits))
@@ -414,5 +411,5 @@ def _best_for_forces(grounds: Grounds, proved: Proved) -> Array | None:
         return None
     moved = on_grid(proved.ys + nearest_optimum(program, best)[:-1].reshape(k, 2), MOVED_DIGITS)
     return np.array([
-        nearest_point(piece.corners, y) for piece, y in zip(grounds.pieces, moved, strict=True)
+        nearest_point(piece.corners, y) for piece, y in zip(task.pieces, moved, strict=True)
     ])  # fmt: skip

@@ -39,11 +39,11 @@ and k = 1 / cos T, all that (4) and (5) leave out is then at most |w|^2 times
     |w| |d_i| (2/3 + k (1 + T) / 2) + (|t| + |e_i|) (3/2 + k (1 + T) / 2).                  (6)
 
 Chance. In unit normal variables z, (4) and (5) are sigma g + z'Hz, with g normal; and (6) is part
-of H, once t, w and e_i are bounded by their `REACH`. Where w = 0 nothing is left of z'Hz, so at
-most three eigenvalues of H are positive, as w has three coordinates. Let l be the largest, or zero
-if that is more. Then z'Hz is at most l times the squared length of z in the space of three vectors
-and the gradient of g: g^2, and at most three more coordinates, which do not depend on g. So a limit
-b is broken with at most the chance that
+of H, once t, w and e_i are bounded by their `LARGEST_DEVIATIONS`. Where w = 0 nothing is left of
+z'Hz, so at most three eigenvalues of H are positive, as w has three coordinates. Let l be the
+largest, or zero if that is more. Then z'Hz is at most l times the squared length of z in the space
+of three vectors and the gradient of g: g^2, and at most three more coordinates, which do not depend
+on g. So a limit b is broken with at most the chance that
 
     sigma g + l (g^2 + q) > b,    q of the chi-square law of 3 variables,                    (7)
 
@@ -65,22 +65,22 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
 from grasp_core.geometry.polygons import circle, convex_polygon, plane_frame
 from grasp_core.kinds import Friction, NotNegative, Share
-from grasp_core.regions.proof import PLACED, TwistCover
+from grasp_core.regions.proof import PLACE_SLACK, TwistCover
 from grasp_core.values import FINGERS
 
-DRAWS = 2000
+ESTIMATE_DRAWS = 2000
 """Number of draws of an estimate."""
-ROUNDING = 1e-9
+ROUNDING_CHANCE = 1e-9
 """Chance that pays for rounding."""
-REACH = 4.5
+LARGEST_DEVIATIONS = 4.5
 """Largest motions that count, in their largest deviations: a chance of 1.5e-4 for each of t, w."""
-MOST_TURN = 1.0
+LARGEST_CLOSED_TURN = 1.0
 """Largest turn that may count as closed [rad]."""
-SIDES = 16
+DISC_SIDES = 16
 """Corners of the polygons around discs of fingers' shifts."""
-ABOVE = np.append(np.exp2(np.arange(-1.0, -160.0, -1.0) / 4.0), 0.0)
+TAIL_CHANCES = np.append(np.exp2(np.arange(-1.0, -160.0, -1.0) / 4.0), 0.0)
 """Chances of values above the ends of the intervals that a law is divided into."""
-MASS = -np.diff(ABOVE, prepend=1.0)
+MASS = -np.diff(TAIL_CHANCES, prepend=1.0)
 """Chances of the intervals."""
 
 
@@ -99,7 +99,10 @@ class Misplacement(Declared):
 
     def _check_together(self) -> None:
         values = np.linalg.eigvalsh(self.covariance)
-        if not (self.covariance == self.covariance.T).all() or values[0] < -ROUNDING * values[-1]:
+        if (
+            not (self.covariance == self.covariance.T).all()
+            or values[0] < -ROUNDING_CHANCE * values[-1]
+        ):
             raise InputError("covariance must be symmetric and have no negative eigenvalue")
 
     @property
@@ -111,7 +114,9 @@ class Misplacement(Declared):
     @property
     def turn(self) -> float:
         """Largest turn of the object that may count as closed, T [rad]."""
-        return min(MOST_TURN, REACH * float(np.linalg.norm(self.root[3:], 2)))
+        return min(
+            LARGEST_CLOSED_TURN, LARGEST_DEVIATIONS * float(np.linalg.norm(self.root[3:], 2))
+        )
 
 
 @declared
@@ -172,25 +177,25 @@ class PlacementProbability(Declared):
         """Return E, (k, 3), and b [m] of (5) for a landing; None if it is no convex polygon."""
         frame, arms = plane_frame(self.normals[i]), self.landings[i] - self.positions[i]
         size = float(np.abs(arms).max(initial=0.0))  # of no corners too
-        flat = convex_polygon(arms @ frame / size, PLACED)
-        if flat is None or np.abs(arms @ self.normals[i]).max() > PLACED * size:
+        flat = convex_polygon(arms @ frame / size, PLACE_SLACK)
+        if flat is None or np.abs(arms @ self.normals[i]).max() > PLACE_SLACK * size:
             return None
         return flat.E @ frame.T, flat.b * size
 
     @property
     def estimate(self) -> float:
-        """Share of `DRAWS` draws in which fingers meet their landings and are closed there.
+        """Share of some draws in which fingers meet their landings and are closed there.
 
         The draws are always the same. Fingers that meet the object beside their landings count as
         not closed, although they often are, so that more draws may be closed than this.
         """
         spatial: Any = importlib.import_module("scipy.spatial.transform")
         rng, n, d = np.random.default_rng(0), self.normals, self.positions - self.center
-        moves = rng.normal(size=(DRAWS, 6)) @ self.off.root.T
-        mu = self.off.friction + self.off.friction_sigma * rng.normal(size=DRAWS)
+        moves = rng.normal(size=(ESTIMATE_DRAWS, 6)) @ self.off.root.T
+        mu = self.off.friction + self.off.friction_sigma * rng.normal(size=ESTIMATE_DRAWS)
         R = spatial.Rotation.from_rotvec(moves[:, 3:]).as_matrix()
         frames = np.array([plane_frame(each) for each in n])
-        beside = self.off.contact_sigma * rng.normal(size=(DRAWS, FINGERS, 2))
+        beside = self.off.contact_sigma * rng.normal(size=(ESTIMATE_DRAWS, FINGERS, 2))
         arms = d + np.einsum("kij,mkj->mki", frames, beside) - moves[:, None, :3]
         # (1), before the object has moved
         turned = np.einsum("mij,kj->mki", R, n)
@@ -206,11 +211,11 @@ class PlacementProbability(Declared):
             return 0.0
         friction = np.repeat(mu[there, None], FINGERS, axis=1)
         cones = ContactCones.at(unit_size(arms[there])[0], turned[there], friction)
-        return float(np.count_nonzero(decided_at_once(cones)[0])) / DRAWS
+        return float(np.count_nonzero(decided_at_once(cones)[0])) / ESTIMATE_DRAWS
 
     def _prisms(self) -> list[Array]:
         """Return corners of prisms that hold (2), in the unit of the proof, (32, 3) each."""
-        disc = self.shift / math.cos(math.pi / SIDES) * circle(SIDES)
+        disc = self.shift / math.cos(math.pi / DISC_SIDES) * circle(DISC_SIDES)
         lengths = self.slides + self.depth / math.cos(self.off.turn)
         found = list[Array]()
         for x, n, length in zip(self.positions, self.normals, lengths, strict=True):
@@ -222,7 +227,11 @@ class PlacementProbability(Declared):
 def bound(it: PlacementProbability) -> float:
     """Return a number that the chance of closure is not below, by (3) to (7)."""
     special: Any = importlib.import_module("scipy.special")
-    failing = chance_of_turning(it) + 2.0 * float(special.chdtrc(3, REACH**2)) + ROUNDING
+    failing = (
+        chance_of_turning(it)
+        + 2.0 * float(special.chdtrc(3, LARGEST_DEVIATIONS**2))
+        + ROUNDING_CHANCE
+    )
     if it.off.contact_sigma:
         failing += FINGERS * float(np.exp(-0.5 * np.square(it.shift / it.off.contact_sigma)))
     failing += float(_chances_beyond(*_limits(it), special).sum())
@@ -232,11 +241,11 @@ def bound(it: PlacementProbability) -> float:
 def chance_of_turning(it: PlacementProbability) -> float:
     """Bound the chance that (3) fails from above: by the least friction of each interval."""
     special: Any = importlib.import_module("scipy.special")
-    mu = it.off.friction + it.off.friction_sigma * special.ndtri(ABOVE[:-1])
+    mu = it.off.friction + it.off.friction_sigma * special.ndtri(TAIL_CHANCES[:-1])
     room = np.arctan(np.maximum(mu, 0.0)) - math.atan(it.least_friction) - it.lean
     turned = float(np.linalg.norm(it.off.root[3:], 2))
     with np.errstate(divide="ignore", invalid="ignore"):
-        turning = special.chdtrc(3, (np.minimum(room, MOST_TURN) / turned) ** 2)
+        turning = special.chdtrc(3, (np.minimum(room, LARGEST_CLOSED_TURN) / turned) ** 2)
     return float(np.where(room > 0.0, turning, 1.0) @ MASS[:-1]) + float(MASS[-1])
 
 
@@ -244,7 +253,7 @@ def _limits(it: PlacementProbability) -> tuple[Array, Array, Array]:
     """Write (4) and (5) as g.z + z'Hz <= b: g (m, 8), H (m, 8, 8) and b (m,)."""
     off, T = it.off, it.off.turn
     k = (1.0 + T) / (2.0 * math.cos(T))
-    farthest = REACH * float(np.linalg.norm(off.root[:3], 2)) + it.shift
+    farthest = LARGEST_DEVIATIONS * float(np.linalg.norm(off.root[:3], 2)) + it.shift
     linear, curved, limits = list[Array](), list[Array](), list[Array]()
     for i, (x, n, slide) in enumerate(zip(it.positions, it.normals, it.slides, strict=True)):
         d, (E, b) = x - it.center, it.edges(i) or (np.zeros((1, 3)), np.full(1, -1.0))
@@ -277,7 +286,7 @@ def _chances_beyond(g: Array, H: Array, b: Array, special: Any) -> Array:
     """Bound the chances that g.z + z'Hz <= b fails, one for each row, from above by (7)."""
     sigma = np.linalg.norm(g, axis=1)[:, None]
     top = np.maximum(np.linalg.eigvalsh(H)[:, -1:], 0.0)
-    left = b[:, None] - top * special.chdtri(3, ABOVE[:-1])
+    left = b[:, None] - top * special.chdtri(3, TAIL_CHANCES[:-1])
     # sigma g + l g^2 > left beyond one root, and before the other
     square = sigma**2 + 4.0 * top * left
     roots = sigma + np.sqrt(np.maximum(square, 0.0))

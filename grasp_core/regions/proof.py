@@ -68,13 +68,13 @@ from grasp_core.kinds import LARGEST_FRICTION, Quantity
 from grasp_core.values import FINGERS, ContactRegion
 
 TWIST = 6
-LEAF = 15
+UNDIVIDED = 15
 """Code of a cone that is not divided; smaller codes number the edges (0, 1), (0, 2), ... (4, 5)."""
 EDGES = tuple((i, j) for i in range(TWIST) for j in range(i + 1, TWIST))
-SLACK = 1e-12
+POWER_SLACK = 1e-12
 """Rounding of a power, relative to the lengths of wrench and `summed` twist: thousands of
 roundings."""
-LARGEST_ENTRY = 2.0**50
+LARGEST_EXACT = 2.0**50
 """Entries of rays up to this are exact: they are sums of whole numbers. Lengths of axes must be
 between its inverse and it."""
 
@@ -89,14 +89,14 @@ class TwistCover(Declared):
 
     axes: Annotated[Array, Shape(TWIST, TWIST)]
     """Six independent twists as rows: velocity of the origin, then angular velocity, (6, 6)."""
-    codes: Annotated[Indices, Shape("n", whole=True, most=LEAF)]
+    codes: Annotated[Indices, Shape("n", whole=True, most=UNDIVIDED)]
     """The tree of cones, (n,), level by level from the 64 orthants: for each cone the number of the
-    edge at which it is divided, or `LEAF`."""
+    edge at which it is divided, or `UNDIVIDED`."""
     forces: Annotated[Array, Shape("m", "k", 3)]
     """Forces on the object for each cone that is not divided, in the same order, (m, k, 3)."""
 
     def _check_together(self) -> None:
-        leaves = int(np.count_nonzero(self.codes == LEAF))
+        leaves = int(np.count_nonzero(self.codes == UNDIVIDED))
         if len(self.forces) != leaves:
             raise InputError(
                 f"forces must be those of the {leaves} cones that are not divided, got "
@@ -110,7 +110,7 @@ class TwistCover(Declared):
             codes = self.codes[at : at + len(cones)]
             if len(codes) < len(cones):
                 break
-            uncut = codes == LEAF
+            uncut = codes == UNDIVIDED
             count = int(np.count_nonzero(uncut))
             yield slice(begun, begun + count), cones[uncut]
             at, begun = at + len(cones), begun + count
@@ -127,14 +127,14 @@ class TwistCover(Declared):
         if not self.is_sound():
             return False
         k = self.forces.shape[1]
-        units = is_array(normals, k, 3, units=True, slack=SLACK)
+        units = is_array(normals, k, 3, units=True, slack=POWER_SLACK)
         if not (units and is_array(friction, k, least=0.0, most=LARGEST_FRICTION)):
             return False
         placed = isinstance(regions, list | tuple) and len(regions) == k
         placed = placed and all(is_array(each, None, 3) and len(each) > 0 for each in regions)
         largest = np.abs(self.forces).max(axis=(1, 2), initial=0.0)
         lengths = np.linalg.norm(self.axes, axis=1)
-        exact = ((lengths > 1.0 / LARGEST_ENTRY) & (lengths < LARGEST_ENTRY)).all()
+        exact = ((lengths > 1.0 / LARGEST_EXACT) & (lengths < LARGEST_EXACT)).all()
         if not (placed and (largest > 0.0).all() and exact):
             return False
         independence = np.linalg.svd(self.axes / lengths[:, None], compute_uv=False)[-1]
@@ -143,7 +143,7 @@ class TwistCover(Declared):
         across = np.linalg.norm(forces - along[..., None] * normals, axis=2)
         # every F_i lies in its cone C_i
         in_cones = ((along >= 0.0) & (across <= friction * along)).all()
-        if not (independence > SLACK and in_cones):
+        if not (independence > POWER_SLACK and in_cones):
             return False
         try:
             return all(
@@ -155,7 +155,7 @@ class TwistCover(Declared):
     def _powerful(self, forces: Array, rays: Array, regions: Sequence[Array]) -> bool:
         """Return whether forces have positive power, h > 0 in (2), on the rays of each cone."""
         # beyond this the rays would not be exact, nor the cuts (4)
-        if np.abs(rays).max(initial=0.0) > LARGEST_ENTRY:
+        if np.abs(rays).max(initial=0.0) > LARGEST_EXACT:
             return False
         powers, sizes = np.zeros(rays.shape[:2]), np.zeros(rays.shape[:2])
         twists, lengths = rays @ self.axes, summed(rays, self.axes)
@@ -183,7 +183,7 @@ def summed(rays: Array, axes: Array) -> Array:
 def slack_of(F: Array, places: Array) -> Array:
     """Bound the rounding of powers of forces (m, 3) at places (c, 3), per `summed`, (m,)."""
     farthest = np.linalg.norm(places, axis=1).max()
-    return SLACK * np.linalg.norm(F, axis=1) * (1.0 + farthest)
+    return POWER_SLACK * np.linalg.norm(F, axis=1) * (1.0 + farthest)
 
 
 def orthants() -> Array:
@@ -204,7 +204,7 @@ def halves(cones: Array, codes: Indices) -> Array:
     return halves
 
 
-PLACED = 1e-9
+PLACE_SLACK = 1e-9
 """How far points may be off their planes and borders, and radii off their measured values, relative
 to `scale`, which is no longer than contacts are apart: files that keep ten digits stay within it.
 """
@@ -260,7 +260,8 @@ class CertifiedRegions(Declared):
     def _has_fitting_scale(self) -> bool:
         """Return whether the unit of length is no longer than contacts in the borders are apart.
 
-        What may be `PLACED` off is measured with it: twice as long as it need be, for rounding.
+        What may be `PLACE_SLACK` off is measured with it: twice as long as it need be, for
+        rounding.
         """
         return self.scale <= 2.0 * float(np.linalg.norm(np.ptp(np.vstack(self.borders), axis=0)))
 
@@ -275,20 +276,20 @@ class CertifiedRegions(Declared):
                 return False
             width, radius = region.inscribed_radius / self.scale, self.radius / self.scale
             if not (
-                border.holds(polygon.corners, PLACED)
-                and polygon.holds(center, PLACED)
+                border.holds(polygon.corners, PLACE_SLACK)
+                and polygon.holds(center, PLACE_SLACK)
                 and has_inscribed_radius(polygon, width)
                 and holds_disc(polygon, border, center[0], radius)
             ):
                 return False
             away = np.linalg.norm(border.corners - center, axis=1)
             farthest = max(farthest, float(away.max()))
-        return self.radius <= (farthest + PLACED) * self.scale
+        return self.radius <= (farthest + PLACE_SLACK) * self.scale
 
     def _flat(self, i: int, points: Array) -> Array | None:
         """Write points in the plane of a finger's border, at unit size, (n, 2); None if off it."""
         arms = (points - self.borders[i][0]) / self.scale
-        if float(np.abs(arms @ self.normals[i]).max()) > PLACED:
+        if float(np.abs(arms @ self.normals[i]).max()) > PLACE_SLACK:
             return None
         return arms @ plane_frame(self.normals[i])
 
@@ -297,7 +298,7 @@ class CertifiedRegions(Declared):
         if not FEWEST_CORNERS <= len(corners) <= MOST_CORNERS:
             return None
         flat = self._flat(i, corners)
-        return None if flat is None else convex_polygon(flat, PLACED)
+        return None if flat is None else convex_polygon(flat, PLACE_SLACK)
 
     def _is_open(self) -> bool:
         """Return whether `open_choice` lies on the borders at radius `limit`, without closure."""
@@ -308,11 +309,11 @@ class CertifiedRegions(Declared):
             return False
         for i, place in enumerate(choice):
             border, at = self._polygon(i, self.borders[i]), self._flat(i, place[None])
-            if border is None or at is None or not border.holds(at, PLACED):
+            if border is None or at is None or not border.holds(at, PLACE_SLACK):
                 return False
         away = float(np.linalg.norm(choice - self.centers, axis=1).max())
         proof = ClosureCertificate(False, 0.0, choice, self.normals, self.friction, None, wrench)
-        return abs(away - self.limit) <= PLACED * self.scale and proof.verify()
+        return abs(away - self.limit) <= PLACE_SLACK * self.scale and proof.verify()
 
     # a region with depth is a prism: its corners lie on both sides of the plane
     def _closes(self) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.errors import SolverError
 
-RESIDUAL = 1e-7
+CONIC_RESIDUAL = 1e-7
 """Largest accepted violation, relative to the solution's size. Callers prove their own results from
 a solution, so this only catches answers that are plainly wrong."""
 REQUESTED = 1e-11
@@ -102,7 +102,7 @@ def _check(program: ConicProgram, solution: ConicSolution, status: str) -> None:
     if not (np.isfinite(x).all() and np.isfinite(z).all()):
         raise SolverError(f"the conic solver Clarabel returned no numbers (status {status})")
     slack = program.b - program.A @ x
-    allowed = RESIDUAL * (1.0 + float(np.abs(x).max()) + float(np.abs(z).max()))
+    allowed = CONIC_RESIDUAL * (1.0 + float(np.abs(x).max()) + float(np.abs(z).max()))
     failures = {
         "the conic solver's answer violates a constraint": _outside(program, slack, dual=False),
         "the conic solver's multipliers leave the dual cone": _outside(program, z, dual=True),

@@ -22,13 +22,13 @@ from grasp_core.compiled import compiled
 from grasp_core.errors import SolverError
 from grasp_core.solvers.conic import ConicProgram, answered
 
-RESIDUAL = 1e-8
+LP_RESIDUAL = 1e-8
 """Largest accepted violation, for programs whose data are of order one (the planner scales objects
 to unit size)."""
-FARTHEST = 1e4
+EXCLUDED_SIZE = 1e4
 """Largest |x|_1 that a proof of infeasibility must exclude, at unit size."""
 
-KERNEL = "grasp_core.solvers.lp_kernel"
+LP_KERNEL = "grasp_core.solvers.lp_kernel"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,7 @@ class Optimum:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Infeasible:
-    """A proof (Farkas), by a combination of the rows, that no |x|_1 <= `FARTHEST` is feasible."""
+    """A proof (Farkas), by a combination of rows, that no |x|_1 <= `EXCLUDED_SIZE` is feasible."""
 
     multipliers: Array  # multipliers y, then z, of the combination, (rows + equalities,)
 
@@ -89,12 +89,12 @@ def _by_interior_point(program: LinearProgram) -> Optimum | Infeasible:
 def _by_simplex(program: LinearProgram) -> Optimum | Infeasible:
     G, h = program.stacked()
     count, n = G.shape
-    kernel = compiled(KERNEL)
+    kernel = compiled(LP_KERNEL)
     ended = kernel.vertex_of(n)
     basis = ended.basis
-    rows = kernel.Rows(np.array(G.T, order="C"), np.array(h), count - len(program.b))
+    rows = kernel.LpRows(np.array(G.T, order="C"), np.array(h), count - len(program.b))
     status, against = kernel.solve(program.c, rows, -math.inf, ended, False)
-    if status == kernel.LOST:
+    if status == kernel.NOT_SOLVED:
         raise SolverError("the simplex method reached its limit of steps without an answer")
     basis.sort()
     vertex = np.vstack([G, np.repeat(np.eye(n), 2, axis=0)])[basis]
@@ -104,7 +104,7 @@ def _by_simplex(program: LinearProgram) -> Optimum | Infeasible:
         multipliers[basis] = -np.linalg.solve(vertex.T, row)
         as_given = (row == G[against]).all() and rows.b[against] == h[against]
         multipliers[against] = 1.0 if as_given else -1.0
-        if np.abs(multipliers[count:]).max() > RESIDUAL:
+        if np.abs(multipliers[count:]).max() > LP_RESIDUAL:
             raise SolverError(
                 "the simplex method proved infeasibility only near the origin, not everywhere"
             )
@@ -132,8 +132,8 @@ def _checked_optimum(program: LinearProgram, x: Array, duals: Array) -> Optimum:
         "the linear program's bound differs from its value": abs(float(h @ duals) - value),
     }  # fmt: skip
     for failure, size in failures.items():
-        if not size <= RESIDUAL * scale:  # nor if it is not a number
-            raise SolverError(f"{failure} by {size:.3g}, allowed {RESIDUAL * scale:.3g}")
+        if not size <= LP_RESIDUAL * scale:  # nor if it is not a number
+            raise SolverError(f"{failure} by {size:.3g}, allowed {LP_RESIDUAL * scale:.3g}")
     return Optimum(x, value, duals)
 
 
@@ -142,10 +142,10 @@ def _checked_ray(program: LinearProgram, ray: Array) -> Infeasible:
     rows = len(program.b)
     unit = ray / max(float(np.abs(ray).max(initial=0.0)), np.finfo(np.float64).tiny)
     for multipliers in (unit, -unit):
-        if multipliers[:rows].min(initial=0.0) < -RESIDUAL:
+        if multipliers[:rows].min(initial=0.0) < -LP_RESIDUAL:
             continue
         multipliers[:rows] = np.maximum(multipliers[:rows], 0.0)
         combined = np.abs(G.T @ multipliers).max(initial=0.0)
-        if -float(h @ multipliers) > FARTHEST * combined + RESIDUAL:
+        if -float(h @ multipliers) > EXCLUDED_SIZE * combined + LP_RESIDUAL:
             return Infeasible(multipliers)
     raise SolverError("a linear program was neither solved nor proved infeasible")

@@ -18,7 +18,7 @@ most enters; after many steps that lower nothing the first one does, which leave
 
 If x violates no row, but a y_j is negative, c.x rises on the edge where x moves off row j alone.
 The first row that is met there enters in its place, as in the primal simplex method. Steps of
-either kind are limited: a circle ends as LOST.
+either kind are limited: a circle ends as `NOT_SOLVED`.
 """
 
 from typing import NamedTuple
@@ -28,33 +28,33 @@ from numpy.typing import NDArray
 
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
-from grasp_core.solvers.lp import FARTHEST
+from grasp_core.solvers.lp import EXCLUDED_SIZE
 
-BOX = 1e3
+BOX_SIZE = 1e3
 """Half the side of the box in which the search begins: data are of order one, and a program whose
 search ends at the box is left to another solver."""
-VIOLATED = 1e-10
+BEYOND_ROW = 1e-10
 """Distance beyond a row's plane at which a point violates the row."""
-POSITIVE = 1e-9
+LEAST_PIVOT = 1e-9
 """Least alpha_j that may serve as a pivot."""
-SLACK = 1e-10
+MULTIPLIER_SLACK = 1e-10
 """Size below zero that multipliers may reach on the way."""
 NEGATIVE = 1e-13
 """Size below zero from which a multiplier's row has to leave the basis in the end."""
-AT_ONCE = 1e-12
+STEP_BEYOND = 1e-12
 """Distance beyond a row's plane at which a step along an edge may end."""
 UNCHANGED = 1e-13
 """Decrease of c.x in one step below which the step counts as no progress."""
-PATIENCE, MOST = 3, 60
+LP_PATIENCE, LP_STEPS = 3, 60
 """Steps without progress until the first violated row is chosen, and largest number of steps, both
 per variable."""
 REFINEMENTS = 3
-SHORTEST = 1e-8
+LEAST_ROW = 1e-8
 """Least length of a row that violations are divided by."""
-OPTIMAL, INFEASIBLE, BELOW, LOST = 0, 1, 2, 3
+OPTIMAL, INFEASIBLE, BELOW_BOUND, NOT_SOLVED = 0, 1, 2, 3
 
 
-class Rows(NamedTuple):
+class LpRows(NamedTuple):
     """The rows of a program; equalities come last, and the search may change their signs."""
 
     At: Array
@@ -78,9 +78,9 @@ class Vertex(NamedTuple):
 
 
 @loop("numpy")
-def empty_rows(n: int, count: int, equalities: int) -> Rows:
+def empty_rows(n: int, count: int, equalities: int) -> LpRows:
     """Make rows of zeros for a program of n variables."""
-    return Rows(np.zeros((n, count)), np.zeros(count), equalities)
+    return LpRows(np.zeros((n, count)), np.zeros(count), equalities)
 
 
 @loop("numpy")
@@ -90,7 +90,7 @@ def vertex_of(n: int) -> Vertex:
 
 
 @loop("numpy")
-def bounded(c: Array, rows: Rows, cutoff: float, accuracy: float, vertex: Vertex) -> float:
+def bounded(c: Array, rows: LpRows, cutoff: float, accuracy: float, vertex: Vertex) -> float:
     """Prove an upper bound on c.x that is the tightest one if it is above the cutoff.
 
     It is minus infinity where nothing is feasible, and infinite where nothing is proved.
@@ -98,9 +98,9 @@ def bounded(c: Array, rows: Rows, cutoff: float, accuracy: float, vertex: Vertex
     # a basis that is nearly singular proves nothing; another rule reaches another one
     for first in (False, True):
         status, against = solve(c, rows, cutoff, vertex, first)
-        if status == INFEASIBLE and proved_empty(rows, vertex, against, FARTHEST):
+        if status == INFEASIBLE and proved_empty(rows, vertex, against, EXCLUDED_SIZE):
             return -np.inf
-        if status in (OPTIMAL, BELOW):
+        if status in (OPTIMAL, BELOW_BOUND):
             # a wrong answer of the search costs tightness, never correctness
             bound = proved_bound(c, rows, vertex, accuracy)
             if bound < np.inf:
@@ -109,7 +109,7 @@ def bounded(c: Array, rows: Rows, cutoff: float, accuracy: float, vertex: Vertex
 
 
 @loop("numpy")
-def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex, first: bool) -> tuple[int, int]:
+def solve(c: Array, rows: LpRows, cutoff: float, vertex: Vertex, first: bool) -> tuple[int, int]:
     """Find a best vertex: how that ended, and the row that contradicts the basis, if one does.
 
     The row that is violated most enters the basis, or the first that is violated.
@@ -118,13 +118,13 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex, first: bool) -> t
     basis, y, x = vertex
     inverse, value, norms = *_corner(c, count, vertex), _lengths(rows)
     alpha, excess, inside = np.empty(n), np.empty(count), np.zeros(count, dtype=np.bool_)
-    for _ in range(MOST * n):
+    for _ in range(LP_STEPS * n):
         if value < cutoff and not _is_held_up(y, basis, rows):
             _refine(c, rows, basis, inverse, y)
             if not _is_held_up(y, basis, rows):
-                return BELOW, -1
+                return BELOW_BOUND, -1
         _exceeded(x, rows, excess)
-        entering = _violated(excess, rows, norms, inside, first or idle > PATIENCE * n)
+        entering = _violated(excess, rows, norms, inside, first or idle > LP_PATIENCE * n)
         if entering >= 0:
             if excess[entering] < 0.0:
                 _turn(rows, excess, entering)
@@ -140,7 +140,7 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex, first: bool) -> t
                 return OPTIMAL, -1
             entering = _blocking(inverse[:, leaving], rows, excess, inside)
             if entering < 0:
-                return LOST, -1
+                return NOT_SOLVED, -1
             _combined(rows, entering, inverse, alpha)
         drop = max(y[leaving] / alpha[leaving], 0.0)
         idle = idle + 1 if drop * abs(excess[entering]) < UNCHANGED else 0
@@ -153,11 +153,11 @@ def solve(c: Array, rows: Rows, cutoff: float, vertex: Vertex, first: bool) -> t
             inside[basis[leaving]] = False
         inside[entering] = True
         basis[leaving] = entering
-    return LOST, -1
+    return NOT_SOLVED, -1
 
 
 @loop("numpy")
-def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float:
+def proved_bound(c: Array, rows: LpRows, vertex: Vertex, accuracy: float) -> float:
     """Return y.b, a bound of feasible values, if y >= 0 gives c closely enough; else infinity."""
     bound, left = 0.0, c.copy()
     for j in range(len(c)):
@@ -171,7 +171,7 @@ def proved_bound(c: Array, rows: Rows, vertex: Vertex, accuracy: float) -> float
 
 
 @loop("numpy")
-def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> bool:
+def proved_empty(rows: LpRows, vertex: Vertex, against: int, farthest: float) -> bool:
     """Return whether a row and a basis it contradicts exclude all |x|_1 up to `farthest`.
 
     Where a_r = alpha_1 a_1 + .. with alpha <= 0, the excess of a_r.x over b_r is at least that of
@@ -184,17 +184,17 @@ def proved_empty(rows: Rows, vertex: Vertex, against: int, farthest: float) -> b
             continue
         gap += share * rows.b[vertex.basis[j]]
         _subtract(left, share, rows, vertex.basis[j])
-    return gap > farthest * np.abs(left).max() + VIOLATED
+    return gap > farthest * np.abs(left).max() + BEYOND_ROW
 
 
 @loop("numpy")
-def _may_weigh(share: float, k: int, rows: Rows) -> bool:
+def _may_weigh(share: float, k: int, rows: LpRows) -> bool:
     """Return whether a proof may use row k this much: never the box, equalities always."""
     return k < len(rows.b) and (share > 0.0 or _is_equality(k, rows))
 
 
 @loop("numpy")
-def _is_equality(k: int, rows: Rows) -> bool:
+def _is_equality(k: int, rows: LpRows) -> bool:
     return len(rows.b) - rows.equalities <= k < len(rows.b)
 
 
@@ -206,25 +206,25 @@ def _corner(c: Array, count: int, vertex: Vertex) -> tuple[Array, float]:
     for i in range(n):
         side = 1.0 if c[i] >= 0.0 else -1.0
         vertex.basis[i] = count + 2 * i + (0 if side > 0.0 else 1)
-        inverse[i, i], vertex.x[i], vertex.y[i] = side, side * BOX, abs(c[i])
+        inverse[i, i], vertex.x[i], vertex.y[i] = side, side * BOX_SIZE, abs(c[i])
         value += c[i] * vertex.x[i]
     return inverse, value
 
 
 @loop("numpy", once=True)
-def _lengths(rows: Rows) -> Array:
-    """Return the length of each row, or `SHORTEST`."""
+def _lengths(rows: LpRows) -> Array:
+    """Return the length of each row, or `LEAST_ROW`."""
     norms = np.zeros(len(rows.b))
     for i in range(len(rows.At)):
         for k in range(len(norms)):
             norms[k] += rows.At[i, k] * rows.At[i, k]
     for k in range(len(norms)):
-        norms[k] = max(np.sqrt(norms[k]), SHORTEST)
+        norms[k] = max(np.sqrt(norms[k]), LEAST_ROW)
     return norms
 
 
 @loop("numpy")
-def _is_held_up(y: Array, basis: Indices, rows: Rows) -> bool:
+def _is_held_up(y: Array, basis: Indices, rows: LpRows) -> bool:
     """Return whether the value is no bound: it leans on the box, or a multiplier is negative."""
     leans = _negative(y, basis, rows) >= 0
     for j in range(len(y)):
@@ -233,7 +233,7 @@ def _is_held_up(y: Array, basis: Indices, rows: Rows) -> bool:
 
 
 @loop("numpy")
-def _negative(y: Array, basis: Indices, rows: Rows) -> int:
+def _negative(y: Array, basis: Indices, rows: LpRows) -> int:
     """Return the place in the basis with the most negative multiplier, -1 if there is none."""
     least, found = -NEGATIVE, -1
     for j in range(len(y)):
@@ -243,19 +243,19 @@ def _negative(y: Array, basis: Indices, rows: Rows) -> int:
 
 
 @loop("numpy", once=True)
-def _blocking(column: Array, rows: Rows, excess: Array, inside: NDArray[np.bool_]) -> int:
+def _blocking(column: Array, rows: LpRows, excess: Array, inside: NDArray[np.bool_]) -> int:
     """Return the row that is met first on the edge against a column; -1 if there is none.
 
     Of rows that are met with the first one, the steepest is taken.
     """
     count = len(excess) - rows.equalities
-    rates, farthest, steepest, found = np.zeros(count), np.inf, POSITIVE, -1
+    rates, farthest, steepest, found = np.zeros(count), np.inf, LEAST_PIVOT, -1
     for i in range(len(column)):
         for k in range(count):
             rates[k] -= rows.At[i, k] * column[i]
     for k in range(count):
-        if rates[k] > POSITIVE and not inside[k]:
-            farthest = min(farthest, (max(-excess[k], 0.0) + AT_ONCE) / rates[k])
+        if rates[k] > LEAST_PIVOT and not inside[k]:
+            farthest = min(farthest, (max(-excess[k], 0.0) + STEP_BEYOND) / rates[k])
     for k in range(count):
         if rates[k] > steepest and not inside[k] and -excess[k] <= farthest * rates[k]:
             steepest, found = rates[k], k
@@ -263,7 +263,7 @@ def _blocking(column: Array, rows: Rows, excess: Array, inside: NDArray[np.bool_
 
 
 @loop("numpy", once=True)
-def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
+def _exceeded(x: Array, rows: LpRows, excess: Array) -> None:
     """Fill in by how much x violates each row."""
     for k in range(len(excess)):
         excess[k] = -rows.b[k]
@@ -275,10 +275,10 @@ def _exceeded(x: Array, rows: Rows, excess: Array) -> None:
 
 @loop("numpy", once=True)
 def _violated(
-    excess: Array, rows: Rows, norms: Array, inside: NDArray[np.bool_], first: bool
+    excess: Array, rows: LpRows, norms: Array, inside: NDArray[np.bool_], first: bool
 ) -> int:
     """Return the row that is violated most, or the first violated row; -1 if none is violated."""
-    worst, found, inequalities = VIOLATED, -1, len(excess) - rows.equalities
+    worst, found, inequalities = BEYOND_ROW, -1, len(excess) - rows.equalities
     for k in range(len(excess)):
         beyond = excess[k] if k < inequalities else abs(excess[k])
         if beyond > worst * norms[k] and not inside[k]:
@@ -289,7 +289,7 @@ def _violated(
 
 
 @loop("numpy", once=True)
-def _turn(rows: Rows, excess: Array, k: int) -> None:
+def _turn(rows: LpRows, excess: Array, k: int) -> None:
     """Change the sign of an equality, so that points below it violate it."""
     rows.b[k], excess[k] = -rows.b[k], -excess[k]
     for i in range(len(rows.At)):
@@ -297,7 +297,7 @@ def _turn(rows: Rows, excess: Array, k: int) -> None:
 
 
 @loop("numpy", once=True)
-def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
+def _combined(rows: LpRows, entering: int, inverse: Array, alpha: Array) -> None:
     """Write a row as a combination of the rows of the basis."""
     alpha[:] = 0.0
     for i in range(len(alpha)):
@@ -308,7 +308,7 @@ def _combined(rows: Rows, entering: int, inverse: Array, alpha: Array) -> None:
 
 
 @loop("numpy")
-def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> None:
+def _refine(c: Array, rows: LpRows, basis: Indices, inverse: Array, y: Array) -> None:
     """Compute the multipliers afresh, without the rounding errors that steps have added up."""
     y[:] = 0.0
     for _ in range(REFINEMENTS):
@@ -321,7 +321,7 @@ def _refine(c: Array, rows: Rows, basis: Indices, inverse: Array, y: Array) -> N
 
 
 @loop("numpy")
-def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
+def _subtract(left: Array, share: float, rows: LpRows, k: int) -> None:
     """Subtract a multiple of a row, or of a side of the box, from `left`."""
     side = k - len(rows.b)
     if side >= 0:
@@ -332,16 +332,16 @@ def _subtract(left: Array, share: float, rows: Rows, k: int) -> None:
 
 
 @loop("numpy", once=True)
-def _leaving(y: Array, alpha: Array, basis: Indices, rows: Rows) -> int:
+def _leaving(y: Array, alpha: Array, basis: Indices, rows: LpRows) -> int:
     """Return the place in the basis that leaves, -1 if no alpha is positive.
 
-    Of the quotients y / alpha that lower no multiplier below -`SLACK`, the one with the largest
-    alpha is taken: small ones spoil the inverse. Equalities stay in the basis.
+    Of the quotients y / alpha that lower no multiplier below -`MULTIPLIER_SLACK`, the one with the
+    largest alpha is taken: small ones spoil the inverse. Equalities stay in the basis.
     """
-    most, largest, found = np.inf, POSITIVE, -1
+    most, largest, found = np.inf, LEAST_PIVOT, -1
     for j in range(len(y)):
-        if alpha[j] > POSITIVE and not _is_equality(basis[j], rows):
-            most = min(most, (max(y[j], 0.0) + SLACK) / alpha[j])
+        if alpha[j] > LEAST_PIVOT and not _is_equality(basis[j], rows):
+            most = min(most, (max(y[j], 0.0) + MULTIPLIER_SLACK) / alpha[j])
     for j in range(len(y)):
         if alpha[j] > largest and y[j] <= most * alpha[j] and not _is_equality(basis[j], rows):
             largest, found = alpha[j], j

@@ -26,14 +26,14 @@ from numpy.typing import NDArray
 from grasp_core.arrays import Array, Indices
 from grasp_core.compiled import loop
 
-VIOLATED = 1e-13
+ROW_VIOLATED = 1e-13
 """Distance beyond a row's plane, relative to |x| or 1, at which a point violates the row."""
-DEPENDENT = 1e-9
+INDEPENDENT_SHARE = 1e-9
 """Share of its length that a row must keep orthogonal to the active rows to be independent of them.
 """
-TINY = 1e-300
+SMALLEST_DIVISOR = 1e-300
 """Smallest length that is divided by."""
-MOST = 20
+NEAREST_STEPS = 20
 """Largest number of steps per variable."""
 
 
@@ -71,7 +71,7 @@ def nearest(C: Array, d: Array, x: Array) -> tuple[float, float]:
         return 0.0, -d.min()
     unit, norms, u = d / size, np.empty(m), np.zeros(m)
     for k in range(m):
-        norms[k] = max(np.sqrt(_dot(C[k], C[k])), TINY)
+        norms[k] = max(np.sqrt(_dot(C[k], C[k])), SMALLEST_DIVISOR)
     active = Active(
         np.empty(v + 1, np.int64), np.zeros(m, np.bool_), np.empty((v, v)),
         np.empty((v, v + 1)), np.empty(v + 1), np.empty(v), np.empty(v),
@@ -95,12 +95,12 @@ def nearest(C: Array, d: Array, x: Array) -> tuple[float, float]:
 def _active_at(C: Array, d: Array, norms: Array, active: Active, x: Array) -> int:
     """Find the rows that are active at the nearest point; return their number, or -1."""
     count = 0
-    for _ in range(MOST * (len(x) + 1)):
+    for _ in range(NEAREST_STEPS * (len(x) + 1)):
         entering, excess = _violated(C, d, norms, active.inside, x)
         if entering < 0:
             return count
         active.rows[count], active.u[count] = entering, 0.0
-        count = _enter(C, active, count, excess, DEPENDENT * norms[entering], x)
+        count = _enter(C, active, count, excess, INDEPENDENT_SHARE * norms[entering], x)
         if count < 0:
             break
     return -1
@@ -157,7 +157,7 @@ def _violated(
     size = 1.0
     for j in range(len(x)):
         size = max(size, abs(x[j]))
-    found, worst, most = -1, VIOLATED * size, 0.0
+    found, worst, most = -1, ROW_VIOLATED * size, 0.0
     for k in range(len(d)):
         excess = _dot(C[k], x) - d[k]
         if excess > worst * norms[k] and not inside[k]:
@@ -186,7 +186,7 @@ def _split(row: Array, active: Active, count: int) -> float:
 @loop()
 def _append(active: Active, count: int, square: float) -> None:
     """Add the remainder z, with its square, to the orthonormal rows."""
-    length = max(np.sqrt(square), TINY)
+    length = max(np.sqrt(square), SMALLEST_DIVISOR)
     active.R[count, count] = length
     for j in range(len(active.z)):
         active.Q[count, j] = active.z[j] / length

@@ -40,10 +40,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
 about twenty while infeasible ones would go on for minutes, and the closest feasible point."""
 ACTIVE = (1e-6, 1e-5, 1e-7, 1e-8)
 """Slacks below which a constraint may count as active; the one with the least error is taken."""
-EXACT = 1e-6
+MOST_ERROR = 1e-6
 """Error up to which the solution of (2) is accepted, in its equations, the constraints or the
 objective: a hundred times the accuracy asked of ProxQP."""
-KERNEL = "grasp_core.solvers.nearest_point_kernel"
+NEAREST_POINT_KERNEL = "grasp_core.solvers.nearest_point_kernel"
 NEAREST = 1e-11
 """Accepted violation of the conditions of optimality, relative to x: some thousand rounding
 errors, and a hundredth of any difference that matters."""
@@ -65,7 +65,7 @@ def least_norm(C: Array, d: Array, A: Array, b: Array, solver: str = PROXQP) -> 
         answer = qpsolvers.solve_problem(asked, solver=solver, **options)
     if answer.x is None or not np.isfinite(answer.x).all():
         return None
-    best, least = np.asarray(answer.x, dtype=np.float64), EXACT
+    best, least = np.asarray(answer.x, dtype=np.float64), MOST_ERROR
     square = float(best @ best)
     for slack in ACTIVE:
         active = d - C @ answer.x < slack
@@ -96,5 +96,5 @@ def _qpsolvers() -> Any:
 def least_distance(C: Array, d: Array, *, accuracy: float = NEAREST) -> Array:
     """Find the nearest point (3), (v,); NaN where none was proved to be near."""
     x = np.empty(C.shape[1])
-    unmet, _ = compiled(KERNEL).nearest(np.array(C, order="C"), np.array(d), x)
+    unmet, _ = compiled(NEAREST_POINT_KERNEL).nearest(np.array(C, order="C"), np.array(d), x)
     return x if unmet <= accuracy else np.full(len(x), np.nan)

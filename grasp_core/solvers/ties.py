@@ -36,7 +36,7 @@ from grasp_core.solvers.qp import least_distance
 SAME_VALUE = 1e-5
 """Share of a program's value that the nearest optimum may give up: with less, optima form thin
 slivers, in which rounding moves the nearest point farther."""
-FOUND = 1e-7
+CONDITIONS_MET = 1e-7
 """Error up to which the conditions of a nearest optimum are met. They are met by far or not at all:
 an answer near this limit would be accepted on one machine only."""
 GRID_DIGITS = 9
@@ -129,5 +129,5 @@ def nearest_optimum(program: LinearProgram, optimum: Optimum, share: float = SAM
     equalities = slice(len(program.b), None)
     rows = np.vstack([G, -program.c[None], -G[equalities]])
     limits = np.concatenate([h, [-kept], -h[equalities]])
-    x = least_distance(rows, limits, accuracy=FOUND)
+    x = least_distance(rows, limits, accuracy=CONDITIONS_MET)
     return x if float((rows @ x - limits).max()) <= FEASIBLE else optimum.x  # nor if there is none

@@ -7,7 +7,7 @@ n, the point q of the new surface that takes its place is found by these rules, 
 2. On each like face, the candidate is the point nearest to p, its holes and notches left out: the
    foot of the perpendicular, or a point of the border if the foot is outside.
 3. The nearest candidate is q if |q - p| <= `distance`. Of candidates that are equally near, to
-   within `SAME` of the old part's size, the one on the face with the lowest number is q.
+   within `CHANGE_ROUNDING` of the old part's size, the one on the face with the lowest number is q.
 4. Otherwise p has no place on the new surface.
 
 Therefore a point on a face that has moved along its normal by h goes straight along that normal, by
@@ -58,14 +58,14 @@ SHARE_OF_SIZE = 0.05
 ANGLE_DEG = Carrying().angle_deg
 WIDEST_DEG = 45.0
 """Largest angle between the normals of like faces that is accepted [deg]."""
-SAME = 1e-9
+CHANGE_ROUNDING = 1e-9
 """Difference of distances, relative to the old part's radius, and of angles [rad] that is rounding:
 a face that has moved by exactly the allowed distance is still near enough."""
 TURNED = 1e-4
 """Least angle that counts as turned [rad]: six digits turn a face by no more unless it is narrower
 than a hundredth of the part."""
 RESHAPED = 1e-5  # least change of a face's area that counts, relative to its area
-MOST_NAMED = 12  # largest number of faces that one line names
+FACES_IN_A_LINE = 12  # largest number of faces that one line names
 MM = 1e3
 
 
@@ -91,7 +91,7 @@ def likeness(old: Polyhedron, distance: float | None, angle_deg: float) -> Liken
     return Likeness(
         number(most, "distance", ge=0.0, le=old.radius, where=where),
         math.radians(value_of(FaceTurn, angle_deg, "angle_deg")),
-        SAME * old.radius,
+        CHANGE_ROUNDING * old.radius,
     )
 
 
@@ -157,11 +157,11 @@ def changes_in_words(
         key=lambda change: (change.new is not None, -abs(change.distance), change.old),
     )
     said: list[str] = []
-    for change in moved[:MOST_NAMED]:
+    for change in moved[:FACES_IN_A_LINE]:
         number = change.old if numbers is None else numbers.get(change.old)
         said.append(change.in_words("a newer face" if number is None else f"face {number}"))
-    if len(moved) > MOST_NAMED:
-        said.append(f"{len(moved) - MOST_NAMED} more faces moved")
+    if len(moved) > FACES_IN_A_LINE:
+        said.append(f"{len(moved) - FACES_IN_A_LINE} more faces moved")
     if kept := sum(change.reshaped and not change.moved for change in changes):
         said.append(f"{counted(kept, 'face')} of another area")
     likely = {change.likely for change in changes}
@@ -205,7 +205,7 @@ def _successor(
     face: Face, new: Polyhedron, candidates: Sequence[int], rule: Likeness, reach: float
 ) -> int | None:
     """Find the nearest like face among some of the changed part; None if none is within reach."""
-    like = new.normals @ face.normal >= math.cos(rule.angle + SAME)
+    like = new.normals @ face.normal >= math.cos(rule.angle + CHANGE_ROUNDING)
     centers = np.array([piece.mean(axis=0) for piece in face.pieces])
     weights = np.array([  # twice the areas of the pieces
         float(np.linalg.norm(cross(piece[1:-1] - piece[0], piece[2:] - piece[0]).sum(axis=0)))

@@ -5,7 +5,7 @@ from typing import Literal
 
 from grasp_core.declared import declared
 from grasp_core.kinds import FaceTurn, NotNegative, Quantity
-from grasp_core.mesh_files.limits import Unit
+from grasp_core.mesh_files.limits import LengthUnit
 from grasp_core.settings import Settings
 
 
@@ -33,7 +33,7 @@ class IfChanged(Carrying):
     missing: Literal["note", "fail"] = "note"
     """What a missing mesh file means: `note` tests the mesh in the file of grasps and says so,
     `fail` refuses that."""
-    unit: Unit | None = None
+    unit: LengthUnit | None = None
     """Unit of length in a mesh file that has changed; if not given, the one in which the part is
     about as large as it was."""
     scale: Quantity | None = None

@@ -52,13 +52,13 @@ from grasp_core.objects.build import DEFAULT_LIMITS
 from grasp_core.objects.face_pieces import piece_of
 from grasp_core.objects.on_faces import check_on_faces, check_planar
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron
-from grasp_core.objects.shells import SMALL
+from grasp_core.objects.shells import SMALL_SHARE
 from grasp_core.planning.given_contacts import Seated, facets_of, grasp_of, nearest_like
 from grasp_core.planning.reach import Finger, reach
 from grasp_core.transferring.face_changes import (
     ANGLE_DEG,
+    CHANGE_ROUNDING,
     MM,
-    SAME,
     FaceChange,
     Likeness,
     added_faces,
@@ -78,7 +78,7 @@ FRICTION_BAND = 0.05
 """Difference of critical frictions that does not count, as a share of the friction."""
 QUALITY_BAND = 0.05
 """Difference of qualities that does not count, as a share of the old quality."""
-DRAWS = 8  # how often internal forces are drawn that may make the lines of a witness skew
+WITNESS_DRAWS = 8  # how often internal forces are drawn that may make the lines of a witness skew
 
 
 @declared
@@ -192,7 +192,9 @@ class Transfer(Declared):
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps of each status, and of contacts that moved or were lost."""
         contacts = [each for grasp in self.grasps for each in grasp.contacts]
-        rounding = self.old.radius * SAME  # a contact on a face that stayed is put on its plane
+        rounding = (
+            self.old.radius * CHANGE_ROUNDING
+        )  # a contact on a face that stayed is put on its plane
         placed = [each for each in contacts if each.contact is not None]
         return {
             "grasps": len(self.grasps),
@@ -306,8 +308,8 @@ class _Judge:
     def _contact(self, finger: int, face: int, contact: Contact) -> CarriedContact:
         rule, normal = self.rule, contact.normal
         near = nearest_like(
-            facets_of(self.new), contact.position, normal, lean=rule.angle + SAME, reach=math.inf,
-            margin=rule.same,
+            facets_of(self.new), contact.position, normal, lean=rule.angle + CHANGE_ROUNDING,
+            reach=math.inf, margin=rule.same,
         )  # fmt: skip
         if near is None:
             return CarriedContact(finger, face, None, None, math.inf, 0.0)
@@ -345,7 +347,7 @@ def judged(seated: Seated, friction: float, name: str) -> tuple[GraspFigures | N
     positions, none = (found.positions - center) / size, np.empty((0, 3))
     plain = Placement(positions, found.witness.forces, none, np.zeros(FINGERS), 0.0)
     # the forces of a certificate may all meet, as at the face centres of a regular solid
-    for draw in range(DRAWS):
+    for draw in range(WITNESS_DRAWS):
         skew = of_general_type(pieces, plain, friction, np.random.default_rng(draw))
         if skew is not None:
             return figures, replace(found, witness=Witness(found.positions, skew.forces))
@@ -388,7 +390,7 @@ GUESSED = ("m", "cm", "mm", "in")
 SURE_GROWTH = 1.5
 """Largest ratio of the two sizes at which the unit is sure: an inch and a centimetre, the two units
 nearest to each other, differ by 2.54, which is more than the square of it."""
-SAME_LENGTH = 1e-6
+LENGTH_ROUNDING = 1e-6
 """Largest relative difference of two lengths that differ by rounding and joined vertices only."""
 
 
@@ -396,7 +398,7 @@ def as_read(old: Polyhedron) -> dict[str, Any]:
     """Return the keywords of `load_polyhedron` that read a changed part as the old one was read."""
     return {
         "faces": "planar",
-        "largest_part": old.surface.dropped > SMALL,
+        "largest_part": old.surface.dropped > SMALL_SHARE,
         "center_of_mass": old.center_of_mass if old.surface.center_given else None,
     }
 
@@ -433,7 +435,7 @@ def fitting_lengths(
     """Find a unit and a scale at which a mesh file is as large as the body read from it."""
     stated, times = _times(path, body, limits)
     for unit in GUESSED if stated is None else (stated,):
-        if math.isclose(times * UNITS_M[unit], 1.0, rel_tol=SAME_LENGTH):
+        if math.isclose(times * UNITS_M[unit], 1.0, rel_tol=LENGTH_ROUNDING):
             return unit, 1.0
     unit = stated or "m"
     return unit, float(f"{1.0 / (times * UNITS_M[unit]):.9g}")

@@ -26,7 +26,7 @@ from grasp_core.arrays import Array, Indices
 from grasp_core.arrays import Shape as ArrayShape
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import InputError
-from grasp_core.frames import POSE
+from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.hand_arrays import hand_arrays, places
 from grasp_core.hands.reach import HandReach, with_balls
@@ -150,7 +150,7 @@ class PosedHand(Declared):
     hand: Hand
     joints: Annotated[Array, ArrayShape(None)]
     """Joint angles in the order of `hand.joints`, (j,) [rad]."""
-    palm_pose: Annotated[Array, ArrayShape(POSE, POSE)]
+    palm_pose: Annotated[Array, ArrayShape(POSE_SIZE, POSE_SIZE)]
     """Pose of the palm in the object's frame, (4, 4)."""
     fingers: tuple[int, ...]
     contacts: tuple[Contact, ...]

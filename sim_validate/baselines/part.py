@@ -13,7 +13,7 @@ from pathlib import Path
 
 from grasp_core.errors import InputError, MeshError
 from grasp_core.files.text_files import read_bytes
-from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.mesh_files.limits import MESH_FORMATS
 from grasp_core.objects.on_faces import check_planar
 from grasp_core.objects.polyhedron import UNITS_M, Polyhedron, load_polyhedron
 from grasp_core.planning.result import Plan
@@ -95,7 +95,9 @@ def _beside(name: str, folders: Iterable[Path]) -> list[Path]:
     for folder in {folder.resolve(): folder for folder in folders}.values():
         with suppress(OSError):
             found += (path for path in sorted(folder.iterdir()) if path.stem == name)
-    return [path for path in found if path.suffix.lower().lstrip(".") in FORMATS and path.is_file()]
+    return [
+        path for path in found if path.suffix.lower().lstrip(".") in MESH_FORMATS and path.is_file()
+    ]
 
 
 def fitting_exactly(path: Path, body: Polyhedron, scale: float | None) -> str | None:

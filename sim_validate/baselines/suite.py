@@ -18,6 +18,7 @@ from grasp_core.kinds import LARGEST_FRICTION, RandomWrenches, Repeats, Seed, Sh
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.planner import plan
 from grasp_core.planning.result import Plan
+from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.settings import CHOSEN, Settings, for_users, named
 from grasp_core.values import Grasp
@@ -231,6 +232,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
     if args:
         return _cases_of_file(folder, folder / args[0], settings)
     wanted: dict[str, Any] = {"limit": 1, **settings, "friction": friction}
+    families = wanted.pop("families", None)
     name = wanted.pop("object", None)
     lengths = {each: wanted.pop(each) for each in ("unit", "scale") if each in wanted}
     if not isinstance(name, str):
@@ -238,7 +240,7 @@ def grasp_cases(folder: Path, args: Sequence[Any], settings: Mapping[str, Any]) 
     is_file = Path(name).suffix
     body = load_polyhedron(folder / name, **lengths) if is_file else example_object(name)
     try:
-        grasps = plan(body, **wanted).grasps
+        grasps = plan(body, families=families, settings=PlanSettings(**wanted)).grasps
     except (TypeError, ValueError) as error:
         raise InputError(f"@pytest.mark.grasp: a setting is of the wrong kind: {error}") from error
     _check_any(grasps, body, friction)

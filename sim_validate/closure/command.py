@@ -13,7 +13,7 @@ from grasp_core.closure.critical_friction import critical_friction
 from grasp_core.closure.force_closure import force_closure
 from grasp_core.compiled import compiled, state_of
 from grasp_core.cones.pyramids import inscribed_share
-from grasp_core.families.placements import KEPT
+from grasp_core.families.placements import RADIUS_GIVEN_UP
 from grasp_core.files.records import RecordFile, record_of
 from grasp_core.planning.planner import plan
 from grasp_core.planning.reach import Finger
@@ -180,7 +180,9 @@ def check_installation(command: flags.DoctorFlags, reporter: Reporter) -> int:
     cone = math.tan(grasp.force_cones[0].half_angle) * inscribed_share()
     checks = {
         # solvers give up KEPT of the exact radius
-        "linear programs": math.isclose(3.0 * grasp.radius / body.radius, cone, rel_tol=2.0 * KEPT),
+        "linear programs": math.isclose(
+            3.0 * grasp.radius / body.radius, cone, rel_tol=2.0 * RADIUS_GIVEN_UP
+        ),
         "conic programs": force_closure(grasp).verify(),
         "critical friction": critical_friction(grasp) == 0.0,
         **{f"gate: {check.name}": check.passed for check in gate.checks},

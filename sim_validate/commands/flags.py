@@ -27,7 +27,7 @@ from grasp_core.kinds import (
     ending,
     nonzero,
 )
-from grasp_core.mesh_files.limits import FORMATS, Lengths, MeshChoices, MeshLimits
+from grasp_core.mesh_files.limits import MESH_FORMATS, FileLengths, MeshChoices, MeshLimits
 from grasp_core.names import RANKINGS, MeasureName, RankBy
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.settings import Settings
@@ -37,7 +37,7 @@ from sim_validate.processes.workers import available_cores
 Positive = Annotated[float, Interval(gt=0.0)]
 Jobs = Annotated[Count, arg(help="Largest number of processes; results do not depend on it.")]
 ObjectName = Annotated[
-    str, arg(help=f"A mesh file ({', '.join(FORMATS)}) or the name of a built-in object.")
+    str, arg(help=f"A mesh file ({', '.join(MESH_FORMATS)}) or the name of a built-in object.")
 ]
 GraspsPath = Annotated[Path, arg(help="A grasps.json, as `plan` writes it.")]
 GraspId = Annotated[
@@ -252,8 +252,8 @@ class TransferFlags(Spoken):
 
     grasps: Positional[GraspsPath]
     part: Annotated[Positional[str], arg(help=(
-        f"The changed part, in the same frame: a mesh file ({', '.join(FORMATS)}) or the name of a "
-        "built-in object."
+        f"The changed part, in the same frame: a mesh file ({', '.join(MESH_FORMATS)}) or the name "
+        "of a built-in object."
     ))]  # fmt: skip
     carrying: Annotated[Carrying, BARE] = field(default_factory=Carrying)
     friction: AtFriction = None

@@ -8,7 +8,7 @@ from grasp_core.by_value import counted
 from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import QUARANTINE
 from grasp_core.files.records import record_of
-from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.mesh_files.limits import MESH_FORMATS
 from grasp_core.processes import local_processes
 from grasp_core.settings import extended
 from sim_validate.commands.console import TABLE_ROWS, Reporter, say_cut
@@ -141,9 +141,9 @@ def _listed(names: tuple[str, ...]) -> tuple[str, ...]:
             continue
         meshes = sorted(
             path for path in folder.iterdir()
-            if path.suffix.lower()[1:] in FORMATS and not path.name.startswith(".")
+            if path.suffix.lower()[1:] in MESH_FORMATS and not path.name.startswith(".")
         )  # fmt: skip
         if not meshes:
-            raise InputError(f"{name}: this folder holds no mesh file ({', '.join(FORMATS)})")
+            raise InputError(f"{name}: this folder holds no mesh file ({', '.join(MESH_FORMATS)})")
         found += map(str, meshes)
     return tuple(found)

@@ -18,7 +18,7 @@ from annotated_types import Interval
 from grasp_core.declared import declared
 from grasp_core.errors import InputError, about
 from grasp_core.kinds import MOST_COUNT, Count, Friction, RandomWrenches
-from grasp_core.mesh_files.limits import FaceKind, Lengths
+from grasp_core.mesh_files.limits import FaceKind, FileLengths
 from grasp_core.messages import shown
 from grasp_core.names import METHODS, ConeKind, Method
 from grasp_core.settings import Settings, as_table
@@ -116,7 +116,7 @@ def _joints_of(hand: str) -> int:
 
 
 @declared
-class Content(Lengths):
+class Content(FileLengths):
     """What a dataset is made of, whether its grasps are planned or given."""
 
     frictions: tuple[Friction, ...] = (0.5,)

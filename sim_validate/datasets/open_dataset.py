@@ -105,7 +105,7 @@ class Dataset:
         for row in self.rows(ROW_CLASSES[name]):
             yield str(getattr(row, key))[:ID_DIGITS], name, row
 
-    def surface(self, object_id: str) -> MeshFile:
+    def surface(self, object_id: str) -> FileSurface:
         """Read the triangles of an object [m]."""
         path = mesh_path(self.folder, object_id)
         mesh = read_triangles(path, DEFAULT_LIMITS)
@@ -206,7 +206,7 @@ def recorded_in_dataset(folder: Path, wanted: Wanted) -> Recorded:
     name = wanted.grasp if wanted.control is None else f"{wanted.grasp}:{wanted.control}"
     row = next(chosen.rows(GraspRow, grasp_id=name), None)
     if row is None or not row.was_tried:
-        there = some(row.grasp_id for row in islice(chosen.rows(GraspRow), NAMED))
+        there = some(row.grasp_id for row in islice(chosen.rows(GraspRow), NAMES_LISTED))
         raise InputError(
             f"{folder}: no simulated grasp is named {name}; the dataset has {there}, ..."
         )

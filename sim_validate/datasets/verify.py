@@ -33,10 +33,10 @@ from grasp_core.execution.loads import any_direction
 from grasp_core.execution.squeeze_certificate import Survival
 from grasp_core.files.file_kinds import MANIFEST, QUARANTINE
 from grasp_core.files.text_files import read_text
-from grasp_core.frames import POSE
+from grasp_core.frames import POSE_SIZE
 from grasp_core.hands.collisions import clearances, tip_distances
 from grasp_core.hands.hand import Hand
-from grasp_core.objects.on_faces import Surface
+from grasp_core.objects.on_faces import SolidSurface
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import arithmetic
 from grasp_core.values import FINGERS
@@ -348,7 +348,7 @@ class _Checking:
         except InputError as error:
             yield str(error)
             return
-        surface = Surface(mesh.vertices, mesh.triangles)
+        surface = SolidSurface(mesh.vertices, mesh.triangles)
         own = (each for each in self.rows.grasps if each.object_id == row.object_id)
         on_it = [on for each in own if each.was_tried
                  for on in _on_surface(surface, each, row.radius_m)]  # fmt: skip
@@ -482,7 +482,7 @@ class _Checking:
             yield f"{claim} is {stated:.9g}, but the squeeze is not proved to carry as much"
 
 
-def _on_surface(surface: Surface, row: GraspRow, radius_m: float) -> Iterator[bool]:
+def _on_surface(surface: SolidSurface, row: GraspRow, radius_m: float) -> Iterator[bool]:
     """Yield for each contact whether it is on the object, with its normal if it is no control's."""
     for point, normal in zip(row.points, row.normals, strict=True):
         if row.control_of is None:
@@ -528,7 +528,7 @@ def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
     if len({*standing}) < FINGERS or fingers.max() >= len(hand.fingers):
         yield f"hand_fingers are {standing}, not {FINGERS} of the hand's {len(hand.fingers)}"
         return
-    surface, turn = Surface(body.vertices, body.triangles), pose[:3, :3]
+    surface, turn = SolidSurface(body.vertices, body.triangles), pose[:3, :3]
     roundings = np.array([hand.fingers[finger].tip.core[1] for finger in standing])
     behind = points - roundings[:, None] * normals  # within the tips, as deep as they are rounded
     gaps = tip_distances(hand, joints, pose, standing, behind) + roundings

@@ -39,10 +39,10 @@ from sim_validate.commands.exit_codes import Exit
 from sim_validate.files.result_files import ResultFile
 from sim_validate.processes.workers import each
 
-MOST_EDGES = 10_000
+MOST_HULL_EDGES = 10_000
 """Most edges of all pyramids of a grasp, whose hull in six dimensions then takes ten seconds."""
 
-ROUNDING = 1e-12
+FIGURE_ROUNDING = 1e-12
 """Size up to which figures of unit size come from rounding."""
 HARDLY = 1e-9
 """Share of the largest normal force below which what contacts resist comes from rounding."""
@@ -51,15 +51,15 @@ NO_BALANCE = "no balance"
 OF_HARD = "min-weight, hull volume, singular value, the lower end of mu*, least-norm forces"
 """Figures that are not defined here for soft fingertips, in words."""
 
-Answer = TypeVar("Answer")
-Checked = TypeVar("Checked", ClosureCertificate, FrictionInterval)
+Analysed = TypeVar("Analysed")
+CheckedProof = TypeVar("CheckedProof", ClosureCertificate, FrictionInterval)
 Forces = Annotated[Array, Shape(None, 3)]
 Margin = Annotated[float, Null(-math.inf)]
-Bounds = tuple[float, float]
+ProvedBounds = tuple[float, float]
 """Proved lower and upper bound."""
 
 
-class Outcome(StrEnum):
+class ClosureAnswer(StrEnum):
     """What was decided about force closure."""
 
     CLOSED = "closed"
@@ -109,7 +109,8 @@ class Analysis(Declared):
     closed: Annotated[bool | None, Shown("closed")]
     """Whether the contacts are in force closure, by a certificate that was checked again."""
     closure_margin: Annotated[
-        Margin | None, Shown("margin", infinite=NO_BALANCE, rounding=ROUNDING, least=FAR_BELOW)
+        Margin | None,
+        Shown("margin", infinite=NO_BALANCE, rounding=FIGURE_ROUNDING, least=FAR_BELOW),
     ]
     """Proved margin of force closure; -1e6 stands for smaller ones, too."""
     forces: Forces | None
@@ -121,15 +122,17 @@ class Analysis(Declared):
     critical_friction_interval: tuple[OrInfinity, OrInfinity] | None
     """Ends between which it is proved to lie, checked again in rational arithmetic; None with
     torsion."""
-    ferrari_canny_l1_n: Annotated[Bounds | None, Shown("l1 N", rounding=ROUNDING)]
-    ferrari_canny_linf_n: Annotated[Bounds | None, Shown("linf N", rounding=ROUNDING)]
+    ferrari_canny_l1_n: Annotated[ProvedBounds | None, Shown("l1 N", rounding=FIGURE_ROUNDING)]
+    ferrari_canny_linf_n: Annotated[ProvedBounds | None, Shown("linf N", rounding=FIGURE_ROUNDING)]
     verified: Mapping[str, bool]
     """Whether plain arithmetic has confirmed closure and the bounds of both qualities, by name."""
     min_weight: Annotated[
-        Margin | None, Shown("min-weight", infinite=NO_BALANCE, rounding=ROUNDING)
+        Margin | None, Shown("min-weight", infinite=NO_BALANCE, rounding=FIGURE_ROUNDING)
     ]
     hull_volume: Annotated[float | None, Shown("hull volume")]
-    smallest_singular_value: Annotated[float | None, Shown("singular value", rounding=ROUNDING)]
+    smallest_singular_value: Annotated[
+        float | None, Shown("singular value", rounding=FIGURE_ROUNDING)
+    ]
     weakest_axis_wrench: Resisted | None
     """The wrench along an axis that is resisted least, and its limit."""
     resisted_in_every_direction_n: Annotated[float | None, Shown("every direction N")]
@@ -144,11 +147,11 @@ class Analysis(Declared):
 
     @computed_field
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> ClosureAnswer:
         """The answer about force closure."""
         if self.closed is None:
-            return Outcome.UNDECIDED
-        return Outcome.CLOSED if self.closed else Outcome.OPEN
+            return ClosureAnswer.UNDECIDED
+        return ClosureAnswer.CLOSED if self.closed else ClosureAnswer.OPEN
 
     @computed_field
     @property
@@ -175,7 +178,7 @@ class Analyses(ResultFile):
     def summary(self) -> Mapping[str, int]:
         """Numbers of grasps, and of grasps of each outcome."""
         counts = Counter(each.outcome for each in self.grasps)
-        return {"grasps": len(self.grasps)} | {each.value: counts[each] for each in Outcome}
+        return {"grasps": len(self.grasps)} | {each.value: counts[each] for each in ClosureAnswer}
 
 
 def analyze(contacts: ContactSet, question: Question) -> Analysis:
@@ -235,7 +238,7 @@ class _Asking:
 
     reasons: dict[str, str] = field(default_factory=dict[str, str])
 
-    def __call__(self, name: str, question: Callable[[], Answer]) -> Answer | None:
+    def __call__(self, name: str, question: Callable[[], Analysed]) -> Analysed | None:
         try:
             return question()
         except (UndecidedError, SolverError) as error:
@@ -243,7 +246,7 @@ class _Asking:
             return None
 
 
-def _checked(certificate: Checked) -> Checked:
+def _checked(certificate: CheckedProof) -> CheckedProof:
     if not certificate.verify():
         raise UndecidedError(
             "the answer's own certificate failed its check, so the answer cannot be trusted"
@@ -259,7 +262,7 @@ def _about_center(proof: ClosureCertificate | None, center: Array) -> Array | No
     return np.concatenate([wrench[:3] + np.cross(wrench[3:], center), wrench[3:]])
 
 
-def _critical(contacts: ContactSet, soft: dict[str, Any]) -> tuple[float, Bounds | None]:
+def _critical(contacts: ContactSet, soft: dict[str, Any]) -> tuple[float, ProvedBounds | None]:
     """Return the critical friction, and its proved bounds for hard fingertips."""
     given = contacts.positions, contacts.normals
     if soft:
@@ -312,8 +315,8 @@ def _resisted(contacts: ContactSet, wrench: ArrayLike, question: Question) -> Re
     return replace(limit, least_norm_forces_n=forces)
 
 
-DIGITS = 7
-STEP = 10.0**-DIGITS
+PRINTED_DIGITS = 7
+PRINTED_STEP = 10.0**-PRINTED_DIGITS
 """Step to which ends of a printed interval are rounded, and to which they are reproducible."""
 
 
@@ -327,10 +330,10 @@ def analyze_file(command: flags.AnalyzeFlags, reporter: Reporter) -> int:
         count = len(contacts.positions)
         with about(f"{command.contacts}: grasp {contacts.id}"):
             contact_torsions(command.torsion_m, contacts.friction)
-        if count * command.edges > MOST_EDGES:
+        if count * command.edges > MOST_HULL_EDGES:
             raise InputError(
                 f"grasp {contacts.id}: {count} contacts with {command.edges} edges each exceed "
-                f"{MOST_EDGES} edges; use --edges {MOST_EDGES // count} or less"
+                f"{MOST_HULL_EDGES} edges; use --edges {MOST_HULL_EDGES // count} or less"
             )
     question = Question(
         command.max_normal_force_n, command.wrench, command.edges, command.torsion_m
@@ -343,10 +346,14 @@ def analyze_file(command: flags.AnalyzeFlags, reporter: Reporter) -> int:
         return analyses
 
     analyses = reporter.collected(
-        "analysing", found, len(sets), ("closed", lambda one: one.outcome is Outcome.CLOSED), told
+        "analysing",
+        found,
+        len(sets),
+        ("closed", lambda one: one.outcome is ClosureAnswer.CLOSED),
+        told,
     )
     _show(analyses, reporter)
-    good = all(found.outcome is Outcome.CLOSED for found in analyses.grasps)
+    good = all(found.outcome is ClosureAnswer.CLOSED for found in analyses.grasps)
     return Exit.GOOD if good else Exit.NEGATIVE
 
 
@@ -429,12 +436,14 @@ def _wrench_rows(found: Analysis, question: Question) -> list[tuple[str, ...]]:
 
 def _proved(lower: float, upper: float) -> tuple[str, str]:
     """Say where mu* is proved to be, with both ends rounded outwards so that it still holds."""
-    low, high = np.array([np.floor(lower / STEP), np.ceil(upper / STEP)]) * STEP
+    low, high = (
+        np.array([np.floor(lower / PRINTED_STEP), np.ceil(upper / PRINTED_STEP)]) * PRINTED_STEP
+    )
     if math.isinf(lower):
         return "mu* is proved", "infinite: no friction is enough"
     if math.isinf(upper):
-        return "mu* is proved at least", f"{low:.{DIGITS}f}"
-    return "mu* is proved between", f"{low:.{DIGITS}f} and {high:.{DIGITS}f}"
+        return "mu* is proved at least", f"{low:.{PRINTED_DIGITS}f}"
+    return "mu* is proved between", f"{low:.{PRINTED_DIGITS}f} and {high:.{PRINTED_DIGITS}f}"
 
 
 def _listed(values: Array) -> str:

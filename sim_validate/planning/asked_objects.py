@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from grasp_core.errors import InputError
-from grasp_core.mesh_files.limits import FORMATS, MeshLimits
+from grasp_core.mesh_files.limits import MESH_FORMATS, MeshLimits
 from grasp_core.objects.polyhedron import Polyhedron, load_polyhedron
 from grasp_core.planning.reach import Finger
 from grasp_core.planning.result import Plan
@@ -15,14 +15,14 @@ from scenes.example_objects import example_object
 from sim_validate.commands import flags
 from sim_validate.commands.console import Reporter
 
-NAMED = 5
+NAMES_LISTED = 5
 """Largest number of names that a message lists."""
 
 
 def is_mesh_file(name: str) -> bool:
     """Tell whether an object is a mesh file, by its ending or as it exists, or is built in."""
     path = Path(name)
-    return path.suffix.lower().lstrip(".") in FORMATS or path.is_file()
+    return path.suffix.lower().lstrip(".") in MESH_FORMATS or path.is_file()
 
 
 def load_object(name: str, mesh: flags.MeshFlags) -> Polyhedron:
@@ -43,8 +43,8 @@ def load_object(name: str, mesh: flags.MeshFlags) -> Polyhedron:
         )  # fmt: skip
     if path.suffix or len(path.parts) > 1:
         raise InputError(
-            f"{name}: expected a mesh file ({', '.join(FORMATS)}) or a built-in object; no such "
-            "file exists"
+            f"{name}: expected a mesh file ({', '.join(MESH_FORMATS)}) or a built-in object; no "
+            "such file exists"
         )
     unlimited = replace(mesh.choices, **asdict(MeshLimits()))
     if replace(mesh, choices=unlimited) != flags.MeshFlags():
@@ -140,5 +140,5 @@ def grasp_with_id(path: Path, saved: Plan, wanted: str | None) -> Grasp:
 def some(names: Iterable[str]) -> str:
     """List the first few of many names for a message."""
     listed = list(names)
-    more = f" and {len(listed) - NAMED} more" if len(listed) > NAMED else ""
-    return (", ".join(listed[:NAMED]) or "none") + more
+    more = f" and {len(listed) - NAMES_LISTED} more" if len(listed) > NAMES_LISTED else ""
+    return (", ".join(listed[:NAMES_LISTED]) or "none") + more

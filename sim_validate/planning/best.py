@@ -21,8 +21,8 @@ from grasp_core.kinds import Friction, Number, Quantity
 from grasp_core.names import Family, MeasureName
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.optimizing.best_grasp import (
+    BestEnded,
     BestGrasp,
-    Ended,
     GapAt,
     best_until,
     checked_clearance,
@@ -59,7 +59,7 @@ class Rated(Declared):
 
 
 @declared
-class Placed(Declared):
+class StandingFingers(Declared):
     """Where the fingers of the best grasp stand."""
 
     id: str
@@ -83,12 +83,12 @@ class Best(ResultFile):
     """The wrenches of a task, force before torque [N, N m]; none for another measure."""
     clearance_m: Quantity
     """Distance of contacts from the edges of faces [m]."""
-    grasp: Placed
+    grasp: StandingFingers
     quality: tuple[float, float]
     """Proved lower and upper bound of what the measure says of the grasp."""
     bound: Annotated[float, Interval(gt=0.0)]
     """What no four contacts exceed that are as far from edges."""
-    ended: Ended
+    ended: BestEnded
     proof: str | None
     """Name of the proof's file; None if it was not kept."""
     proof_nodes: Number
@@ -110,7 +110,9 @@ class Best(ResultFile):
             measure=measure.name,
             wrenches=tuple(loads),
             clearance_m=best.clearance,
-            grasp=Placed(grasp.id, grasp.family, grasp.faces, grasp.positions, grasp.normals),
+            grasp=StandingFingers(
+                grasp.id, grasp.family, grasp.faces, grasp.positions, grasp.normals
+            ),
             quality=(best.quality.lower, best.quality.upper),
             bound=best.bound,
             ended=best.ended,
@@ -152,7 +154,7 @@ WHY = {
     "undivided": "what is left of the faces is too small, or too much, to be divided further",
 }
 """Why a search ended, in words."""
-ROUGH = 1e-3
+PLANNED_GAP = 1e-3
 """Gap between the bounds of what planned grasps hold."""
 
 
@@ -194,7 +196,7 @@ def write_best(
     measure, friction = best.proof.measure, best.proof.friction
     bounds = [grasp.ferrari_canny for grasp in planned]
     if not measure.is_usual:
-        found = (measured(body, grasp, friction, measure, ROUGH) for grasp in planned)
+        found = (measured(body, grasp, friction, measure, PLANNED_GAP) for grasp in planned)
         rating = reporter.counted("rating", found, len(planned), "rated", bool, stop)
         bounds = [(each.lower, each.upper) for each in rating]
     rated = (

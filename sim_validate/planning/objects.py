@@ -26,7 +26,7 @@ from sim_validate.planning.asked_objects import load_object
 
 MM, CM3 = 1e3, 1e6
 MM2 = 1e6
-ALONG = 1e-4
+ALONG_AXIS = 1e-4
 """Largest angle from an axis at which a face counts as facing along it [rad]."""
 NOTHING_MM = 1e-6
 """Coordinate that is written as zero [mm]."""
@@ -141,7 +141,7 @@ def _place(face: Face) -> str:
     across = math.hypot(*(each for index, each in enumerate(outward) if index != axis))
     center = [f"{0.0 if abs(MM * each) < NOTHING_MM else MM * each:.5g}"
               for each in face.centroid.tolist()]  # fmt: skip
-    if across <= ALONG:
+    if across <= ALONG_AXIS:
         name, sign = "xyz"[axis], "+" if outward[axis] > 0.0 else "-"
         return f"facing {sign}{name} at {name} = {center[axis]} mm"
     side = ", ".join(f"{round(each, 2) + 0.0:g}" for each in outward)

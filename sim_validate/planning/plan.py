@@ -22,8 +22,8 @@ from grasp_core.files.text_files import write_text
 from grasp_core.names import METHODS, RankBy
 from grasp_core.objects.on_faces import nearest_edge
 from grasp_core.objects.polyhedron import Polyhedron
-from grasp_core.planning.plan_search import carried
-from grasp_core.planning.planner import search_plan
+from grasp_core.planning.plan_search import carried, chosen
+from grasp_core.planning.planner import put_together, search_grasps
 from grasp_core.planning.result import Moved, Plan, PlanRequest, methods_for
 from grasp_core.planning.settings import PlanSettings
 from grasp_core.records.grasps_json import plan_to_json
@@ -43,7 +43,7 @@ from sim_validate.processes.workers import each
 if TYPE_CHECKING:
     from grasp_core.optimizing.best_grasp import BestGrasp
 
-SAME_CONTACTS = 0.01
+ONE_OPTIMUM = 0.01
 """Distance below which two optimized contacts count as the same [object radii]; searches for one
 optimum end some thousandths from it."""
 
@@ -76,11 +76,10 @@ def plan_object(
             else:  # bounds end such a search long before all are tried
                 steps.update(done, None, f"of at most {total} ({grasps} grasps)")
 
-        found = search_plan(
-            body, request, stop.part(1 + planning.optimize + later), tell,
-            partial(steps.update, note="grasps", title=f"ranking by {request.rank_by}"),
-            jobs, WRITTEN_S,
-        )  # fmt: skip
+        planned_by = stop.part(1 + planning.optimize + later)
+        search = search_grasps(body, request, planned_by, tell, jobs=jobs, after_s=WRITTEN_S)
+        ranked = partial(steps.update, note="grasps", title=f"ranking by {request.rank_by}")
+        found = put_together(search, chosen(search, planned_by, ranked))
     if planning.optimize and found.grasps:
         found = improved(body, found, planning, jobs, stop.part(1 + later), reporter)
     return found
@@ -104,7 +103,7 @@ def improved(
     done.sort(key=lambda pair: -pair[0].ferrari_canny[0])
     kept: list[Grasp] = []
     for grasp, _ in done:
-        if not any(_same_contacts(grasp, other, SAME_CONTACTS * body.radius) for other in kept):
+        if not any(_same_contacts(grasp, other, ONE_OPTIMUM * body.radius) for other in kept):
             kept.append(grasp)
     if left_out := len(done) - len(kept):
         reporter.say(f"{left_out} optimised grasps are left out, equal to others after moving")

@@ -57,9 +57,9 @@ FIELDS: Mapping[str, str] = {
 }  # fmt: skip
 """Name of the array in a proof file for fields of `CertifiedRegions`."""
 ARRAYS = ("axes", "codes", "forces", *FIELDS.values(), *POLYGONS, *BORDERS)
-MOST_CORNERS = 1000
+MOST_REGION_CORNERS = 1000
 """Largest number of corners of a region's polygon in a file."""
-SMALLEST_SCALE, LARGEST = 1e-6, 1e6
+SMALLEST_SCALE, LARGEST_SCALE = 1e-6, 1e6
 """Smallest and largest unit of length of a proof, and largest coordinate in it [m]."""
 
 
@@ -73,7 +73,7 @@ class ProofFile(Declared):
 
 
 FourRegions = tuple[ContactRegion, ContactRegion, ContactRegion, ContactRegion]
-Points = Annotated[Array, Shape(FINGERS, 3)]
+FingerPoints = Annotated[Array, Shape(FINGERS, 3)]
 
 
 @declared
@@ -95,8 +95,8 @@ class GraspRegions(Declared):
     open_radius_m: Annotated[NotNegative | None, Shown("open mm", ".3g", MILLI)] = None
     """A larger radius, at which `open_choice_m` is not in force closure [m]; None if no such
     contacts were found."""
-    open_choice_m: Points | None = None
-    centers_m: Points | None = None
+    open_choice_m: FingerPoints | None = None
+    centers_m: FingerPoints | None = None
     """Centres of the discs."""
     normals: Annotated[Array, Shape(FINGERS, 3, units=True)] | None = None
     """Inward normals of the planes of the regions."""
@@ -240,7 +240,7 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
     fields: dict[str, Any] = {field: np.asarray(kept[name])[()] for field, name in FIELDS.items()}
     for optional in ("open_choice", "open_wrench"):  # empty where nothing was found
         fields[optional] = fields[optional] if np.size(fields[optional]) else None
-    scale = number(fields["scale"], "scale_m", ge=SMALLEST_SCALE, le=LARGEST)
+    scale = number(fields["scale"], "scale_m", ge=SMALLEST_SCALE, le=LARGEST_SCALE)
     normals = frozen_units(kept["normals"], (FINGERS, 3), "normals")
     forces = frozen(kept["forces"], (None, FINGERS, 3), "forces")
     return CertifiedRegions(
@@ -256,10 +256,13 @@ def regions_of(kept: Mapping[str, NDArray[Any]]) -> CertifiedRegions:
 
 def _region(name: str, given: NDArray[Any], normal: Array, scale: float) -> ContactRegion:
     polygon = frozen(given, (None, 3), name)
-    if not FEWEST_CORNERS <= len(polygon) <= MOST_CORNERS or np.abs(polygon).max() > LARGEST:
+    if (
+        not FEWEST_CORNERS <= len(polygon) <= MOST_REGION_CORNERS
+        or np.abs(polygon).max() > LARGEST_SCALE
+    ):
         raise InputError(
-            f"{name}: expected a polygon of {FEWEST_CORNERS} to {MOST_CORNERS} corners within "
-            f"{LARGEST:g} m; certify the regions again"
+            f"{name}: expected a polygon of {FEWEST_CORNERS} to {MOST_REGION_CORNERS} corners "
+            f"within {LARGEST_SCALE:g} m; certify the regions again"
         )
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # edges without length divide by zero

@@ -37,10 +37,10 @@ from sim_validate.files.results_folder import remove_results
 from sim_validate.planning.asked_objects import asked_grasps, load_object
 
 MM = 1e3
-ABSENT = "-"
+NO_FIGURE = "-"
 COLUMNS = ("grasp", "status", "mm", "deg", "mu*", "now", "quality N", "now", "faces")
 """How far contacts moved and turned, what they reach, and faces under them that changed."""
-BAD: tuple[Change, ...] = ("worse", "gone")
+BAD_CHANGES: tuple[Change, ...] = ("worse", "gone")
 """What becomes of a grasp if its part should not have changed like that."""
 
 
@@ -95,7 +95,7 @@ def transfer_file(command: flags.TransferFlags, reporter: Reporter) -> int:
     _show(found, reporter)
     if not found.carried:
         return Exit.NONE
-    return Exit.NEGATIVE if any(map(found.count, BAD)) else Exit.GOOD
+    return Exit.NEGATIVE if any(map(found.count, BAD_CHANGES)) else Exit.GOOD
 
 
 def carried_to_json(found: Transfer, saved: Plan) -> str:
@@ -146,23 +146,23 @@ def _show(found: Transfer, reporter: Reporter) -> None:
         f"that may move by {MM * found.distance:.4g} mm: {counts}"
     )
     for each in shown:
-        if each.status in BAD:
+        if each.status in BAD_CHANGES:
             reporter.warn(f"{each.old.id}: {each.status}: {each.reason}")
     if not found.carried:
         reporter.warn("no grasp is left; plan on the changed part anew")
 
 
 def _row(each: CarriedGrasp, changed: set[int]) -> tuple[str, ...]:
-    moved = turned = ABSENT
+    moved = turned = NO_FIGURE
     if all(contact.contact is not None for contact in each.contacts):
         moved = f"{MM * max(contact.distance for contact in each.contacts):.2f}"
         turned = f"{math.degrees(max(contact.turn for contact in each.contacts)):.2f}"
     old, new = _figures(each.before), _figures(each.after)
-    faces = ", ".join(map(str, sorted(changed & {*each.old.faces}))) or ABSENT
+    faces = ", ".join(map(str, sorted(changed & {*each.old.faces}))) or NO_FIGURE
     return (each.old.id, each.status, moved, turned, old[0], new[0], old[1], new[1], faces)
 
 
 def _figures(figures: GraspFigures | None) -> tuple[str, str]:
     if figures is None:
-        return ABSENT, ABSENT
+        return NO_FIGURE, NO_FIGURE
     return f"{figures.critical_friction:.4f}", f"{figures.ferrari_canny[0]:.4f}"

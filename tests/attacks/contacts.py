@@ -198,7 +198,7 @@ def put_to_rest(rng):
 
 def nearly_at_rest(monkeypatch):
     """Speeds of a ten-thousandth of what is left of a twist count as none."""
-    monkeypatch.setattr(friction_interval, "SAME", 10**4)
+    monkeypatch.setattr(friction_interval, "RESTING_INVERSE", 10**4)
 
 
 FRICTION = Attack(

@@ -11,7 +11,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.wrench_sets import WrenchSet
 from grasp_core.objects.face_pieces import unit_pieces
-from grasp_core.quality.ferrari_canny import RAYS, FerrariCanny, InnerPolytope
+from grasp_core.quality.ferrari_canny import COUNTING_RAYS, FerrariCanny, InnerPolytope
 from grasp_core.quality.wrench_limits import WrenchLimit
 from tests.attacks import contacts, faces, limits, wrench_sets
 from tests.attacks.searching import attacked
@@ -21,7 +21,7 @@ from tests.judges import TETRA_CENTERS, TETRA_NORMALS
 
 def test_a_sliver_in_two_orders_of_its_corners_encloses_nothing():
     """A ray through its side is met once by rounding, and twice or never in truth."""
-    u = RAYS[0] / np.linalg.norm(RAYS[0])
+    u = COUNTING_RAYS[0] / np.linalg.norm(COUNTING_RAYS[0])
     corners = np.array([np.arange(6), [3, 1, 4, 0, 5, 2], [5, 4, 3, 2, 1, 0], [1, 0, 2, 4, 3, 5]])
     for seed in range(200):
         d = np.random.default_rng(seed).normal(size=(6, 6))

@@ -15,7 +15,12 @@ import grasp_core.quality.measures as resisted
 from grasp_core.closure import wrench_sets
 from grasp_core.closure.wrench_sets import WrenchSet, into_cones
 from grasp_core.quality import ferrari_canny
-from grasp_core.quality.ferrari_canny import RAYS, FerrariCanny, InnerPolytope, wrench_set_quality
+from grasp_core.quality.ferrari_canny import (
+    COUNTING_RAYS,
+    FerrariCanny,
+    InnerPolytope,
+    wrench_set_quality,
+)
 from grasp_core.quality.measures import Measure, resisted_loads, task_limits
 from tests.attacks.searching import Attack, always, power
 from tests.judges import random_contacts
@@ -84,7 +89,7 @@ def optimum(w, load, depth):
 def along_ray(seed, place):
     """Forces whose wrench is far out along a ray on which simplices are counted, and the ray."""
     w, _ = closed_set(seed)
-    u = RAYS[place] / np.linalg.norm(RAYS[place])
+    u = COUNTING_RAYS[place] / np.linalg.norm(COUNTING_RAYS[place])
     (limit,) = task_limits(w, Measure("task", -u[None]))
     f = into_cones(0.95 * into_cones(limit.forces, w.friction) + 0.05 * balance(seed), w.friction)
     p = w.G @ f
@@ -114,7 +119,7 @@ def claimed(w, seed, polytope, rng):
 
 def any_ray(rng):
     """The first of the rays, on which the answer mostly rests, or another."""
-    return 0 if rng.uniform() < 0.6 else int(rng.integers(len(RAYS)))
+    return 0 if rng.uniform() < 0.6 else int(rng.integers(len(COUNTING_RAYS)))
 
 
 def seen_from(points, u):

@@ -78,14 +78,22 @@ def main():
     """Print the table; only the small objects with `--quick`."""
     quick = "--quick" in sys.argv
     gc.plan(example_object("random-9-7"), 0.5)
-    gc.plan(example_object("random-9-7"), 0.5, families=PAPER, cones="normal", limit=2)
+    gc.plan(
+        example_object("random-9-7"),
+        0.5,
+        families=PAPER,
+        limit=2,
+        settings=gc.PlanSettings(cones="normal"),
+    )
     check()
     print(f"{'plan':44} grasps    CPU s  ms/grasp      r figures s")
     for faces in NORMAL[: 1 if quick else None]:
         body = example_object(f"random-{faces}-1")
         row(
             f"the paper's families, {faces} faces",
-            lambda b=body: gc.plan(b, TEN_DEGREES, families=PAPER, cones="normal"),
+            lambda b=body: gc.plan(
+                b, TEN_DEGREES, families=PAPER, settings=gc.PlanSettings(cones="normal")
+            ),
             figures=not quick,
         )
     for faces in ALL[: 1 if quick else None]:

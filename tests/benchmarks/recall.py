@@ -35,7 +35,7 @@ def examine(case):
     """Count what became of the face quadruples, and sample."""
     name, friction = case
     body = scenes.example_object(name)
-    paper = gc.plan(body, friction, families=FAMILIES, cones="normal")
+    paper = gc.plan(body, friction, families=FAMILIES, settings=gc.PlanSettings(cones="normal"))
     found = gc.plan(body, friction)
     held = {tuple(sorted(g.faces)) for g in found.grasps}
     regions = {tuple(sorted(g.faces)) for g in found.grasps if g.radius > 0.0}

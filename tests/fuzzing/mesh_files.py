@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 import grasp_core as gc
-from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.mesh_files.limits import MESH_FORMATS
 from grasp_core.mesh_files.reading import mesh_of_bytes
 from tests.bad_input.mesh_texts import CORNERS, TRIANGLES
 from tests.bad_input.of_binary_meshes import glb, tree
@@ -180,6 +180,6 @@ def solid_seeds():
 
 TARGETS = [
     *(Target(kind, *(partial(each, kind) for each in (triangles_of, seeds, same_triangles)),
-             WRITTEN[kind]) for kind in FORMATS),
+             WRITTEN[kind]) for kind in MESH_FORMATS),
     Target("solid", solid, solid_seeds, same_volume, "npz"),
 ]  # fmt: skip

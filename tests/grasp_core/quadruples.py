@@ -6,7 +6,7 @@ import numpy as np
 
 from grasp_core.cones.spanning import SpanningTable
 from grasp_core.families import placing_kernel
-from grasp_core.families.placements import LEFT, PAIRINGS
+from grasp_core.families.placements import NOT_DECIDED, PAIRINGS
 from grasp_core.objects.face_pieces import unit_pieces
 from grasp_core.values import ForceCone
 from scenes.example_objects import example_object
@@ -42,4 +42,4 @@ def tilted_side_cones(pieces, tilt, half_angle):
 
 def leave_all(monkeypatch):
     """Have compiled code solve no program of discs."""
-    monkeypatch.setattr(placing_kernel, "place", lambda *given: given[-1].ends.fill(LEFT))
+    monkeypatch.setattr(placing_kernel, "place", lambda *given: given[-1].ends.fill(NOT_DECIDED))

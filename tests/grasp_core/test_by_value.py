@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from grasp_core.by_value import MOST, ByValue
+from grasp_core.by_value import MOST_TEXT, ByValue
 from scenes.example_objects import example_object
 
 FRICTION = 0.5
@@ -115,7 +115,12 @@ def test_public_dataclasses_with_arrays_are_compared_by_value():
 
 def test_what_is_shown_stays_on_its_line_however_long_its_names_and_reasons_are():
     body = replace(example_object("box"), name="a\nb" * 1000)
-    plan = gc.plan(example_object("box"), 0.5, families=("concurrent",), cones="normal")
+    plan = gc.plan(
+        example_object("box"),
+        0.5,
+        families=("concurrent",),
+        settings=gc.PlanSettings(cones="normal"),
+    )
     for each in (body, replace(plan, absence="no grasp " * 1000)):
-        assert len(repr(each)) <= MOST
+        assert len(repr(each)) <= MOST_TEXT
         assert "\n" not in repr(each)

@@ -38,12 +38,17 @@ from tests.public_values.call import (
 CENTER = np.zeros(3)
 CENTERED = array(CENTER) | {"far away": [1e40, 0.0, 0.0]}
 LEVERS = np.eye(2, 12)
+FAMILIES = SEVERAL | {"unknown": "nonsense", "numbers": (1, 2), "empty": ()}
 PLANNED = {
-    "families": SEVERAL | {"unknown": "nonsense", "numbers": (1, 2), "empty": ()},
-    "theta_deg": optional(POSITIVE) | {"wider than friction": 80.0},
+    "friction": optional(FRICTION),
+    "families": optional(FAMILIES),
     "finger": optional(VALUE) | {"radius": 0.006},
-    "edge_clearance_m": NOT_NEGATIVE | {"larger than the object": 1.0},
-    "share_faces_m": optional(NOT_NEGATIVE) | {"larger than the object": 1.0},
+    "settings": optional(VALUE)
+    | {
+        "wider than friction": gc.PlanSettings(theta_deg=80.0),
+        "cut back too far": gc.PlanSettings(edge_clearance_m=1.0),
+        "too far apart": gc.PlanSettings(share_faces_m=1.0),
+    },
 }
 
 
@@ -68,8 +73,15 @@ def mesh():
 
 CALLS = [
     Call("gc.plan", lambda: {"body": body(), "limit": 1}, PLANNED | {
+        "limit": optional(AT_LEAST_ONE), "rank_by": optional(WORD),
+    }),
+    Call("gc.PlanSettings", dict, {
+        "families": FAMILIES,
+        "theta_deg": optional(POSITIVE),
         "limit": optional(AT_LEAST_ONE),
         "complete": SWITCH,
+        "edge_clearance_m": NOT_NEGATIVE,
+        "share_faces_m": optional(NOT_NEGATIVE),
         "time_limit_s": optional(NOT_NEGATIVE),
     }),
     Call("gc.iter_grasps", lambda: {"body": body()}, PLANNED),

@@ -21,7 +21,9 @@ MAX_FORCE = 10.0
 @cache
 def grasps(name, friction, limit, families=("concurrent",), cones="normal"):
     body = scenes.example_object(name)
-    return body, gc.plan(body, friction, limit=limit, families=families, cones=cones).grasps
+    return body, gc.plan(
+        body, friction, limit=limit, families=families, settings=gc.PlanSettings(cones=cones)
+    ).grasps
 
 
 def saved_plan(folder, limit=1, friction=0.5):

@@ -11,9 +11,8 @@ from typing import get_args
 import pytest
 import trimesh
 
-from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.mesh_files.limits import MESH_FORMATS
 from grasp_core.names import HANDS, RANKINGS, RankBy
-from grasp_core.planning.planner import plan
 from grasp_core.planning.result import FAMILIES
 from grasp_core.provenance import versions
 from scenes.drawing.painting import Camera
@@ -178,7 +177,7 @@ def test_an_unexpected_error_is_internal_and_shows_its_place_when_asked(monkeypa
     def broken(*_, **__):
         raise RuntimeError("boom")
 
-    monkeypatch.setattr("sim_validate.planning.plan.search_plan", broken)
+    monkeypatch.setattr("sim_validate.planning.plan.search_grasps", broken)
     assert main(["plan", "wedge"]) == Exit.INTERNAL
     assert "internal error" in capsys.readouterr().err
     assert main(["plan", "wedge", "-v"]) == Exit.INTERNAL
@@ -345,7 +344,6 @@ def test_the_help_of_a_flag_names_every_value(capsys, words, flag, values):
 
 def test_every_ranking_is_described_wherever_rankings_are():
     assert set(RANKINGS) == set(get_args(RankBy))
-    assert all(f"`{name}`" in (plan.__doc__ or "") for name in RANKINGS)
     assert get_args(ProtocolName) == tuple(PROTOCOLS)
     assert get_args(BuiltInHand) == ("", *HANDS)
 

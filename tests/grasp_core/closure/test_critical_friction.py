@@ -70,7 +70,7 @@ def test_what_the_search_gets_wrong_is_made_program_by_program(monkeypatch, spoi
         forces[:] = np.nan if spoil == "numbers" else -contacts[0]
         twists[:], values[:] = 1.0, np.nan if spoil == "numbers" else 0.5
 
-    kernel = compiled(critical.KERNEL)
+    kernel = compiled(critical.MARGIN_KERNEL)
     honest = kernel.search
     positions, normals = (array[:6] for array in contact_sets())
     right = gc.critical_frictions(positions, normals)

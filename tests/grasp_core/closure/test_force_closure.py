@@ -6,7 +6,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.closure import force_closure as module
-from grasp_core.closure.decision import Answer
+from grasp_core.closure.decision import Decision
 from grasp_core.files.json_text import text_of
 from grasp_core.files.records import from_record, record_of
 from tests.judges import TETRA_CENTERS, TETRA_NORMALS, random_contacts
@@ -133,7 +133,9 @@ def test_a_certificate_without_contacts_is_refused():
 
 
 def test_a_decision_that_its_forces_do_not_prove_is_no_certificate(monkeypatch):
-    wrong = Answer(0.1, TETRA_NORMALS * np.array([[2.0], [1], [1], [1]]), np.zeros(6), closed=True)
+    wrong = Decision(
+        0.1, TETRA_NORMALS * np.array([[2.0], [1], [1], [1]]), np.zeros(6), closed=True
+    )
     monkeypatch.setattr(module, "decide", lambda _: wrong)
     with pytest.raises(gc.UndecidedError, match=r"neither .* can be proved \(margin 0\.1\)"):
         gc.force_closure(TETRA_CENTERS, TETRA_NORMALS, 0.5)

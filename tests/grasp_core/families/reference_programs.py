@@ -10,7 +10,7 @@ import numpy as np
 from grasp_core.cones.pyramids import PYRAMID_SIDES, pyramid_facets
 from grasp_core.cones.spanning import angles_between
 from grasp_core.families.placements import LEAST_RADIUS
-from grasp_core.families.regulus_kernel import LEAST_DEPTH, LEAST_GAP, LEAST_INSET
+from grasp_core.families.regulus_kernel import LEAST_DEPTH, LEAST_PASS, REGULUS_INSET
 from grasp_core.geometry.polygons import clip
 from grasp_core.solvers.lp import LinearProgram, Optimum, maximize
 from tests.judges import balancing_weights
@@ -106,7 +106,7 @@ def regulus(pieces, cones):
 
 
 def _with_slopes(pieces, cones, u, v, frames, slopes, side):
-    rows, limits = [-side * v[4:5]], [[-LEAST_GAP / min(map(abs, slopes))]]  # (8)
+    rows, limits = [-side * v[4:5]], [[-LEAST_PASS / min(map(abs, slopes))]]  # (8)
     A_eq, b_eq = [], []
     for finger, (piece, cone) in enumerate(zip(pieces, cones, strict=True)):
         i, sign = finger // 2, 1.0 if finger % 2 == 0 else -1.0
@@ -118,7 +118,7 @@ def _with_slopes(pieces, cones, u, v, frames, slopes, side):
         G = facets_of(piece, cone)
         # (4), (5) with both signs, (6) and (7)
         rows += [piece.E @ flat, flat - v[9], -flat - v[9], -G @ f, [-piece.normal @ f]]
-        inside = piece.b - LEAST_INSET + piece.E @ middle
+        inside = piece.b - REGULUS_INSET + piece.E @ middle
         limits += [inside, middle, -middle, np.zeros(len(G)), [-LEAST_DEPTH]]
         A_eq.append(piece.normal @ (d - f))
         b_eq.append(piece.normal @ piece.origin)

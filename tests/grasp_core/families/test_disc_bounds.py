@@ -8,7 +8,7 @@ import pytest
 from grasp_core.cones.spanning import span_sines
 from grasp_core.families.disc_bounds import corners_of, disc_limits
 from grasp_core.families.placements import LEAST_RADIUS, Attempts
-from grasp_core.families.placing import CONSTRUCTIONS, Settling
+from grasp_core.families.placing import CONSTRUCTIONS, ContactPlacing
 from grasp_core.objects.face_pieces import face_shapes
 from scenes.example_objects import example_object
 from tests.grasp_core.quadruples import spanning_quadruples
@@ -31,7 +31,7 @@ def quadruples(body, seed=0):
 
 def bounds_on(shapes, construction, attempts, least):
     """Bounds of a construction on the hulls of faces."""
-    return construction.bounds(Settling(construction, shapes).table, attempts, least)
+    return construction.bounds(ContactPlacing(construction, shapes).table, attempts, least)
 
 
 @pytest.mark.parametrize("name", BODIES)

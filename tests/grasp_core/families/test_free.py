@@ -149,7 +149,7 @@ def test_placements_balance_strictly_inside_their_faces_and_cones():
         assert np.abs(wrench(placed.positions, placed.forces)).max() < TOLERANCE
         assert pushes.sum() == pytest.approx(1.0, abs=TOLERANCE)
         assert (slides < friction * pushes).all()
-        assert insets(pieces, placed.positions).min() > free.LEAST_INSET - TOLERANCE
+        assert insets(pieces, placed.positions).min() > free.FREE_INSET - TOLERANCE
         assert insets(pieces, placed.positions).min() == pytest.approx(placed.merit, abs=TOLERANCE)
         assert gc.classify_lines(placed.positions, placed.forces) == "regulus"
         if number % 8 == 0:
@@ -232,7 +232,7 @@ def test_a_grasp_of_two_parallel_slabs_is_not_along_one_line():
     placed = place(walls, 0.5)
     assert isinstance(placed, Placement)
     spread = np.linalg.svd(placed.positions - placed.positions.mean(axis=0), compute_uv=False)
-    assert spread[1] > free.LEAST_INSET
+    assert spread[1] > free.FREE_INSET
 
 
 def test_the_parts_reached_by_cutting_cover_the_faces_without_overlap():

@@ -10,7 +10,7 @@ from grasp_core.families.placements import LEAST_RADIUS, face_table
 from grasp_core.families.placing import CONSTRUCTIONS, MIXED, attempts_of, regions_of
 from grasp_core.objects.face_pieces import edge_rows, face_shapes, inscribed_radius
 from grasp_core.planning.quadruples import LEAST_SPAN_ANGLE, PlannedCones, all_blocks
-from grasp_core.solvers.lp import RESIDUAL
+from grasp_core.solvers.lp import LP_RESIDUAL
 from grasp_core.values import ForceCone, four
 from scenes.example_objects import example_object
 from tests.grasp_core.curved import curved_body
@@ -72,8 +72,10 @@ def test_discs_are_the_largest_that_plain_rows_allow_and_so_are_their_bounds(cas
             assert (at is not None) is (best >= LEAST_RADIUS)
             ends[at is not None] += 1
             if at is not None:
-                assert at.merit == pytest.approx(best - RESIDUAL, abs=1e-6 * best)  # of equal ones
-                assert bound == pytest.approx(best + RESIDUAL, abs=2e-8)
+                assert at.merit == pytest.approx(
+                    best - LP_RESIDUAL, abs=1e-6 * best
+                )  # of equal ones
+                assert bound == pytest.approx(best + LP_RESIDUAL, abs=2e-8)
             else:
                 assert bound <= LEAST_RADIUS + 2e-8
     assert deepest > 0.0

@@ -4,7 +4,7 @@ import trimesh
 
 import grasp_core as gc
 import scenes
-from grasp_core.mesh_files.limits import FORMATS
+from grasp_core.mesh_files.limits import MESH_FORMATS
 from grasp_core.objects.polyhedron import is_convex, polyhedron_from_mesh
 from tests.bad_input.of_threemf import mesh, model, object_, threemf
 
@@ -14,7 +14,7 @@ def box():
     return trimesh.creation.box(extents=(0.1, 0.2, 0.3))
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("kind", MESH_FORMATS)
 def test_every_format_gives_the_same_box(box, kind, tmp_path):
     path = tmp_path / f"part.{kind}"
     if kind == "3mf":  # trimesh writes it in millimetres, by packages that nothing else here needs

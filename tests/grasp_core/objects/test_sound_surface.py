@@ -11,7 +11,7 @@ import grasp_core as gc
 from grasp_core.errors import MeshRefusal
 from grasp_core.objects.booleans import Solid
 from grasp_core.objects.build import caps_of
-from grasp_core.objects.surface import Edges, Mesh
+from grasp_core.objects.surface import Mesh, MeshEdges
 from tests.bad_input import mesh_texts
 
 TURN = trimesh.transformations.rotation_matrix(0.7, [3.0, 1.0, 2.0])[:3, :3]
@@ -237,7 +237,7 @@ def test_a_long_triangle_of_a_thin_pipe_hides_little(sections):
     """Half a ball over its length would be larger than all the material."""
     pipe = trimesh.creation.annulus(0.009, 0.011, 0.15, sections=sections)
     long = np.flatnonzero(np.ptp(pipe.triangles, axis=1).max(axis=1) > 0.14)
-    beside = Edges.of(pipe.faces).neighbours()[long[0]]
+    beside = MeshEdges.of(pipe.faces).neighbours()[long[0]]
     for gone in (long[:1], [long[0], beside[np.isin(beside, long)][0]]):
         body = gc.Polyhedron.from_mesh(pipe.vertices, np.delete(pipe.faces, gone, axis=0))
         assert body.surface.volume_source == "capped surface"
@@ -249,14 +249,14 @@ def test_a_long_triangle_of_a_thin_pipe_hides_little(sections):
 def test_crooked_holes_are_closed_and_hide_no_more_than_they_say(seed):
     rng = np.random.default_rng(seed)
     mesh = trimesh.creation.icosphere(subdivisions=3)
-    across, gone = Edges.of(mesh.faces).neighbours(), [int(rng.integers(len(mesh.faces)))]
+    across, gone = MeshEdges.of(mesh.faces).neighbours(), [int(rng.integers(len(mesh.faces)))]
     while len(gone) < 40:
         gone.append(int(rng.choice(np.setdiff1d(across[gone], gone))))
     for wound in (mesh.faces, mesh.faces[:, ::-1]):
         left = np.delete(wound, gone, axis=0)
         caps = caps_of(Mesh(mesh.vertices, left))
         whole = np.concatenate([left, caps.triangles])
-        assert not Edges.of(whole).balance.any()
+        assert not MeshEdges.of(whole).balance.any()
         assert abs(abs(Solid(mesh.vertices, whole).volume) - mesh.volume) <= caps.hidden
 
 

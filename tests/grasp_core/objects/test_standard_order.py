@@ -130,7 +130,7 @@ def test_an_object_planned_as_its_mirror_image_is_certified_and_proved_absent_as
 def test_fingers_on_one_face_hold_and_keep_their_distance():
     body = example_object("box")
     apart = 0.02
-    plan = gc.plan(body, 0.5, share_faces_m=apart)
+    plan = gc.plan(body, 0.5, settings=gc.PlanSettings(share_faces_m=apart))
     shared = [grasp for grasp in plan.grasps if len(set(grasp.faces)) < 4]
     assert len(shared) >= 20
     assert len({grasp.id for grasp in plan.grasps}) == len(plan.grasps)
@@ -148,7 +148,7 @@ def test_fingers_on_one_face_hold_and_keep_their_distance():
 def test_absence_is_proved_for_whole_faces_not_for_their_halves():
     """Random contacts on the whole faces of quadruples that are called absent never close."""
     body, rng, tested = example_object("wedge"), np.random.default_rng(0), 0
-    plan = gc.plan(body, 0.2, share_faces_m=0.0)
+    plan = gc.plan(body, 0.2, settings=gc.PlanSettings(share_faces_m=0.0))
     for faces, proofs in plan.absences.items():
         assert all(proof.verify() for proof in proofs)
         if len(set(faces)) == 4:
@@ -177,7 +177,9 @@ def from_edges(point, face):
 def test_planned_contacts_and_regions_keep_the_margin():
     body = example_object("l-bracket")
     margin, tested = 0.05 * body.radius, 0
-    plan = gc.plan(body, 0.5, edge_clearance_m=margin, families="concurrent")
+    plan = gc.plan(
+        body, 0.5, families="concurrent", settings=gc.PlanSettings(edge_clearance_m=margin)
+    )
     for grasp in plan.grasps:
         for face, contact, region in zip(grasp.faces, grasp.contacts, grasp.regions, strict=True):
             for point in (contact.position, *region.polygon):
@@ -189,12 +191,15 @@ def test_planned_contacts_and_regions_keep_the_margin():
 
 def test_a_margin_wider_than_all_faces_leaves_nothing():
     body = example_object("wedge")
-    plan = gc.plan(body, 0.5, edge_clearance_m=0.9 * body.radius)
+    plan = gc.plan(body, 0.5, settings=gc.PlanSettings(edge_clearance_m=0.9 * body.radius))
     assert not plan.grasps
     assert plan.outcomes.absent == plan.counts.quadruples
     assert "m from their edges" in plan.absence
     structured = gc.plan(
-        body, 0.5, edge_clearance_m=0.9 * body.radius, families="concurrent", cones="normal"
+        body,
+        0.5,
+        families="concurrent",
+        settings=gc.PlanSettings(edge_clearance_m=0.9 * body.radius, cones="normal"),
     )
     assert structured.counts.spanning == 15
     assert "15 face quadruples span" in structured.absence

@@ -8,7 +8,7 @@ from grasp_core.objects.face_pieces import inset_piece
 from grasp_core.optimizing.ascent import ContactFaces
 from grasp_core.optimizing.better_contacts import pieces_under
 from grasp_core.quality.ferrari_canny import wrench_set_quality
-from grasp_core.quality.measures import THIN, thin
+from grasp_core.quality.measures import SMALL_LENGTH, thin
 from scenes.example_objects import example_object
 
 
@@ -25,7 +25,7 @@ def contacts_of(body, grasp, inset=0.05):
 @pytest.fixture(scope="module")
 def wedge():
     body = example_object("wedge")
-    return body, gc.plan(body, 0.5, limit=12, cones="normal").grasps
+    return body, gc.plan(body, 0.5, limit=12, settings=gc.PlanSettings(cones="normal")).grasps
 
 
 def ball(faces, y, length):
@@ -34,7 +34,7 @@ def ball(faces, y, length):
     return wrench_set_quality(wrenches if length == 1.0 else thin(wrenches), 1e-7)
 
 
-@pytest.mark.parametrize("length", [1.0, THIN])
+@pytest.mark.parametrize("length", [1.0, SMALL_LENGTH])
 def test_slopes_of_the_nearest_planes_predict_small_moves(wedge, length):
     """The lowest of the linearised distances against the quality itself, 1e-4 away.
 

@@ -13,7 +13,7 @@ from grasp_core.objects.on_faces import within
 from grasp_core.optimizing import ascent, search
 from grasp_core.optimizing import best_grasp as searching
 from grasp_core.optimizing.ascent import CLIMBED
-from grasp_core.optimizing.contact_places import ROOM, exact_maps, grounds_of
+from grasp_core.optimizing.contact_places import CORNER_ROOM, exact_maps, grounds_of
 from grasp_core.optimizing.support_cuts import read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object
@@ -229,7 +229,7 @@ def test_parts_that_leave_nodes_to_others_prove_as_much(monkeypatch):
 
 
 def test_a_search_of_too_many_nodes_ends_with_a_proved_bound(monkeypatch):
-    monkeypatch.setattr(search, "MOST_NODES", 100)
+    monkeypatch.setattr(search, "MOST_SEARCHED", 100)
     found = gc.best_grasp(example_object("tetrahedron"), FRICTION, gap=0.01, time_limit_s=120.0)
     assert found.ended == "undivided"
     assert 0.01 < found.gap < 1.0
@@ -328,7 +328,7 @@ def test_a_cut_keeps_all_that_answers_and_next_to_nothing_else():
     pieces = kernel.Pieces(grounds.normals, grounds.origins, grounds.frames, FRICTION)
     for _ in range(400):
         p, y, t = int(rng.integers(len(grounds.counts))), rng.normal(size=6), rng.normal()
-        polygon, at, out = grounds.polygons()[p], np.empty(6), np.empty((ROOM, 2))
+        polygon, at, out = grounds.polygons()[p], np.empty(6), np.empty((CORNER_ROOM, 2))
         kernel.slopes(pieces, p, y, at)
         kept = kernel.cut(np.array(polygon), len(polygon), at, FRICTION, t, out)
 

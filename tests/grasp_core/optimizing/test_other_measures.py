@@ -7,7 +7,7 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.optimizing.contact_places import exact_maps, grounds_of
-from grasp_core.optimizing.support_cuts import ROUNDING, read_proof, write_proof
+from grasp_core.optimizing.support_cuts import MEASURE_ROUNDING, read_proof, write_proof
 from grasp_core.quality.measures import Measure
 from scenes.example_objects import example_object
 from tests.grasp_core.optimizing.contacts_on_faces import FRICTION, LIFT, best
@@ -72,7 +72,7 @@ def test_twists_that_ask_for_nothing_leave_room_for_rounding():
     )
     assert not ask.verify()
     answers = ask.threshold * ask.measure.demands(ask.twists) - ask.slack.lowered
-    assert answers == pytest.approx([-(1.0 + FRICTION) * ROUNDING], rel=1e-12)
+    assert answers == pytest.approx([-(1.0 + FRICTION) * MEASURE_ROUNDING], rel=1e-12)
     assert ask.bound == ask.threshold
 
 

@@ -7,10 +7,10 @@ import pytest
 
 import grasp_core as gc
 from grasp_core.families import placing_kernel
-from grasp_core.families.placements import LEFT
+from grasp_core.families.placements import NOT_DECIDED
 from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.planning import method_search as promising_module
-from grasp_core.planning.method_search import SAME_MERIT, FamilySearch, MethodSearch
+from grasp_core.planning.method_search import BEATEN_SHARE, FamilySearch, MethodSearch
 from grasp_core.planning.plan_search import in_standard_order
 from grasp_core.planning.quadruples import PlannedCones, all_blocks
 from grasp_core.planning.result import PlanRequest
@@ -44,7 +44,7 @@ def test_a_limit_keeps_the_largest_discs_of_all(name):
     assert len(every) >= 2
     for limit in (1, 3, 8):
         best = radii(body, options, family, limit)
-        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
+        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * BEATEN_SHARE)
 
 
 def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
@@ -56,7 +56,7 @@ def test_cones_that_are_tilted_late_are_not_missed(monkeypatch):
         monkeypatch.setattr(promising_module, name, size)
     for limit in (2, 50):
         best = radii(body, {"friction": 0.4}, "pencil", limit)
-        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * SAME_MERIT)
+        np.testing.assert_allclose(best, every[:limit], rtol=2.0 * BEATEN_SHARE)
 
 
 def opened(body, family, least):
@@ -107,7 +107,7 @@ def test_attempts_whose_programs_fail_are_undecided_and_the_search_goes_on(monke
     def sometimes(pencil, table, attempts, patterns, least, placed):
         solve(pencil, table, attempts, patterns, least, placed)
         numbers = np.arange(len(tried), len(tried) + len(least))
-        placed.ends[numbers % 10 == 0] = LEFT
+        placed.ends[numbers % 10 == 0] = NOT_DECIDED
         tried.extend(numbers)
 
     expected = gc.plan(body, 0.4, families="concurrent", limit=5).grasps

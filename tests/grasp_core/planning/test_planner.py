@@ -11,13 +11,13 @@ from grasp_core.families.placing import CONSTRUCTIONS
 from grasp_core.names import METHODS, RankBy
 from grasp_core.objects.face_pieces import face_shapes
 from grasp_core.objects.standard_order import standard
-from grasp_core.planning.plan_search import PlanSearch
-from grasp_core.planning.planner import search_plan
+from grasp_core.planning.plan_search import PlanSearch, chosen
+from grasp_core.planning.planner import put_together, search_grasps
 from grasp_core.planning.quadruples import PlannedCones, all_blocks
 from grasp_core.planning.result import PlanRequest
 from grasp_core.stopping import Stop
 from scenes.example_objects import example_object
-from tests.benchmarks.invariance import chosen, examine, found_on
+from tests.benchmarks import invariance
 from tests.benchmarks.objects import sphere_hull
 from tests.grasp_core.bodies import from_edges
 
@@ -35,7 +35,12 @@ FAMILIES = (*DISCS, "regulus")
 )
 def test_platonic_solids_have_the_known_number_of_quadruples_at_ten_degrees(name, count):
     """Quadruples with theta* above ten degrees; all of them carry a concurrent grasp."""
-    found = gc.plan(example_object(name), TEN_DEGREES, families=("concurrent",), cones="normal")
+    found = gc.plan(
+        example_object(name),
+        TEN_DEGREES,
+        families=("concurrent",),
+        settings=gc.PlanSettings(cones="normal"),
+    )
     wide = [grasp for grasp in found.grasps if grasp.span_angle > math.radians(10.0)]
     assert len(wide) == count
     assert found.counts.families["concurrent"].rejected == 0
@@ -49,7 +54,9 @@ def test_every_grasp_lies_on_its_faces_inside_its_regions_whose_corners_are_clos
     rng, tested = np.random.default_rng(7), 0
     for name, cones in TILTED + NORMAL:
         body = example_object(name)
-        for grasp in gc.plan(body, 0.4, limit=20, families=DISCS, cones=cones).grasps:
+        for grasp in gc.plan(
+            body, 0.4, limit=20, families=DISCS, settings=gc.PlanSettings(cones=cones)
+        ).grasps:
             for face, contact, region in zip(
                 grasp.faces, grasp.contacts, grasp.regions, strict=True
             ):
@@ -71,8 +78,10 @@ def test_every_grasp_lies_on_its_faces_inside_its_regions_whose_corners_are_clos
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [4, 18, 25])
 def test_faces_and_families_stay_where_vertices_move_by_a_thousand_millionth(number):
-    name, friction = chosen(number)
-    *_, count, differing = examine((number, found_on(example_object(name), friction)))
+    name, friction = invariance.chosen(number)
+    *_, count, differing = invariance.examine(
+        (number, invariance.found_on(example_object(name), friction))
+    )
     assert count > 50
     assert differing == []
 
@@ -108,7 +117,9 @@ def test_grasps_are_streamed_as_they_are_found():
 
 
 def test_a_smaller_theta_binds_the_free_method_too():
-    found = gc.plan(example_object("wedge"), 0.5, theta_deg=8.0, families="free")
+    found = gc.plan(
+        example_object("wedge"), 0.5, families="free", settings=gc.PlanSettings(theta_deg=8.0)
+    )
     assert found.grasps
     for grasp in found.grasps:
         f, n = grasp.witness.forces, grasp.normals
@@ -121,7 +132,7 @@ def test_a_smaller_theta_binds_the_free_method_too():
 def test_every_four_faces_are_held_or_proved_to_hold_nothing(name, absent):
     """Also where no normals span: with tilted cones most grasps have regions."""
     for friction in (0.3, 0.8):
-        found = gc.plan(example_object(name), friction, families=METHODS, cones="tilted")
+        found = gc.plan(example_object(name), friction, families=METHODS)
         proofs = [proof for each in found.absences.values() for proof in each]
         assert all(proof.verify() for proof in proofs)
         assert len(proofs) >= absent * (friction < 0.5)
@@ -138,7 +149,9 @@ def test_every_four_faces_are_held_or_proved_to_hold_nothing(name, absent):
 def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():
     """Long faces on which whole patches balance though no contacts do, or only few."""
     body = example_object("double-wedge-bar")
-    quick, complete = (gc.plan(body, 0.3, complete=whole) for whole in (False, True))
+    quick, complete = (
+        gc.plan(body, 0.3, settings=gc.PlanSettings(complete=whole)) for whole in (False, True)
+    )
     assert quick.outcomes.open == len(quick.undecided) == 8
     assert all(0.0 < share <= 1.0 for share in quick.undecided.values())
     assert complete.outcomes.open == len(complete.undecided) == 0
@@ -152,7 +165,12 @@ def test_what_is_left_open_is_decided_when_asked_and_the_gap_is_said_before():
 
 
 def test_every_family_is_planned_and_every_witness_is_of_its_family():
-    found = gc.plan(example_object("chamfered-box"), TEN_DEGREES, families=FAMILIES, cones="normal")
+    found = gc.plan(
+        example_object("chamfered-box"),
+        TEN_DEGREES,
+        families=FAMILIES,
+        settings=gc.PlanSettings(cones="normal"),
+    )
     assert list(found.counts.families) == list(FAMILIES)
     assert {grasp.family for grasp in found.grasps} == set(FAMILIES)
     for grasp in found.grasps:
@@ -166,7 +184,13 @@ def test_every_family_is_planned_and_every_witness_is_of_its_family():
 
 @pytest.mark.parametrize("name", ["chamfered-box", "random-12-1"])
 def test_counts_add_up_and_nothing_is_rejected(name):
-    found = gc.plan(example_object(name), TEN_DEGREES, limit=30, families=FAMILIES, cones="normal")
+    found = gc.plan(
+        example_object(name),
+        TEN_DEGREES,
+        limit=30,
+        families=FAMILIES,
+        settings=gc.PlanSettings(cones="normal"),
+    )
     for family, counts in found.counts.families.items():
         ended = counts.infeasible + counts.found + counts.duplicates + counts.rejected
         assert counts.tried == ended
@@ -202,7 +226,9 @@ def test_radii_stay_below_the_bounds_that_prune():
             for faces, bound in zip(coned.faces.tolist(), best, strict=True)
         }
         assert max(bounds.values()) <= room
-        for grasp in gc.plan(given, 1.0, theta_deg=8.0, families=family, cones="tilted").grasps:
+        for grasp in gc.plan(
+            given, 1.0, families=family, settings=gc.PlanSettings(theta_deg=8.0)
+        ).grasps:
             assert grasp.radius <= bounds[tuple(sorted(grasp.faces))] * body.radius * (1 + 1e-6)
             tested += 1
     assert tested >= 80
@@ -241,6 +267,11 @@ class Looks(Stop):
         return super().__call__() or self.looks < 0
 
 
+def planned(body, request, stop, ranked=None):
+    search = search_grasps(body, request, stop)
+    return put_together(search, chosen(search, stop, ranked))
+
+
 @pytest.fixture(scope="module")
 def bar():
     body = example_object("double-wedge-bar")
@@ -252,7 +283,7 @@ def bar():
 )
 def test_a_plan_that_is_ended_early_keeps_what_it_found_and_says_so(bar, looks, limit):
     body, every = bar
-    found = search_plan(body, PlanRequest(limit=limit), Looks(looks))
+    found = planned(body, PlanRequest(limit=limit), Looks(looks))
     assert found.ended == "time"
     assert {grasp.id for grasp in found} < every
     assert all(gc.force_closure(grasp).closed for grasp in found)
@@ -274,7 +305,7 @@ def test_grasps_that_there_is_no_time_to_rank_come_last(bar, rank_by):
             stop.now()
 
     stop = Stop()
-    found = search_plan(body, PlanRequest(rank_by=rank_by), stop, ranked=tell)
+    found = planned(body, PlanRequest(rank_by=rank_by), stop, ranked=tell)
     assert {grasp.id for grasp in found} == every
     if rank_by == "radius":
         assert (found.ended, ranked) == ("done", [])
@@ -292,13 +323,39 @@ def test_what_is_undecided_stays_so_where_time_is_up(bar, monkeypatch):
         return completed(search)
 
     monkeypatch.setattr(PlanSearch, "_completed", stopped)
-    found = search_plan(body, PlanRequest(0.3, complete=True), stop)
+    found = planned(body, PlanRequest(0.3, complete=True), stop)
     assert found.ended == "interrupt"
     assert found.undecided == usual.undecided
     assert len(found.undecided) == 8
 
 
-def test_a_time_limit_is_a_keyword_of_plan():
-    found = gc.plan(example_object("box"), time_limit_s=0.0)
+def test_settings_that_were_keywords_still_are_and_a_warning_says_what_to_write():
+    body = example_object("tetrahedron")
+    wanted = r"settings=PlanSettings\(%s\)"
+    with pytest.warns(DeprecationWarning, match=wanted % "cones='normal'") as warned:
+        old = gc.plan(body, 0.6, limit=2, cones="normal")
+    with pytest.warns(DeprecationWarning, match=wanted % "seed=3"):
+        streamed = list(gc.iter_grasps(body, 0.6, seed=3))
+    assert [each.filename for each in warned] == [__file__]
+    assert old == gc.plan(body, 0.6, limit=2, settings=gc.PlanSettings(cones="normal"))
+    assert streamed == list(gc.iter_grasps(body, settings=gc.PlanSettings(0.6, seed=3)))
+    with pytest.raises(TypeError, match=r"plan\(\) got an unexpected keyword argument 'radius'"):
+        gc.plan(body, radius=0.1)
+
+
+def test_keywords_come_before_settings_and_grasps_that_stream_are_not_the_best():
+    body = example_object("tetrahedron")
+    settings = gc.PlanSettings(0.6, families=("free",), limit=2)
+    found = gc.plan(body, 0.7, families="concurrent", settings=settings)
+    assert (found.friction, len(found), found[0].family) == (0.7, 1, "concurrent")
+    for best in (settings, gc.PlanSettings(rank_by="diverse")):
+        with pytest.raises(gc.InputError, match="choose the best of all grasps"):
+            gc.iter_grasps(body, settings=best)
+
+
+def test_a_plan_ends_when_its_time_is_up():
+    found = gc.plan(example_object("box"), settings=gc.PlanSettings(time_limit_s=0.0))
     assert (len(found), found.ended) == (0, "time")
-    assert gc.plan(example_object("box"), time_limit_s=1e6).ended == "done"
+    assert (
+        gc.plan(example_object("box"), settings=gc.PlanSettings(time_limit_s=1e6)).ended == "done"
+    )

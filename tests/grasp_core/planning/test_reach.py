@@ -70,7 +70,7 @@ def test_reached_contacts_have_free_rods_and_others_say_why():
     body = example_object("l-bracket")
     finger = Finger(0.06 * body.radius, 0.8 * body.radius)
     reached, reasons = 0, set()
-    plan = gc.plan(body, 0.5, limit=40, families="concurrent", cones="tilted")
+    plan = gc.plan(body, 0.5, limit=40, families="concurrent")
     for grasp in plan.grasps[:40]:
         found = reach(body, grasp.faces, grasp.positions, grasp.normals, finger)
         if isinstance(found, str):

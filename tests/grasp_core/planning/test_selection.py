@@ -114,8 +114,8 @@ def _closest(grasps):
 def test_with_everything_found_families_take_turns_largest_first():
     """Grasps that the free method found regions for take turns with those of their family."""
     body = example_object("l-bracket")
-    everything = gc.plan(body, 0.5, complete=True).grasps
-    few = gc.plan(body, 0.5, complete=True, limit=10).grasps
+    everything = gc.plan(body, 0.5, settings=gc.PlanSettings(complete=True)).grasps
+    few = gc.plan(body, 0.5, limit=10, settings=gc.PlanSettings(complete=True)).grasps
     for family in ("concurrent", "pencil"):
         radii = [grasp.radius for grasp in everything if grasp.family == family]
         kept = [grasp.radius for grasp in few if grasp.family == family]

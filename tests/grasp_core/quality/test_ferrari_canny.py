@@ -23,7 +23,7 @@ def test_the_centers_of_a_tetrahedron():
     found = gc.ferrari_canny(TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0)
     assert found.lower <= 0.124355
     assert found.upper >= 0.124352
-    assert found.upper - found.lower <= module.GAP * found.upper
+    assert found.upper - found.lower <= module.QUALITY_GAP * found.upper
     assert found.verify()
 
 
@@ -104,7 +104,7 @@ def test_bounds_are_proved_narrow_and_positive_exactly_with_closure(norm):
         assert found.verify()
         assert (found.lower > 0.0) == closed
         assert found.lower <= found.upper
-        assert found.upper - found.lower <= module.GAP * abs(found.upper) + 1e-9
+        assert found.upper - found.lower <= module.QUALITY_GAP * abs(found.upper) + 1e-9
         if not closed and norm == "l1":
             assert found.upper < 0.0
         seen[closed] += 1

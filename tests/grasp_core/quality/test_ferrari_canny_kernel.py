@@ -31,15 +31,15 @@ def test_symmetric_contacts_with_ties_everywhere_are_proved(monkeypatch, positio
 
 def test_the_finest_gap_is_reached():
     found = gc.ferrari_canny(
-        TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0, gap=module.FINEST_GAP
+        TETRA_CENTERS, TETRA_NORMALS, 0.3, torque_scale=1.0, gap=module.FINEST_QUALITY_GAP
     )
-    assert found.upper - found.lower <= module.FINEST_GAP * found.upper
+    assert found.upper - found.lower <= module.FINEST_QUALITY_GAP * found.upper
     assert found.verify()
 
 
 def spoiled(status=None, change=None):
     """The kernel with another status or with other forces, corners, normals and direction."""
-    kernel = compiled(module.KERNEL)
+    kernel = compiled(module.QUALITY_KERNEL)
 
     def grow(*args):
         true_status, *answer = kernel.grow(*args)
@@ -51,9 +51,9 @@ def spoiled(status=None, change=None):
 
 
 WRONG_ANSWERS = {
-    "fell apart": spoiled("LOST"),
-    "called flat": spoiled("FLAT", lambda f, c, n, y: (f[:0], c[:0], n[:0], 0.0 * y)),
-    "called outside": spoiled("OUTSIDE"),
+    "fell apart": spoiled("BROKEN_HULL"),
+    "called flat": spoiled("IN_A_PLANE", lambda f, c, n, y: (f[:0], c[:0], n[:0], 0.0 * y)),
+    "called outside": spoiled("ZERO_OUTSIDE"),
     "a simplex is missing": spoiled(None, lambda f, c, n, y: (f, c[1:], n[1:], y)),
     "a simplex is doubled": spoiled(
         None, lambda f, c, n, y: (f, np.vstack([c, c[:1]]), np.vstack([n, n[:1]]), y)
@@ -78,7 +78,7 @@ def test_wrong_polytopes_prove_nothing_and_the_bounds_stay_true(monkeypatch, ker
     found = gc.ferrari_canny(*contacts, torque_scale=1.0)
     assert found.polytope is None
     assert -NEAR <= found.lower <= 0.0
-    assert expected.upper * (1.0 - module.GAP) <= found.upper
+    assert expected.upper * (1.0 - module.QUALITY_GAP) <= found.upper
     assert found.verify()
 
 

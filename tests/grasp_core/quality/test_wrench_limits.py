@@ -7,7 +7,7 @@ import pytest
 import grasp_core as gc
 from grasp_core.quality import wrench_limits
 from grasp_core.quality.wrench_limits import (
-    SETTLED,
+    LEAST_GAIN,
     WrenchBody,
     axis_wrenches,
     limit_of,
@@ -74,7 +74,7 @@ def test_the_weakest_wrench_is_proved_and_weaker_than_axes_and_random_wrenches()
             assert weakest.limit <= min(limits) * (1 + 1e-6)
             facing = -weakest.facet * scale**2
             facing = limit_of(resisted, facing / np.linalg.norm(facing / scale)).limit
-            assert weakest.limit * (1.0 - SETTLED) <= facing <= weakest.limit * (1.0 + 1e-6)
+            assert weakest.limit * (1.0 - LEAST_GAIN) <= facing <= weakest.limit * (1.0 + 1e-6)
             every = gc.ferrari_canny(
                 grasp, friction=0.3, center=body.center_of_mass, torque_scale=body.radius,
                 norm="linf",

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import grasp_core as gc
 from grasp_core.geometry.polygons import plane_frame
 from grasp_core.planning.given_contacts import grasp_of, seat
-from grasp_core.regions.placement import REACH, _chances_beyond, _limits
+from grasp_core.regions.placement import LARGEST_DEVIATIONS, _chances_beyond, _limits
 from scenes import example_object
 from tests.placements import met, share_closed
 
@@ -71,7 +71,10 @@ def test_series_are_above_the_exact_motions():
         there = (
             (np.linalg.norm(moves[:, 3:], axis=1) <= off.turn)
             & (np.linalg.norm(e, axis=1) <= found.shift)
-            & (np.linalg.norm(moves[:, :3], axis=1) <= REACH * np.linalg.norm(off.root[:3], 2))
+            & (
+                np.linalg.norm(moves[:, :3], axis=1)
+                <= LARGEST_DEVIATIONS * np.linalg.norm(off.root[:3], 2)
+            )
         )
         for values in exact:
             series = u @ g[row] + np.einsum("ni,ij,nj->n", u, H[row], u)

@@ -10,7 +10,7 @@ import pytest
 import grasp_core as gc
 import scenes
 from grasp_core.regions.certify_regions import certify_regions
-from grasp_core.regions.proof import EDGES, LEAF, TwistCover
+from grasp_core.regions.proof import EDGES, UNDIVIDED, TwistCover
 from tests.grasp_core.exact_judges import exactly
 
 SMALL = 1_000
@@ -33,9 +33,9 @@ def random_tree(rng, cuts):
     codes, width = [], 64
     while width:
         cut = rng.random(width) < 0.5 if len(codes) < cuts else np.zeros(width, dtype=bool)
-        codes += np.where(cut, rng.integers(len(EDGES), size=width), LEAF).tolist()
+        codes += np.where(cut, rng.integers(len(EDGES), size=width), UNDIVIDED).tolist()
         width = 2 * int(cut.sum())
-    leaves = codes.count(LEAF)
+    leaves = codes.count(UNDIVIDED)
     axes = rng.normal(size=(6, 6))
     return TwistCover(axes, codes, np.tile([1.0, 0.0, 0.0], (leaves, 4, 1)))
 
@@ -73,7 +73,7 @@ def test_a_cover_holds_in_rational_arithmetic():
                   for s in range(64))  # fmt: skip
     while cones:
         cone, code = cones.popleft(), next(codes)
-        if code < LEAF:
+        if code < UNDIVIDED:
             for end in EDGES[code]:
                 cones.append(cone.copy())
                 cones[-1][end] = cone[EDGES[code][0]] + cone[EDGES[code][1]]
@@ -164,7 +164,7 @@ def test_a_cover_with_a_hole_is_refused(proved):
     assert not dataclasses.replace(proved, cover=cut).verify()
     more = dataclasses.replace(
         cover,
-        codes=np.append(cover.codes, LEAF),
+        codes=np.append(cover.codes, UNDIVIDED),
         forces=np.vstack([cover.forces, cover.forces[:1]]),
     )
     assert not dataclasses.replace(proved, cover=more).verify()

@@ -119,9 +119,9 @@ def test_numbers_that_are_none_are_an_error():
 
 def kernel_rows(A, b, equalities=0):
     """A program as compiled code wants it."""
-    simplex = compiled(lp.KERNEL)
+    simplex = compiled(lp.LP_KERNEL)
     A, b = np.asarray(A, dtype=float), np.asarray(b, dtype=float)
-    rows = simplex.Rows(np.array(A.T, order="C"), b, equalities)
+    rows = simplex.LpRows(np.array(A.T, order="C"), b, equalities)
     return simplex, rows
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import nnls
 
 from grasp_core.compiled import compiled
-from grasp_core.solvers.qp import KERNEL, NEAREST, least_distance
+from grasp_core.solvers.qp import NEAREST, NEAREST_POINT_KERNEL, least_distance
 
 NEAR = 1e-9
 CLOSE = 1e-10
@@ -64,7 +64,7 @@ def test_where_nothing_is_feasible_no_point_is_found():
 
 def test_without_variables_rows_hold_or_nothing_is_found():
     assert least_distance(np.empty((3, 0)), np.ones(3)).shape == (0,)
-    kernel, none = compiled(KERNEL), np.empty(0)
+    kernel, none = compiled(NEAREST_POINT_KERNEL), np.empty(0)
     assert kernel.nearest(np.empty((3, 0)), -np.ones(3), none) == (np.inf, np.inf)
 
 
@@ -72,7 +72,7 @@ def test_without_variables_rows_hold_or_nothing_is_found():
 @pytest.mark.parametrize("which", ["point", "multipliers"])
 def test_wrong_answers_are_not_taken(factor, which):
     """The kernel scales polyhedra so that their farthest row is at one, as these are."""
-    missed, kernel = compiled(KERNEL)._unmet, compiled(KERNEL)
+    missed, kernel = compiled(NEAREST_POINT_KERNEL)._unmet, compiled(NEAREST_POINT_KERNEL)
     for C, D, _ in polyhedra(12):
         for d in D[D.min(axis=1) < 0.0]:
             x, d = np.empty(C.shape[1]), d / -d.min()

@@ -47,7 +47,12 @@ def test_a_plan_shows_four_fingers_and_no_figure_that_was_put_off(plan, monkeypa
 
 
 def test_a_plan_without_grasps_says_why():
-    plan = gc.plan(scenes.example_object("box"), 0.5, families=("concurrent",), cones="normal")
+    plan = gc.plan(
+        scenes.example_object("box"),
+        0.5,
+        families=("concurrent",),
+        settings=gc.PlanSettings(cones="normal"),
+    )
     assert read(plan)[1] == [plan.absence]
 
 

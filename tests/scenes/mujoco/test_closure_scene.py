@@ -16,7 +16,7 @@ SINGLE = 4e-8
 @pytest.fixture(params=OBJECTS, scope="module")
 def held(request):
     body = scenes.example_object(request.param)
-    grasp = gc.plan(body, 0.5, limit=1, cones="normal").grasps[0]
+    grasp = gc.plan(body, 0.5, limit=1, settings=gc.PlanSettings(cones="normal")).grasps[0]
     scene = scenes.build_scene(body, grasp, 0.5)
     return body, grasp, scene, compiled(scene)[0]
 

@@ -18,7 +18,7 @@ FLAG = ' speculative="disable"'
 def text_under(monkeypatch):
     """A function that writes a scene as under a version of MuJoCo."""
     body = scenes.example_object("wedge")
-    grasp = gc.plan(body, 0.5, limit=1, cones="normal").grasps[0]
+    grasp = gc.plan(body, 0.5, limit=1, settings=gc.PlanSettings(cones="normal")).grasps[0]
 
     def written(version):
         monkeypatch.setattr(version_gaps, "versions", lambda: {"mujoco": version})

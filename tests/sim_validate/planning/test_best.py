@@ -64,8 +64,8 @@ def test_planned_grasps_are_written_where_no_best_one_is_found(tmp_path, monkeyp
 def test_an_object_that_no_best_grasp_can_be_searched_on_is_refused_before_it_is_planned(
     monkeypatch, capsys
 ):
-    monkeypatch.setattr("grasp_core.optimizing.contact_places.MOST_PIECES", 3)
-    monkeypatch.setattr("sim_validate.planning.plan.search_plan", None)
+    monkeypatch.setattr("grasp_core.optimizing.contact_places.MOST_POLYGONS", 3)
+    monkeypatch.setattr("sim_validate.planning.plan.search_grasps", None)
     assert main(ASKED) == Exit.INPUT
     assert "1 to 3 convex pieces" in capsys.readouterr().err
 

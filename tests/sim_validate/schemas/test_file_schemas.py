@@ -208,7 +208,7 @@ def test_files_of_flags_are_known_by_their_commands(tmp_path):
 
 def test_every_flag_has_a_meaning():
     silent = [
-        (name, key) for name in KINDS if name.endswith("-flags")
+        (name, key) for name in FILE_KINDS if name.endswith("-flags")
         for key, each in schema_of(name)["properties"].items()
         if not each.get("description") and "properties" not in each
     ]  # fmt: skip
