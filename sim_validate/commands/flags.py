@@ -84,7 +84,7 @@ class Spoken(Settings):
 class MeshFlags(Settings):
     """How a mesh file is read."""
 
-    lengths: Annotated[Lengths, BARE] = field(default_factory=Lengths)
+    lengths: Annotated[FileLengths, BARE] = field(default_factory=FileLengths)
     choices: Annotated[MeshChoices, BARE] = field(default_factory=MeshChoices)
     center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass in the file's frame, in metres. If not given, it is that of uniform density,
@@ -257,7 +257,7 @@ class TransferFlags(Spoken):
     ))]  # fmt: skip
     carrying: Annotated[Carrying, BARE] = field(default_factory=Carrying)
     friction: AtFriction = None
-    lengths: Annotated[Lengths, BARE] = field(default_factory=Lengths)
+    lengths: Annotated[FileLengths, BARE] = field(default_factory=FileLengths)
     center_of_mass_m: Annotated[Vector | None, arg(metavar="X Y Z")] = None
     """Centre of mass of the changed part in the file's frame, in metres; if not given, that of
     uniform density, or the old part's if that was given."""

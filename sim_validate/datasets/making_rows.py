@@ -12,6 +12,7 @@ from grasp_core.errors import InputError, UnfaithfulError
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.planning.given_contacts import grasp_of, seat
 from grasp_core.planning.planner import plan
+from grasp_core.planning.settings import PlanSettings
 from grasp_core.values import Contact, Grasp
 from sim_validate.closure.controls import Control, ControlTrial, ControlVerdict, try_control
 from sim_validate.closure.validate import tested
@@ -141,10 +142,11 @@ class Making:
         """Plan the best grasps of each family separately, and simulate them."""
         config = self.config
         for family in config.families:
-            planned = plan(
-                self.body, self.unit.friction, families=(family,), cones=config.cones,
-                limit=config.limit, seed=config.seed,
+            wanted = PlanSettings(
+                self.unit.friction, (family,), cones=config.cones, limit=config.limit,
+                seed=config.seed,
             )  # fmt: skip
+            planned = plan(self.body, settings=wanted)
             for grasp in planned.grasps:
                 cells: RowCells = {
                     "grasp_id": self._name(grasp.id), "name": grasp.id,

@@ -23,7 +23,7 @@ from grasp_core.files.json_text import object_of
 from grasp_core.files.records import Record, from_record, record_of
 from grasp_core.kinds import one_of, path_of
 from grasp_core.mesh_files.limits import MeshChoices
-from grasp_core.mesh_files.reading import MeshFile, read_triangles
+from grasp_core.mesh_files.reading import FileSurface, read_triangles
 from grasp_core.objects.build import DEFAULT_LIMITS, content_hash
 from grasp_core.objects.polyhedron import Polyhedron, polyhedron_from_mesh
 from grasp_core.objects.surface import Surface
@@ -40,7 +40,7 @@ from sim_validate.datasets.config import (
 from sim_validate.datasets.manifest import Manifest, path_inside, read_manifest
 from sim_validate.datasets.parquet import Columns, Tables, each_batch, read_columns
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.planning.asked_objects import NAMED, some
+from sim_validate.planning.asked_objects import NAMES_LISTED, some
 
 CONFIG = "config.toml"
 

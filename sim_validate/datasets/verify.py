@@ -540,7 +540,7 @@ def _hand_faults(row: GraspRow, hand: Hand, body: Polyhedron) -> Iterator[str]:
         ),
         "T_object_palm_m is not a rigid motion": (
             np.abs(turn @ turn.T - np.eye(3)).max() <= POSE_ROUNDING and np.linalg.det(turn) > 0.0
-            and pose[3].tolist() == np.eye(POSE)[3].tolist()
+            and pose[3].tolist() == np.eye(POSE_SIZE)[3].tolist()
         ),
         "hand_approach is not of unit length": (
             way is None or abs(np.linalg.norm(way) - 1.0) <= POSE_ROUNDING

@@ -323,10 +323,10 @@ def test_help_on_a_command_shows_examples_that_can_be_typed(asked, capsys, words
     [
         ("plan", "--rank-by", get_args(RankBy)), ("run", "--rank-by", get_args(RankBy)),
         ("plan", "{ferrari-canny,weight,task}", ("Ferrari-Canny", "weight", "task")),
-        ("plan", "STR", FORMATS),
+        ("plan", "STR", MESH_FORMATS),
         ("inspect", "--picture", PICTURE_TYPES), ("view", "--picture", PICTURE_TYPES),
         ("view", "--page", PAGE_TYPES), ("view", "--clip", CLIP_TYPES),
-        ("transfer", "part,", FORMATS),
+        ("transfer", "part,", MESH_FORMATS),
         ("hand", "STR", HANDS), ("reach", "--hand", HANDS),
         ("export", "--to", get_args(GraspFormat)),
         ("export", "--out", [ends[0] for ends in EXPORT_ENDINGS.values()]),
