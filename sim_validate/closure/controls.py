@@ -31,9 +31,10 @@ from grasp_core.kinds import FLAT, Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertips import clashes, fitting_radius
-from sim_validate.engine.limits_and_friction import Rig, squeezed
+from sim_validate.engine.rig import Rig, squeezed
+from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Agenda, Setup
-from sim_validate.engine.simulate import Bench, Load
+from sim_validate.engine.stepping import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace, judge
 
 FRICTION_SHARE = 0.9
@@ -183,7 +184,7 @@ class ControlVerdict(Declared):
 def try_control(body: Polyhedron, control: Control, agenda: Agenda, setup: Setup) -> ControlVerdict:
     """Simulate a negative control under the loads that it must not hold."""
     rig, loads = control_case(body, control, setup)
-    traces = rig.hold([each.load for each in loads], [each.settling for each in loads])
+    traces = rig.traced(rig.holds([each.load for each in loads], [each.settling for each in loads]))
     layout = rig.bench.scene.layout
     tried = tuple(
         ControlTrial(

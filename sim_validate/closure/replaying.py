@@ -26,11 +26,13 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertips import clashes
 from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
-from sim_validate.closure.validate import OPEN, disturbed, for_repeats, noisy_case, untouching
+from sim_validate.closure.validate import OPEN, for_repeats, noisy_case, off_faces
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
-from sim_validate.engine.limits_and_friction import Analysis, PlannedLoad, Rig, Watched, closed_on
+from sim_validate.engine.misplacement import disturbed
+from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
+from sim_validate.engine.rig import Rig, Watched, closed_on
+from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.simulate import Load
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
 from sim_validate.planning.asked_objects import grasp_with_id, some
 
@@ -185,12 +187,13 @@ def replayed(recorded: Recorded, wrench: str | None = None) -> Replayed:
         known = ", ".join(limits)
         raise InputError(f"{recorded.name}: no wrench is named {name!r}; choose from {known}")
     settling = [held.settling] if isinstance(held, ControlLoad) else None
-    watched = rig.watch(held.load, settling)
+    trials = rig.holds([held.load], settling)
+    watched = rig.watch(trials[0])
     layout = rig.bench.scene.layout
     amiss = clashes(recorded.body, *stacked(landed), layout.drive.radius_m) if landed else ()
     if recorded.grasp is not None and recorded.trial is None:
-        amiss = amiss or untouching(rig.bench, recorded.body, recorded.grasp)
-    (ended,) = rig.hold([held.load], settling)
+        amiss = amiss or off_faces(rig.bench, recorded.body, recorded.grasp)
+    (ended,) = rig.traced(trials)
     return Replayed(
         name=name,
         load=held.load,
@@ -211,7 +214,7 @@ def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
         return _opened(body, recorded.control, contacts, friction, setup)
     scene = setup.scene(body, recorded.grasp or contacts, friction)
     rig = closed_on(scene, setup, friction)
-    planned = Analysis(body, contacts, friction, setup, None).planned(rig.idle, recorded.agenda)
+    planned = LoadPlanner(body, contacts, friction, setup, None).planned(rig.idle, recorded.agenda)
     if recorded.trial is None or recorded.grasp is None:
         return rig, planned, contacts
     setup, agenda = for_repeats(setup, scene), recorded.agenda

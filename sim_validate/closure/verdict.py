@@ -25,11 +25,12 @@ from grasp_core.kinds import FLAT, Friction, Measured, OrInfinity, path_of
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
-from scenes.mujoco.closure_scene import FingerDrive, Scene
+from scenes.mujoco.closure_scene import FingerDrive, Layout, Scene
 from sim_validate.closure.controls import ControlVerdict
-from sim_validate.engine.gate import Gate
-from sim_validate.engine.limits_and_friction import CriticalFriction, SimulatedLimit
+from sim_validate.engine.known_cases import Gate
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
+from sim_validate.engine.simulated_friction import CriticalFriction
+from sim_validate.engine.simulated_limits import SimulatedLimit
 from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
 from sim_validate.kit.files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
@@ -169,7 +170,7 @@ ROWS = 8
 
 
 @declared
-class Scale(Declared):
+class TrialScale(Declared):
     """The sizes with which the trials of a grasp were simulated."""
 
     grasp_size_m: float
@@ -180,6 +181,11 @@ class Scale(Declared):
     """Mass of the object, not its own: it is chosen so that similar grasps behave alike [kg]."""
     object_inertia_kg_m2: Annotated[Array, Shape(3, 3)]
     fingers: FingerDrive
+
+    @classmethod
+    def of(cls, body: Polyhedron, at: Layout) -> Self:
+        """Take the sizes from the layout of a scene."""
+        return cls(at.grasp_size_m, body.radius, at.object_kg, at.inertia_kg_m2, at.drive)
 
 
 PREDICTED = Compared(more, analysed=True, friction=True)
@@ -214,7 +220,7 @@ class Verdict(HoldsWrenches, InNotebooks):
     """How often the grasp holds with noise, if asked for."""
     setup: Setup
     agenda: Agenda
-    scale: Scale
+    scale: TrialScale
     gate: Annotated[Gate | None, UNRECORDED] = field(default=None, compare=False)
     """How the simulator did on cases with known answers; a file has it once, for all verdicts."""
     scene: Annotated[Scene | None, UNRECORDED] = field(default=None, compare=False)

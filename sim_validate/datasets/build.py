@@ -83,7 +83,8 @@ from sim_validate.datasets.work_units import (
     units_of,
     units_sha256,
 )
-from sim_validate.engine.gate import require_faithful
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import Setup
 from sim_validate.kit.files import alone_in, path_inside, whole_folder
 from sim_validate.kit.locks import entries
@@ -384,7 +385,7 @@ def build(
             shutil.rmtree(staging.of(unit), ignore_errors=True)  # its files are damaged
         for friction in config.frictions if left else ():
             # a gate that fails at one object's size only leaves that object out
-            require_faithful(Setup(), friction)
+            checked(ClosureCase.of(Setup(), friction))
         drive(left, staging, engine, report, timeout_s)
         _finish(config, units, staging, folder)
         return _as_built(folder, units, len(left))

@@ -69,7 +69,8 @@ from grasp_core.figures import Shown
 from grasp_core.kinds import Measured
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.closure_scene import Layout, grasp_size
-from sim_validate.engine.simulate import Health, Motion, Schedule
+from sim_validate.engine.schedules import Schedule, Thresholds
+from sim_validate.engine.stepping import Health, Motion
 from sim_validate.settings import HoldProtocol
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -315,16 +316,6 @@ WATCHED = 3
 must slip begins to in the first step."""
 SAME = 1e-6
 """Difference of two sizes that is rounding, relative to them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """Displacements that answer a trial [m]."""
-
-    watched_m: float
-    """Displacement since friction was lowered."""
-    total_m: float = math.inf
-    """Displacement from the planned pose to the start, and that since then."""
 
 
 class EarlyEnds:

@@ -40,8 +40,7 @@ from sim_validate.kit import simulation_flags
 from sim_validate.kit.console import TABLE_ROWS, Reporter, warn_of
 from sim_validate.kit.exit_codes import Exit, FlagsError
 from sim_validate.kit.files import AboutObject, alone_in, remove_results
-from sim_validate.kit.simulation_flags import Run
-from sim_validate.planning.asked_objects import asked_finger, asked_grasps, grasp_with_id
+from sim_validate.planning.asked_objects import asked_grasps, grasp_with_id
 from sim_validate.settings import ChosenExecution, ExecutionSettings, Holding
 
 EXPLAINED = ("load_multiple", "payload_kg", "least_predicted_loss")
@@ -176,20 +175,12 @@ def execution_settings(
     return extended(ExecutionSettings, holding(given, body, finger), seed=seed)
 
 
-def check_executing(command: Run) -> None:
+def refuse_executing(executing: ChosenExecution) -> None:
     """Refuse flags about executions where none are asked for, before any file is read."""
-    if not command.execute and command.executing != ChosenExecution():
+    if executing != ChosenExecution():
         raise FlagsError(
             "the flags from --mass-kg to --max-deg say how grasps are executed: add --execute too"
         )
-
-
-def execution_of_run(command: Run, body: Polyhedron) -> ExecutionSettings | None:
-    """Build the settings of the executions that `run` is asked for; None if it is not."""
-    if not command.execute:
-        return None
-    planning = command.planning
-    return execution_settings(command.executing, body, planning.seed, asked_finger(planning))
 
 
 TextOf = Callable[[Grasp], str]

@@ -40,7 +40,7 @@ from grasp_core.errors import InputError
 from grasp_core.execution.first_slip import slip_steps
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, hinged, palm_armature
 from scenes.mujoco.mjcf_text import rotations
-from sim_validate.engine.simulate import FREE, PALM, Bench, Health, Motion, Told
+from sim_validate.engine.stepping import FREE, PALM, Bench, Health, Motion, Told
 from sim_validate.execution.paths import WHOLE, Drive, Rows, closing
 
 KEPT = ("qvel", "qfrc_constraint", "state")

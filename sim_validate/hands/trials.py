@@ -71,17 +71,14 @@ from scenes.mujoco.held_scene import HeldScene
 from scenes.settings import FingerSettings
 from sim_validate.closure.validate import held_wrenches
 from sim_validate.closure.verdict import HoldsWrenches, WrenchVerdict
-from sim_validate.engine.gate import Check, measured, require_faithful, two_digits
-from sim_validate.engine.limits_and_friction import (
-    Analysis,
-    PlannedLoad,
-    closed_on,
-    part,
-    ramped_limits,
-    squeezed,
-)
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import Check, checked, two_digits
+from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
+from sim_validate.engine.rig import closed_on, squeezed
+from sim_validate.engine.schedules import Load, part
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
-from sim_validate.engine.simulate import Bench, Load
+from sim_validate.engine.simulated_limits import ramped_limits
+from sim_validate.engine.stepping import Bench
 from sim_validate.engine.traces import LET_GO, HoldVerdict, judge
 from sim_validate.execution.execute import asked_settings, execution_of, result_of
 from sim_validate.execution.predictions import Holder
@@ -122,7 +119,7 @@ class HandControl(Declared):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HandCase(Analysis):
+class HandCase(LoadPlanner):
     """A hand's contacts and motors, from which its controls are made."""
 
     motors: Motors
@@ -212,7 +209,7 @@ class KnownHand:
 def require_faithful_hands(setup: Setup, friction: float) -> tuple[Check, ...]:
     """Check the simulator on the known hand, and refuse settings under which a check fails."""
     plain = replace(setup, threads=1, timeout_s=math.inf)
-    return measured(KnownHand(plain, two_digits(friction))).require("no hand is simulated").checks
+    return checked(KnownHand(plain, two_digits(friction))).checks
 
 
 def cube() -> Polyhedron:
@@ -254,7 +251,7 @@ def _limits(
         "against one finger": (np.eye(6)[0], (1.0 + 2.0 * friction) * press),
     }
     rig = closed_on(scene, setup, friction)
-    resisted = Analysis(body, reach.contacts or (), friction, setup, scene.hand.motors).resisted
+    resisted = LoadPlanner(body, reach.contacts or (), friction, setup, scene.hand.motors).resisted
     loads = [
         Load(size * wrench, limit_of(resisted, wrench).forces) for wrench, size in exact.values()
     ]
@@ -400,7 +397,7 @@ def validate_hand(
     contacts = stance_of(hand, reach).contacts
     if not force_closure(contacts, friction=friction).closed:
         raise InputError(f"the contacts of {reach.grasp} are not in force closure at {friction}")
-    gate = require_faithful(setup, friction, body.radius)
+    gate = checked(ClosureCase.of(setup, friction, body.radius))
     checks = (*gate.checks, *require_faithful_hands(setup, friction))
     layout, high = scene.layout, setup.hold.settling_friction * friction
     rig = closed_on(scene, setup, layout.friction, high)
@@ -426,7 +423,7 @@ def _held(
     """Hold what a control must let go of, after the high friction of the grasp itself."""
     weak = scene.limited(control.limits, control.friction)
     rig = closed_on(weak, setup, weak.layout.friction, high)
-    (trace,) = rig.hold([part(rig.idle, limit, control.share)], [high])
+    (trace,) = rig.traced(rig.holds([part(rig.idle, limit, control.share)], [high]))
     return judge(trace, scene.layout, setup.hold)
 
 

@@ -29,7 +29,7 @@ COMMANDS: Mapping[str, Command] = {
         "closure.",
     ),
     "validate": Command(
-        "kit.simulation_flags:Validate", "protocols.command:judge_file",
+        "kit.simulation_flags:Validate", "protocols.command:validate_file",
         "Simulate the grasps of a file in MuJoCo, with negative controls: contacts that must "
         "fail.",
     ),

@@ -34,10 +34,13 @@ from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.published_tests import TestedObject, TestedScene
 from scenes.mujoco.scene_text import Slides
-from sim_validate.engine.gate import misplaced, require_faithful
-from sim_validate.engine.limits_and_friction import Analysis, closed_on
+from sim_validate.engine.gate import ClosureCase
+from sim_validate.engine.known_cases import checked, untouching
+from sim_validate.engine.planned_loads import LoadPlanner
+from sim_validate.engine.rig import closed_on
+from sim_validate.engine.schedules import samples
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.simulate import Bench, Motion, Told, samples
+from sim_validate.engine.stepping import Bench, Motion, Told
 from sim_validate.engine.traces import Outcome, judge, rotation_angles
 from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
@@ -78,10 +81,10 @@ def judge_by(
     setup = Setup() if setup is None else instance(setup, Setup, "setup")
     contacts = given_contacts(body, grasp)
     given = grasp if isinstance(grasp, Grasp) else contacts
-    require_faithful(setup, friction, body.radius)
+    checked(ClosureCase.of(setup, friction, body.radius))
     scene = _tested(found, body).by_fingertips(given, setup.fingers)
     ours = our_verdict(
-        Analysis(body, contacts, friction, setup, None), found.forces(scene.mass_kg),
+        LoadPlanner(body, contacts, friction, setup, None), found.forces(scene.mass_kg),
         partial(setup.scene, body, given, friction),
     )  # fmt: skip
     return _judged(
@@ -171,11 +174,11 @@ def _ours(
     """Judge a hand by our trials; contacts that were proved open need none."""
     if isinstance(reach, RecordedReach) and not reach.reached:
         return OurVerdict(False, False, 0.0, reach.explanation)
-    require_faithful(setup, friction, body.radius)
+    checked(ClosureCase.of(setup, friction, body.radius))
     require_faithful_hands(setup, friction)
     held = build_hand_scene(hand, body, reach, friction, physics=setup.physics)
     contacts = stance_of(hand, reach).contacts
-    analysis = Analysis(body, contacts, friction, setup, held.hand.motors)
+    analysis = LoadPlanner(body, contacts, friction, setup, held.hand.motors)
     return our_verdict(analysis, forces, lambda: held)
 
 
@@ -187,7 +190,7 @@ def _protocol(given: str | PublishedProtocol) -> PublishedProtocol:
 
 
 def our_verdict(
-    analysis: Analysis, forces: Sequence[Array], scene: Callable[[], Scene]
+    analysis: LoadPlanner, forces: Sequence[Array], scene: Callable[[], Scene]
 ) -> OurVerdict:
     """Predict the least multiple of forces [N] that contacts resist, and hold the forces."""
     setup, friction = analysis.setup, analysis.friction
@@ -203,9 +206,9 @@ def our_verdict(
     loads = analysis.as_they_are(rig.idle, named)
     margin = min((load.predicted_limit for load in loads), default=math.inf)
     held = [load.load for load in loads] or [rig.idle]
-    amiss = misplaced(rig.bench) if isinstance(rig.bench.scene.layout.holder, Slides) else ()
+    amiss = untouching(rig.bench) if isinstance(rig.bench.scene.layout.holder, Slides) else ()
     names = [load.name for load in loads] or ["no load"]
-    for name, trace in zip(names, rig.hold(held), strict=True):
+    for name, trace in zip(names, rig.traced(rig.holds(held)), strict=True):
         found = judge(trace, rig.bench.scene.layout, setup.hold, amiss)
         if found.outcome is not Outcome.HELD:
             return OurVerdict(True, False, margin, f"{name}: {found.outcome.value}: {found.reason}")

@@ -11,9 +11,10 @@ import scenes
 from grasp_core.closure.contacts import contact_frictions
 from grasp_core.planning.given_contacts import Seated, grasp_of
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from sim_validate.engine.limits_and_friction import squeezed
+from sim_validate.engine.rig import squeezed
+from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Setup
-from sim_validate.engine.simulate import Bench, Load
+from sim_validate.engine.stepping import Bench
 
 MAX_FORCE = 10.0
 

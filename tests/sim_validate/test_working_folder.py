@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from sim_validate.engine.simulate import compiled
+from sim_validate.engine.stepping import compiled
 from sim_validate.kit.exit_codes import Exit
 from sim_validate.main import main
 from tests.scenes.meshes import box_obj
