@@ -36,8 +36,8 @@ from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.fingertips import fitting_radius
-from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText, placed
-from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.mjcf_text import FINGERTIPS, IDENTITY_POSE, SceneText, placed
+from scenes.mujoco.scene_text import TOUCH, SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import HARD, FingerSettings, PhysicsSettings, Softness, Surface
 
@@ -244,7 +244,7 @@ def _keys(layout: Layout) -> dict[str, dict[str, Array]]:
         "squeeze": (np.zeros(len(away)), push / SQUEEZE),
     }
     return {
-        name: {"qpos": np.concatenate([HOME, place]), "ctrl": commands}
+        name: {"qpos": np.concatenate([IDENTITY_POSE, place]), "ctrl": commands}
         for name, (place, commands) in told.items()
     }
 

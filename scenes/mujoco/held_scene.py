@@ -30,8 +30,8 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
-from scenes.mujoco.mjcf_text import FINGERTIPS, SceneText
-from scenes.mujoco.scene_text import HOME, TOUCH, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.mjcf_text import FINGERTIPS, IDENTITY_POSE, SceneText
+from scenes.mujoco.scene_text import TOUCH, SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import SAMPLE_S, HeldSettings, PhysicsSettings
 
@@ -298,7 +298,7 @@ def build_held_scene(
 def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
     """Write the MJCF text of a held object; equal layouts give equal texts."""
     told = layout.commands(np.ones((1, len(layout.contacts))), None)[0]
-    rest = np.concatenate([HOME, np.zeros(6 + len(told))])
+    rest = np.concatenate([IDENTITY_POSE, np.zeros(6 + len(told))])
     return scene_text(
         SceneContent(
             comment=TRUE_MASS,

@@ -25,6 +25,9 @@ FINGERTIPS, TABLE, SHAPES = 1, 2, 1 << 20
 """Bits of what fingertips touch, of what a table does, and of what the shapes of links may touch
 besides."""
 ORIGIN = (0.0, 0.0, 0.0)
+IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+"""Position and quaternion of a body that is where its scene has put it, (7,)."""
+IDENTITY_POSE.setflags(write=False)
 FREE = {"pos": ORIGIN, "limited": "false", "damping": 0.0, "stiffness": 0.0, "armature": 0.0,
         "frictionloss": 0.0}  # fmt: skip
 """Attributes of a joint that moves freely."""

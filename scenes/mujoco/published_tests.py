@@ -26,8 +26,8 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.chains import Chains, Weld, hand_inertials
 from scenes.mujoco.closure_scene import SQUEEZE, arrange
 from scenes.mujoco.hand_scenes import build_hand_scene
-from scenes.mujoco.mjcf_text import FINGERTIPS, SHAPES, SceneText, quaternion
-from scenes.mujoco.scene_text import HOME, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.mjcf_text import FINGERTIPS, IDENTITY_POSE, SHAPES, SceneText, quaternion
+from scenes.mujoco.scene_text import SceneContent, SceneObject, Slides, scene_text
 from scenes.mujoco.surface import touched_solids
 from scenes.settings import FingerSettings, PhysicsSettings
 
@@ -190,7 +190,7 @@ class TestedObject:
         )
         rubbing, opened = physics.rubbing(self.friction), told["opened"]
         pose = 7 if isinstance(holder, Chains) and holder.weld is not None else 0
-        key = {"qpos": np.concatenate([HOME, opened]), "ctrl": opened[pose:]}
+        key = {"qpos": np.concatenate([IDENTITY_POSE, opened]), "ctrl": opened[pose:]}
         moved = {"mpos": opened[:3], "mquat": opened[3:7]} if pose else {}
         content = SceneContent(
             comment=COMMENT, held=held, physics=physics, rubbing=rubbing, holder=holder,

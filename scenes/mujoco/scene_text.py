@@ -62,8 +62,6 @@ would arrive with speed, and one that is much deeper is pushed out, which turns 
 others hold and it hardly presses."""
 TOUCHED = {"conaffinity": 0, "mass": 0.0, "group": 2, "rgba": (0.9, 0.6, 0.2, 0.3)}
 """Attributes of a solid that fingertips touch, shown as glass of another colour."""
-HOME = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-"""Joint position of the object where the scene has put it."""
 AWAY = 100.0
 """Distance of the table until it is needed, in object radii."""
 PALM = ("x", "y", "z", "about_x", "about_y", "about_z")

@@ -22,6 +22,7 @@ from grasp_core.figures import Compared, Shown, figure, less, more
 from grasp_core.files.file_kinds import VERDICTS
 from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import FLAT, Friction, Measured, OrInfinity, path_of
+from grasp_core.messages import MICRO
 from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact
@@ -31,7 +32,7 @@ from sim_validate.engine.known_cases import Gate
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.simulated_friction import CriticalFriction
 from sim_validate.engine.simulated_limits import SimulatedLimit
-from sim_validate.engine.traces import LET_GO, MICRO, HoldVerdict, Outcome, Trace
+from sim_validate.engine.traces import LET_GO, HoldVerdict, Outcome, Trace
 from sim_validate.kit.files import AboutGrasps, AboutObject
 from sim_validate.settings import Noise
 

@@ -18,6 +18,7 @@ from grasp_core.arrays import Array
 from grasp_core.declared import Declared, declared
 from grasp_core.errors import UnfaithfulError
 from grasp_core.kinds import Measured, OrInfinity
+from grasp_core.messages import MILLI
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.provenance import versions
 from scenes.example_objects import example_object
@@ -130,7 +131,7 @@ def untouching(bench: Bench[Scene], edges_m: Sequence[float] = ()) -> tuple[str,
     normals, _ = bench.touched(bench.scene.layout.holder.tip_names, one=False)
     turned, found = angles(normals, bench.scene.layout.frames[:, :, 0]), list[str]()
     for finger in np.flatnonzero(~(turned <= NORMAL_ERROR)).tolist():
-        edge = f", {1e3 * edges_m[finger]:.3g} mm from an edge of its face," if edges_m else ""
+        edge = f", {MILLI * edges_m[finger]:.3g} mm from an edge of its face," if edges_m else ""
         fault = (
             "no contact is found; the mesh, flat only to its digits, may lie deeper there"
             if math.isnan(turned[finger])

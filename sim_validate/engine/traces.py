@@ -67,16 +67,15 @@ from grasp_core.closure.contacts import cross_matrix, normal_and_tangential
 from grasp_core.declared import Declared, declared
 from grasp_core.figures import Shown
 from grasp_core.kinds import Measured
+from grasp_core.messages import MICRO, MILLI
 from grasp_core.objects.on_faces import within
 from scenes.mujoco.closure_scene import Layout, grasp_size
+from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from sim_validate.engine.schedules import Schedule, Thresholds
 from sim_validate.engine.stepping import Health, Motion
 from sim_validate.settings import HoldProtocol
 
 Mask: TypeAlias = NDArray[np.bool_]
-MICRO = 1e6
-PLANNED = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-"""Planned pose of the object's frame: its position and its quaternion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,7 +144,7 @@ def _start(motion: Motion, first: int, earlier: Motion | None) -> Array:
         return motion.joints[first - 1]
     if earlier is not None and len(earlier.joints):
         return earlier.joints[-1]
-    return np.append(PLANNED, np.zeros(motion.joints.shape[1] - len(PLANNED)))
+    return np.append(IDENTITY_POSE, np.zeros(motion.joints.shape[1] - len(IDENTITY_POSE)))
 
 
 def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
@@ -156,7 +155,7 @@ def displaced(poses: Array, starts: Array, layout: Layout) -> Array:
 
 def strayed(poses: Array, layout: Layout) -> Array:
     """Measure displacements from the planned pose, (n,) [m]."""
-    return displaced(poses, np.broadcast_to(PLANNED, poses.shape), layout)
+    return displaced(poses, np.broadcast_to(IDENTITY_POSE, poses.shape), layout)
 
 
 def moved(poses: Array, starts: Array, layout: Layout) -> tuple[Array, Array]:
@@ -293,14 +292,14 @@ def _outcome(
     if gaps[finger] > protocol.gap_threshold * layout.grasp_size_m:
         return Outcome.LOST_CONTACT, f"finger {finger} is {_um(gaps[finger])} off its face"
     finger = int(np.argmax(slips))
-    turned = f"the object turned by {1e3 * trace.rotations_rad[first]:.3g} mrad"
+    turned = f"the object turned by {MILLI * trace.rotations_rad[first]:.3g} mrad"
     if trace.displacements_m[first] < protocol.hold_threshold * layout.grasp_size_m:
         turned += f" after {_um(trace.start_m)} of motion while it was loaded"
     return Outcome.SLIPPED, f"finger {finger} slid {_um(slips[finger])} over its face, {turned}"
 
 
 def _um(length_m: float) -> str:
-    return f"{1e6 * length_m:.3g} um"
+    return f"{MICRO * length_m:.3g} um"
 
 
 SAFETY = 2.0
@@ -333,7 +332,7 @@ class EarlyEnds:
         self.frictions = np.array([trial.friction for trial in trials])
         pushes = np.array([trial.forces[-1] for trial in trials])
         self.commands = np.einsum("kij,nki->nkj", layout.frames, pushes).reshape(len(trials), -1)
-        at = PLANNED if start is None else start[:7]
+        at = IDENTITY_POSE if start is None else start[:7]
         self.starts = np.tile(at, (len(trials), 1))
         self.began_m = np.full(len(trials), strayed(at[None], layout)[0])
         self.springs = _springs(layout)

@@ -27,11 +27,13 @@ from grasp_core.arrays import Array
 from grasp_core.hands.hand import Hand
 from grasp_core.hands.reach import HandReach, stance_of
 from grasp_core.kinds import Friction, instance, one_of, value_of
+from grasp_core.messages import MILLI
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.hand_scenes import build_hand_scene
+from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.mujoco.published_tests import TestedObject, TestedScene
 from scenes.mujoco.scene_text import Slides
 from sim_validate.engine.gate import ClosureCase
@@ -219,8 +221,6 @@ CHUNK = 10
 """Simulation steps per sample: DexGraspBench moves its commands every ten steps."""
 FREE = 7
 """Coordinates of the object's free joint, which come first."""
-AT_REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-"""Pose of the object where it is planned to be, from which displacement and turn count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,7 +245,7 @@ def their_verdict(
 ) -> tuple[RunVerdict, ...]:
     """Simulate all runs of a test and judge each."""
     bench = Bench(scene, threads=threads, chunk=CHUNK, kept=("state",))
-    begun = np.concatenate([AT_REST, scene.opened if protocol.close_s else scene.shut])
+    begun = np.concatenate([IDENTITY_POSE, scene.opened if protocol.close_s else scene.shut])
     root = FREE * bench.moves_as_told  # where one moves as told, its pose comes first
     runs = [
         replace(run, mocap=run.commands[:, :root] if root else None,
@@ -328,12 +328,12 @@ def judged_run(number: int, looks: Sequence[Look], fault: str, passing: Passing)
     for look in looks:
         if reason:
             break
-        shift = float(np.linalg.norm(look.pose[:3] - AT_REST[:3]))
-        turn = float(np.degrees(rotation_angles(look.pose[None, 3:], AT_REST[None, 3:])[0]))
+        shift = float(np.linalg.norm(look.pose[:3]))
+        turn = float(np.degrees(rotation_angles(look.pose[None, 3:], IDENTITY_POSE[None, 3:])[0]))
         moved, turned = max(moved, shift), max(turned, turn)
         seen.append(look.fingers)
         if not shift < passing.most_m:
-            reason = f"the object moved by {1e3 * shift:.3g} mm, and {1e3 * passing.most_m:g}"
+            reason = f"the object moved by {MILLI * shift:.3g} mm, and {MILLI * passing.most_m:g}"
             reason += " is enough"
         elif not turn < passing.most_deg:
             reason = f"the object turned by {turn:.3g} deg, and {passing.most_deg:g} is enough"

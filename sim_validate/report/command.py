@@ -16,6 +16,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.file_kinds import GRASPS
 from grasp_core.files.records import record_of
 from grasp_core.files.text_files import write_text
+from grasp_core.messages import MICRO
 from grasp_core.planning.result import Plan
 from grasp_core.provenance import versions
 from grasp_core.records.grasps_json import load_grasps
@@ -24,6 +25,7 @@ from scenes.drawing.clips import GraphicsError, has_display, write_clip, write_t
 from scenes.drawing.pages import turntable_page
 from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
+from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.settings import FingerSettings
 from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
 from sim_validate.datasets.open_dataset import MANIFEST, recorded_in_dataset
@@ -115,8 +117,7 @@ def closing(scene: Scene) -> Array:
     away = np.einsum("kij,ki->kj", layout.frames, layout.approach).ravel()
     left = np.linspace(1.0, 0.0, COMING) ** 2
     slides = np.vstack([left[:, None] * away, np.zeros((RESTING, len(away)))])
-    home = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    return np.column_stack([np.tile(home, (len(slides), 1)), slides])
+    return np.column_stack([np.tile(IDENTITY_POSE, (len(slides), 1)), slides])
 
 
 def report_folder(command: command_flags.Report, reporter: Reporter) -> int:
@@ -155,7 +156,6 @@ def shown_report(asked: command_flags.Report, reporter: Reporter) -> Report:
 
 SHOWN = 12
 """Number of rows of the motion that are shown; the trace file has all of them."""
-MICRO = 1e6
 
 
 def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
