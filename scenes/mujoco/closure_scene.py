@@ -35,11 +35,13 @@ from grasp_core.notebooks import InNotebooks
 from grasp_core.objects.on_faces import check_body, face_under
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
+from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.mjcf_text import FINGERTIPS, IDENTITY_POSE, SceneText, placed
-from scenes.mujoco.scene_text import TOUCH, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.scene_text import TOUCH, SceneContent, SceneObject, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import HARD, FingerSettings, PhysicsSettings, Softness, Surface
+from scenes.mujoco_options import HARD, PhysicsSettings, Softness
+from scenes.settings import FingerSettings, Surface
 
 if TYPE_CHECKING:
     from scenes.mujoco.chains import StandingHand

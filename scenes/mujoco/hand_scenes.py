@@ -50,7 +50,8 @@ from scenes.mujoco.chains import StandingHand
 from scenes.mujoco.closure_scene import SQUEEZE, Layout, Scene, arrange, to_text
 from scenes.mujoco.held_scene import HeldScene, held_layout, held_physics, held_text
 from scenes.mujoco.mjcf_text import FINGERTIPS
-from scenes.settings import FingerSettings, HeldSettings, PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import FingerSettings, HeldSettings
 
 TOUCH = 3e-6
 """Depth of fingertips in their faces at the start, in grasp sizes: more than numbers of nine

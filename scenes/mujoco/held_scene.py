@@ -30,10 +30,12 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
+from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.mjcf_text import FINGERTIPS, IDENTITY_POSE, SceneText
-from scenes.mujoco.scene_text import TOUCH, SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.scene_text import TOUCH, SceneContent, SceneObject, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import SAMPLE_S, HeldSettings, PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import SAMPLE_S, HeldSettings
 
 if TYPE_CHECKING:
     from scenes.mujoco.chains import StandingHand

@@ -25,11 +25,13 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.chains import Chains, Weld, hand_inertials
 from scenes.mujoco.closure_scene import SQUEEZE, arrange
+from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.mjcf_text import FINGERTIPS, IDENTITY_POSE, SHAPES, SceneText, quaternion
-from scenes.mujoco.scene_text import SceneContent, SceneObject, Slides, scene_text
+from scenes.mujoco.scene_text import SceneContent, SceneObject, scene_text
 from scenes.mujoco.surface import touched_solids
-from scenes.settings import FingerSettings, PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import FingerSettings
 
 COMMENT = (
     "The test of another tool: the object has the mass that the test states, and no gravity. "

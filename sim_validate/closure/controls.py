@@ -30,7 +30,7 @@ from grasp_core.forces.contact_forces import least_friction_forces
 from grasp_core.kinds import FLAT, Friction
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
-from scenes.mujoco.fingertips import clashes, fitting_radius
+from scenes.mujoco.fingertip_room import clashes, fitting_radius
 from sim_validate.engine.rig import Rig, squeezed
 from sim_validate.engine.schedules import Load
 from sim_validate.engine.setup import Agenda, Setup

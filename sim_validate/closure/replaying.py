@@ -24,7 +24,7 @@ from grasp_core.planning.result import Plan
 from grasp_core.records.grasps_json import load_grasps
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.fingertips import clashes
+from scenes.mujoco.fingertip_room import clashes
 from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
 from sim_validate.closure.validate import OPEN, for_repeats, noisy_case, off_faces
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts

@@ -34,7 +34,7 @@ from grasp_core.objects.on_faces import check_body, check_on_faces, edge_distanc
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Grasp
 from scenes.mujoco.closure_scene import Scene
-from scenes.mujoco.fingertips import clashes
+from scenes.mujoco.fingertip_room import clashes
 from sim_validate.closure.controls import Control, ControlVerdict, negative_controls, try_control
 from sim_validate.closure.verdict import (
     AGREEMENT,

@@ -25,7 +25,7 @@ from grasp_core.errors import InputError
 from grasp_core.files.text_files import write_parts
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.closure_scene import arrange
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.settings import FingerSettings
 from sim_validate.datasets.columns import GIVEN, GraspRow, ObjectRow
 from sim_validate.datasets.config import CREDITS, SHORT, Name, SplitName, quoted

@@ -19,7 +19,7 @@ from grasp_core.errors import NoForcesError, SolverError, UndecidedError
 from grasp_core.forces.contact_forces import even_forces
 from grasp_core.kinds import OrInfinity
 from scenes.mujoco.closure_scene import SQUEEZE, Scene
-from scenes.settings import HARD, Softness
+from scenes.mujoco_options import HARD, Softness
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench

@@ -41,9 +41,9 @@ from grasp_core.objects.on_faces import (
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.drawing.clips import RATE, write_held_clip
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import SAMPLE_S, HeldScene, build_held_scene, held_physics
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 from sim_validate.engine.known_cases import checked
 from sim_validate.engine.setup import MOST_THREADS
 from sim_validate.execution.gate import cases_of

@@ -50,10 +50,11 @@ from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.objects.surface import areas_and_normals
 from grasp_core.values import Contact
 from scenes.example_objects import example_object
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import SAMPLE_S, HeldLayout, HeldScene, build_held_scene, held_physics
 from scenes.mujoco.scene_text import AWAY, TOUCH
-from scenes.settings import UPRIGHT, HeldSettings, PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
+from scenes.settings import UPRIGHT, HeldSettings
 from sim_validate.engine.known_cases import (
     DEPTH,
     Check,

@@ -20,7 +20,7 @@ from grasp_core.files.records import UNRECORDED
 from grasp_core.kinds import FLAT, Number, OrInfinity, Quantity, path_of
 from grasp_core.messages import MILLI, FieldError
 from grasp_core.solvers.ties import first_best
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 from sim_validate.kit.files import AboutGrasps
 from sim_validate.settings import ExecutionSettings, TrialKind
 

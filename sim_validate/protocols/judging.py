@@ -32,10 +32,10 @@ from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
+from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.hand_scenes import build_hand_scene
 from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.mujoco.published_tests import TestedObject, TestedScene
-from scenes.mujoco.scene_text import Slides
 from sim_validate.engine.gate import ClosureCase
 from sim_validate.engine.known_cases import checked, untouching
 from sim_validate.engine.planned_loads import LoadPlanner

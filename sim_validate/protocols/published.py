@@ -18,7 +18,7 @@ from grasp_core.declared import Declared, declared
 from grasp_core.kinds import Number, OrInfinity, one_of
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.chains import Weld
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 
 Triple: TypeAlias = tuple[float, float, float]
 NOWHERE: Triple = (0.0, 0.0, 0.0)

@@ -22,7 +22,7 @@ import grasp_core as gc
 import scenes
 from grasp_core.closure.contacts import contact_frictions, contact_torsions
 from grasp_core.quality.wrench_limits import WrenchBody, limit_of
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.schedules import Load, part

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import grasp_core as gc
 from grasp_core.execution.grips import unsqueezed
-from scenes.mujoco.fingertips import fitting_radius
+from scenes.mujoco.fingertip_room import fitting_radius
 from scenes.mujoco.held_scene import held_layout
 from scenes.mujoco.scene_text import TOUCH
 from scenes.settings import HeldSettings

@@ -8,7 +8,7 @@ import pytest
 import grasp_core as gc
 import scenes
 import sim_validate as sv
-from scenes.settings import PhysicsSettings
+from scenes.mujoco_options import PhysicsSettings
 from sim_validate.engine.gate import ClosureCase
 from sim_validate.engine.known_cases import checked, measured, untouching
 from sim_validate.engine.setup import Setup
