@@ -15,7 +15,7 @@ from grasp_core.settings import Settings
 
 MOST_ITERATIONS = 10_000
 Iterations = Annotated[int, Interval(ge=1, le=MOST_ITERATIONS)]
-Number = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]
+Coef = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]
 Component = Annotated[float, Interval(ge=-1e4, le=1e4)]
 Field = tuple[Component, Component, Component]
 WITHOUT_TORSION, WITH_TORSION = 3, 4
@@ -56,7 +56,7 @@ class Softness(Settings):
         return friction, self.torsion_m, 0.0
 
 
-HARD = Softness()
+HARD_TIPS = Softness()
 
 
 @declared
@@ -103,8 +103,8 @@ class PhysicsSettings(Softness):
     magnetic: Field = (0.0, 0.0, 0.0)
     density: NotNegative = 0.0
     viscosity: NotNegative = 0.0
-    solref: tuple[Number, Number] = (0.004, 1.0)
-    solimp: tuple[Number, Number, Number, Number, Number] = (0.99, 0.99, 0.001, 0.5, 2.0)
+    solref: tuple[Coef, Coef] = (0.004, 1.0)
+    solimp: tuple[Coef, Coef, Coef, Coef, Coef] = (0.99, 0.99, 0.001, 0.5, 2.0)
     condim: Literal[1, 3, 4, 6] = 3
     """Contact dimension of MuJoCo; 3 is a hard fingertip, which transmits no torsional friction. A
     `torsion_m` above zero makes it 4."""

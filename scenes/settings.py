@@ -15,7 +15,7 @@ from grasp_core.errors import InputError
 from grasp_core.kinds import Direction, Quantity
 from grasp_core.settings import CHOSEN, Settings
 from grasp_core.small_objects import fitted
-from scenes.mujoco_options import HARD, Softness
+from scenes.mujoco_options import HARD_TIPS, Softness
 
 if TYPE_CHECKING:
     from grasp_core.objects.polyhedron import Polyhedron
@@ -65,7 +65,7 @@ class ScaledScene(Settings):
     """What users choose about a scene with scaled masses, in which closure is tested."""
 
     fingers: Fingertips = Fingertips()
-    physics: Softness = HARD
+    physics: Softness = HARD_TIPS
     surface: Annotated[Surface | None, CHOSEN] = None
     """What fingertips touch: the object's own surface, or a flat pad at each contact; if not given,
     pads where the faces are patches of a curved surface, else the object."""

@@ -39,9 +39,9 @@ from sim_validate.report.command import shown_report
 
 RESULTS = Path("graspproof-out")
 """Folder in which each object gets its own folder of results if --out is not given."""
-HASHED = 8
+HASH_DIGITS = 8
 """Number of hash digits in a folder's name that tell apart objects with similar names."""
-NAMED = 60
+NAME_LETTERS = 60
 """Largest number of characters of an object's name in the name of its folder; with four bytes each
 they still fit the limit of file systems."""
 REPORTED = 200
@@ -128,5 +128,5 @@ def _reported(folder: Path | None, jobs: int, reporter: Reporter) -> Generator[N
 
 def _folder_name(body: Polyhedron) -> str:
     """Turn an object's name into a safe folder name; a name that changes gets a hash added."""
-    plain = re.sub(r"[^\w-]+", "_", body.name)[:NAMED] or "object"
-    return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASHED]}"
+    plain = re.sub(r"[^\w-]+", "_", body.name)[:NAME_LETTERS] or "object"
+    return plain if plain == body.name else f"{plain}-{body.content_sha256[:HASH_DIGITS]}"

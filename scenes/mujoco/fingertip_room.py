@@ -28,9 +28,9 @@ TIP_RADIUS = 0.1
 """Fingertip radius that is used wherever such fingertips overlap nothing, in object radii."""
 LEAST_TIP_RADIUS = 1e-3
 """Smallest fingertip radius that is tried, in object radii."""
-ROOM = 0.95
+ROOM_SHARE = 0.95
 """Fingertip radius where `TIP_RADIUS` does not fit, relative to the largest that fits."""
-TOUCHING = 1e-6
+MERE_TOUCH = 1e-6
 """Largest overlap that counts as mere touching, in fingertip radii."""
 MAX_SHRINKING = 100
 """Steps after which a fingertip has no clear radius; up to fifteen are usual."""
@@ -46,12 +46,12 @@ def fitting_radius(body: Polyhedron, positions: Array, normals: Array) -> float:
     largest = min(_largest_apart(positions, normals), clear)
     if largest >= usual:
         return usual
-    return max(ROOM * largest, LEAST_TIP_RADIUS * body.radius)
+    return max(ROOM_SHARE * largest, LEAST_TIP_RADIUS * body.radius)
 
 
 def clashes(body: Polyhedron, positions: Array, normals: Array, radius: float) -> tuple[str, ...]:
     """List what fingertips of a radius overlap: each other, or the object beside their contacts."""
-    least = radius * (1.0 - TOUCHING)
+    least = radius * (1.0 - MERE_TOUCH)
     found = [
         f"fingertips {i} and {j} of radius {radius:.3g} m overlap"
         for i, j in combinations(range(len(positions)), 2)
@@ -117,7 +117,7 @@ def _largest_clear(body: Polyhedron, positions: Array, normals: Array, start: fl
 
 def _touched(body: Polyhedron, radius: float) -> float:
     """Return the distance from which on a surface touches a fingertip but does not meet it [m]."""
-    return radius * (1.0 - TOUCHING) - on_face_slack(body)
+    return radius * (1.0 - MERE_TOUCH) - on_face_slack(body)
 
 
 def _clear_radius(

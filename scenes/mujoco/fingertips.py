@@ -13,9 +13,9 @@ import numpy as np
 from grasp_core.arrays import Array
 from grasp_core.by_value import ByValue
 from scenes.mujoco.mjcf_text import (
-    FREE,
+    FREE_JOINT,
     ORIGIN,
-    TIP,
+    TIP_LOOK,
     Element,
     Parts,
     add_element,
@@ -100,14 +100,14 @@ class Slides(ByValue):
             )
             for number, (ending, axis, stiffness, damping) in enumerate(springs):
                 joint = {"name": f"{name}_{ending}", "type": "slide", "axis": axis}
-                add_element(body, "joint", FREE | joint)
+                add_element(body, "joint", FREE_JOINT | joint)
                 most = None if number else self.most_push_n
                 limits = None if most is None else (0.0, most)
                 add_servo(parts["actuator"], f"{name}_{ending}", stiffness, damping, limits)
             own = {"pos": ORIGIN, "mass": self.tip_mass_kg, "diaginertia": (inertia[finger],) * 3}
             add_element(body, "inertial", own)
             ball = {"name": name, "type": "sphere", "size": self.tip_radii[finger]}
-            add_element(body, "geom", ball | TIP | touching[finger])
+            add_element(body, "geom", ball | TIP_LOOK | touching[finger])
 
     @property
     def _used_axes(self) -> Array:

@@ -31,8 +31,8 @@ from grasp_core.kinds import Quantity, instance, value_of
 from grasp_core.objects.on_faces import check_body
 from grasp_core.objects.polyhedron import Polyhedron
 from scenes.mujoco.fingertips import Slides
-from scenes.mujoco.mjcf_text import FINGERTIPS, IDENTITY_POSE, SceneText
-from scenes.mujoco.scene_text import TOUCH, SceneContent, SceneObject, scene_text
+from scenes.mujoco.mjcf_text import FINGERTIP_BIT, IDENTITY_POSE, SceneText
+from scenes.mujoco.scene_text import TOUCH_DEPTH, SceneContent, SceneObject, scene_text
 from scenes.mujoco.surface import touched_solids
 from scenes.mujoco_options import PhysicsSettings
 from scenes.settings import SAMPLE_S, HeldSettings
@@ -125,7 +125,7 @@ class HeldLayout(SceneObject):
     @property
     def tip_centers(self) -> Array:
         """Return the centres of the fingertips at their contacts, (k, 3) [m]."""
-        height = self.tip_radius_m - TOUCH * self.radius_m
+        height = self.tip_radius_m - TOUCH_DEPTH * self.radius_m
         return self.contacts - height[:, None] * self.frames[:, :, 0]
 
     @property
@@ -160,7 +160,7 @@ def held_layout(
     contacts = to_digits(grip.arms, body.radius)
     axes, stiffness = _spring_axes(grip.stiffness, frames)
     damping = 2.0 * settings.damping_ratio * np.sqrt(stiffness * (mass / len(contacts) + tip_kg))
-    stiffest, heights = float(stiffness.max()), grip.tip_radius_m - TOUCH * body.radius
+    stiffest, heights = float(stiffness.max()), grip.tip_radius_m - TOUCH_DEPTH * body.radius
     inertia = to_digits(mass / body.volume * body.inertia)
     return HeldLayout(
         name=body.name,
@@ -308,7 +308,7 @@ def held_text(layout: HeldLayout, physics: PhysicsSettings) -> str:
             physics=physics,
             rubbing=(0.0, 0.0, 0.0),
             holder=layout.holder,
-            tips=[(FINGERTIPS, (each, 0.0, 0.0)) for each in layout.friction.tolist()],
+            tips=[(FINGERTIP_BIT, (each, 0.0, 0.0)) for each in layout.friction.tolist()],
             palm=("palm" if isinstance(layout.holder, Slides) else "wrist", palm_armature(layout)),
             table_friction=float(layout.friction.max()),
             keys={"squeeze": {"qpos": rest, "ctrl": told}},

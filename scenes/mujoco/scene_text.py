@@ -29,10 +29,10 @@ from grasp_core.by_value import ByValue
 from scenes.mujoco.fingertips import Slides
 from scenes.mujoco.mjcf_text import (
     COMPILER,
-    FINGERTIPS,
-    FREE,
+    FINGERTIP_BIT,
+    FREE_JOINT,
     ORIGIN,
-    TABLE,
+    TABLE_BIT,
     Element,
     Parts,
     add_comment,
@@ -46,23 +46,23 @@ from scenes.mujoco.version_gaps import known_flags
 from scenes.mujoco_options import PhysicsSettings
 
 if TYPE_CHECKING:
-    from scenes.mujoco.chains import Chains
+    from scenes.mujoco.chains import HandChains
 
-SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator", "keyframe")
-EXACT = {"midphase": "disable", "island": "disable"}
+SCENE_SECTIONS = ("asset", "worldbody", "equality", "contact", "actuator", "keyframe")
+FLAGS_OF_EXACT = {"midphase": "disable", "island": "disable"}
 """Flags of scenes in which fingertips touch the object's own surface. MuJoCo's search for pairs
 within two bodies misses contacts that are less deep than a ten-thousandth of the object, as all are
 here. Its search for parts that do not touch each other costs time, and finds one part."""
-TOUCH = 1e-7
+TOUCH_DEPTH = 1e-7
 """Depth of fingertips in the object's surface at the start, in object radii. The simulator stores
 meshes in single precision, which moves surfaces by up to 3e-8. A fingertip that does not touch yet
 would arrive with speed, and one that is much deeper is pushed out, which turns objects that two
 others hold and it hardly presses."""
-TOUCHED = {"conaffinity": 0, "mass": 0.0, "group": 2, "rgba": (0.9, 0.6, 0.2, 0.3)}
+SOLID_LOOK = {"conaffinity": 0, "mass": 0.0, "group": 2, "rgba": (0.9, 0.6, 0.2, 0.3)}
 """Attributes of a solid that fingertips touch, shown as glass of another colour."""
 AWAY = 100.0
 """Distance of the table until it is needed, in object radii."""
-PALM = ("x", "y", "z", "about_x", "about_y", "about_z")
+PALM_JOINTS = ("x", "y", "z", "about_x", "about_y", "about_z")
 """Endings of the names of the palm's slides and hinges, in the order of its joints."""
 PALM_SHARE = 1e-3
 """Mass of the palm itself, relative to the object's: a moving body must have one."""
@@ -98,10 +98,10 @@ class SceneContent:
     physics: PhysicsSettings
     rubbing: tuple[float, float, float]
     """Coefficients of the object's surface as in MJCF; of two that touch, the larger counts."""
-    holder: "Slides | Chains"
+    holder: "Slides | HandChains"
     tips: Sequence[tuple[int, tuple[float, float, float]]]
     """Bits of what the holder's fingertips touch, and their coefficients."""
-    bits: int = FINGERTIPS
+    bits: int = FINGERTIP_BIT
     """Bits of what touches the object's surface."""
     weightless: bool = False
     pads: Sequence[dict[str, Any]] = ()
@@ -116,12 +116,13 @@ class SceneContent:
 
 def scene_text(scene: SceneContent) -> str:
     """Write the MJCF text of a scene; equal values give equal texts."""
-    it, physics, parts = scene.held, scene.physics, {tag: element(tag, {}) for tag in SECTIONS}
+    it, physics = scene.held, scene.physics
+    parts = {tag: element(tag, {}) for tag in SCENE_SECTIONS}
     root = element("mujoco", {"model": printable(it.name)})
     add_comment(root, scene.comment)
     add_element(root, "compiler", COMPILER)
     option = add_element(root, "option", physics.options())
-    flags, lacking = known_flags(physics.flags() | ({} if scene.pads else EXACT))
+    flags, lacking = known_flags(physics.flags() | ({} if scene.pads else FLAGS_OF_EXACT))
     add_element(option, "flag", flags)
     for each in lacking:
         add_comment(root, each)
@@ -149,7 +150,7 @@ def _add_object(scene: SceneContent, parts: Parts) -> None:
     add_element(body, "freejoint", {"name": "object"})
     own = {"pos": it.center, "mass": it.object_kg, "fullinertia": six_of(it.inertia_kg_m2)}
     add_element(body, "inertial", own)
-    hull = 0 if scene.table_friction is None else TABLE
+    hull = 0 if scene.table_friction is None else TABLE_BIT
     hull |= scene.bits if it.solids is None else 0
     shown = {"name": "object", "type": "mesh", "mesh": "object", "contype": hull, "conaffinity": 0,
              "group": 1, "mass": 0.0, "rgba": (0.55, 0.62, 0.70, 0.6)}  # fmt: skip
@@ -159,10 +160,10 @@ def _add_object(scene: SceneContent, parts: Parts) -> None:
         mesh = {"name": name, "inertia": "shell", "vertex": corners}
         add_element(parts["asset"], "mesh", mesh)
         solid = {"name": name, "type": "mesh", "mesh": name, "contype": scene.bits}
-        add_element(body, "geom", solid | TOUCHED | touching)
+        add_element(body, "geom", solid | SOLID_LOOK | touching)
     for finger, pad in enumerate(scene.pads):
         box = {"name": f"pad{finger}", "type": "box"}
-        add_element(body, "geom", box | pad | TOUCHED | touching)
+        add_element(body, "geom", box | pad | SOLID_LOOK | touching)
 
 
 def _add_table(scene: SceneContent, world: Element) -> None:
@@ -172,7 +173,7 @@ def _add_table(scene: SceneContent, world: Element) -> None:
     away = AWAY * radius * np.array([0.0, 0.0, -1.0])
     table = add_element(world, "body", {"name": "table", "mocap": "true", "pos": away})
     plane = {"name": "table", "type": "plane", "size": (10.0 * radius,) * 2 + (0.01,),
-             "contype": 0, "conaffinity": TABLE, "friction": (scene.table_friction, 0.0, 0.0),
+             "contype": 0, "conaffinity": TABLE_BIT, "friction": (scene.table_friction, 0.0, 0.0),
              "rgba": (0.8, 0.78, 0.74, 1.0)}  # fmt: skip
     add_element(table, "geom", plane | scene.physics.contact())
 
@@ -183,10 +184,10 @@ def _base(scene: SceneContent, world: Element) -> Element:
         return world
     name, armatures = scene.palm
     body = add_element(world, "body", {"name": name, "pos": ORIGIN, "gravcomp": 1.0})
-    for place, (way, armature) in enumerate(zip(PALM, armatures, strict=True)):
+    for place, (way, armature) in enumerate(zip(PALM_JOINTS, armatures, strict=True)):
         kind, axis = ("slide", "hinge")[place // 3], np.eye(3)[place % 3]
         joint = {"name": f"palm_{way}", "type": kind, "axis": axis, "armature": armature}
-        add_element(body, "joint", FREE | joint)
+        add_element(body, "joint", FREE_JOINT | joint)
     mass = PALM_SHARE * scene.held.object_kg
     inertia = (mass * scene.held.radius_m**2,) * 3
     add_element(body, "inertial", {"pos": ORIGIN, "mass": mass, "diaginertia": inertia})

@@ -26,19 +26,19 @@ from grasp_core.values import Contact, Grasp
 from scenes.mujoco.closure_scene import Scene
 from scenes.mujoco.fingertip_room import clashes
 from sim_validate.closure.controls import Control, ControlLoad, ControlTrial, control_case
-from sim_validate.closure.validate import OPEN, for_repeats, noisy_case, off_faces
+from sim_validate.closure.validate import OPENED_BY_NOISE, for_repeats, noisy_case, off_faces
 from sim_validate.closure.verdict import Verdict, WrenchVerdict, load_verdicts
 from sim_validate.engine.misplacement import disturbed
 from sim_validate.engine.planned_loads import LoadPlanner, PlannedLoad
 from sim_validate.engine.rig import Rig, Watched, closed_on
-from sim_validate.engine.schedules import Load
+from sim_validate.engine.schedules import TrialLoad
 from sim_validate.engine.setup import WEAKEST, Agenda, Setup
 from sim_validate.engine.traces import HoldVerdict, Outcome, judge
 from sim_validate.planning.asked_objects import grasp_with_id, some
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedTrial:
     """Which contact set of a file is to be simulated again."""
 
     grasp: str | None = None
@@ -78,7 +78,7 @@ class Replayed(Declared):
     """The motion and outcome of one trial that was simulated again."""
 
     name: Annotated[str, Field(alias="wrench")]
-    load: Annotated[Load, UNRECORDED]
+    load: Annotated[TrialLoad, UNRECORDED]
     predicted_limit: OrInfinity | None
     """Largest multiple of the wrench that is resisted by analysis; None for contacts without force
     closure."""
@@ -96,7 +96,7 @@ class Replayed(Declared):
         return self.load.wrench
 
 
-def recorded_in(source: Path, wanted: Wanted) -> Recorded:
+def recorded_in(source: Path, wanted: WantedTrial) -> Recorded:
     """Read a contact set from a `verdicts.json`, or from the folder of a run."""
     path = source / VERDICTS if source.is_dir() else source
     found = load_verdicts(path)
@@ -122,7 +122,7 @@ def recorded_in(source: Path, wanted: Wanted) -> Recorded:
     return replace(recorded, mujoco=found.gate.mujoco)
 
 
-def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: Wanted) -> Recorded:
+def of_verdict(path: Path, saved: Plan, verdict: Verdict, wanted: WantedTrial) -> Recorded:
     """Read a contact set, and how its trials ended, from the verdict on one grasp."""
     grasp = grasp_with_id(path, saved, wanted.grasp)
     if contacts_sha256(grasp.contacts) != verdict.contacts_sha256:
@@ -225,7 +225,7 @@ def _case(recorded: Recorded) -> tuple[Rig, Loads, tuple[Contact, ...]]:
             f"{case.missed[0]} miss its face"
         )
     if not setup.closure(case.contacts, case.friction).closed:
-        return _opened(body, OPEN, case.contacts, case.friction, setup)
+        return _opened(body, OPENED_BY_NOISE, case.contacts, case.friction, setup)
     rig, heavy = noisy_case(body, case, [(each.name, each.load.wrench) for each in planned], setup)
     return rig, heavy, case.landed
 

@@ -219,7 +219,7 @@ def simulated_critical_friction(
     return np.inf if found.simulated is None else found.simulated
 
 
-Progress: TypeAlias = Callable[[int, int, Verdict], object]
+VerdictProgress: TypeAlias = Callable[[int, int, Verdict], object]
 """Function that is told the number of grasps done, the number of all, and the last verdict."""
 
 
@@ -231,7 +231,7 @@ def validate_all(
     agenda: Agenda | None = None,
     setup: Setup | None = None,
     jobs: int = 1,
-    progress: Progress | None = None,
+    progress: VerdictProgress | None = None,
 ) -> tuple[Verdict, ...]:
     """Test many grasps of one object in simulation, each as `validate` does.
 
@@ -323,7 +323,7 @@ def attempted(
 
 NamedLoad: TypeAlias = tuple[str, Array]
 """A name with a wrench, (6,) [N, N m], torque about the centre of mass."""
-OPEN = "noise"
+OPENED_BY_NOISE = "noise"
 """Name of the negative control made of contacts that noise took out of force closure."""
 
 
@@ -357,7 +357,7 @@ def noisy_trial(
     except UndecidedError as error:
         return NoisyTrial(number, None, Outcome.ERROR, "", str(error), ())
     if not certificate.closed:  # a negative control, which must let go
-        control = Control(OPEN, case.friction, certificate)
+        control = Control(OPENED_BY_NOISE, case.friction, certificate)
         verdict = try_control(body, control, Agenda(), setup)
         if verdict.held:
             wrong = ("contacts that are proved not force-closed held the object",)

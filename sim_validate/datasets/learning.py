@@ -37,7 +37,7 @@ from grasp_core.planning.given_contacts import Seated, grasp_of, seat
 from grasp_core.quality.metrics import smallest_singular_value
 from grasp_core.regions.certify_placement import usual_bound
 from grasp_core.values import FINGERS, Contact, ContactRegion, Grasp, four
-from sim_validate.closure.controls import LEAST_FRICTION, negative_controls, try_control
+from sim_validate.closure.controls import LEAST_CONTROL_FRICTION, negative_controls, try_control
 from sim_validate.closure.validate import validate
 from sim_validate.closure.verdict import Verdict
 from sim_validate.datasets.columns import ExecutionCells, ExecutionRow, GraspRow
@@ -248,7 +248,7 @@ def variants(
         for number in range(getattr(asked, kind)):
             ratio = _ratio(kind, draws_by_name(seed, grasp.id, kind, number))
             varied = _short(ratio * grasp.critical_friction)
-            if LEAST_FRICTION <= varied <= LARGEST_FRICTION:
+            if LEAST_CONTROL_FRICTION <= varied <= LARGEST_FRICTION:
                 yield from _decided(kind, number, at, varied, UNMOVED)
     for number in range(asked.moved_out):
         yield from _moved(

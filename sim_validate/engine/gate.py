@@ -51,7 +51,7 @@ from sim_validate.engine.known_cases import (
     DEPTH,
     DEPTH_ERROR,
     NORMAL_ERROR,
-    Check,
+    GateCheck,
     angles,
     near,
     sized,
@@ -59,14 +59,14 @@ from sim_validate.engine.known_cases import (
     two_digits,
 )
 from sim_validate.engine.rig import Rig, squeezed
-from sim_validate.engine.schedules import Load, Schedule, part
+from sim_validate.engine.schedules import Schedule, TrialLoad, part
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.simulated_friction import bisected, forces_just_above, released_friction
 from sim_validate.engine.simulated_limits import SimulatedLimit, bisected_limits, ramped_limits
 from sim_validate.engine.stepping import CLOCK_SLACK_S, Bench
 from sim_validate.engine.traces import holds
 
-LEAST_OFFSET, LARGEST_OFFSET = 0.01, 1.0
+LEAST_OFFSET, MOST_OFFSET = 0.01, 1.0
 """Least and largest critical friction that two offset fingers on the box can be made to need."""
 PUSH = 0.6
 """Normal force of the fingers on the box, relative to the largest normal force allowed."""
@@ -96,7 +96,7 @@ class ClosureCase:
     @property
     def offset_friction(self) -> float:
         """The friction under test, or the nearest one that offset fingers on a box can need."""
-        return min(max(self.friction, LEAST_OFFSET), LARGEST_OFFSET)
+        return min(max(self.friction, LEAST_OFFSET), MOST_OFFSET)
 
     @property
     def push(self) -> float:
@@ -107,7 +107,7 @@ class ClosureCase:
         """Scale an example object to the size under test."""
         return sized(name, self.radius_m)
 
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[GateCheck, ...]:
         """Measure all figures, on what the settings have fingertips touch."""
         touches = () if self.setup.surface == "pads" else surface_touches(self)
         held = tetrahedron(self)
@@ -125,7 +125,7 @@ class ClosureCase:
         return replace(squeezed(bench, self.setup, forces, friction), whole=True)
 
 
-def tetrahedron(case: ClosureCase) -> tuple[Rig, list[Load]]:
+def tetrahedron(case: ClosureCase) -> tuple[Rig, list[TrialLoad]]:
     """Squeeze a tetrahedron at its face centres, and find its limit wrenches on twelve axes."""
     body, largest = case.body("tetrahedron"), case.setup.fingers.max_normal_force_n
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
@@ -134,12 +134,12 @@ def tetrahedron(case: ClosureCase) -> tuple[Rig, list[Load]]:
     frictions = contact_frictions(case.friction, len(contacts))
     resisted = WrenchBody(arms, body.normals, frictions, largest)
     found = [limit_of(resisted, wrench) for wrench in axis_wrenches(body.radius)]
-    return rig, [Load(limit.limit * limit.wrench, limit.forces) for limit in found]
+    return rig, [TrialLoad(limit.limit * limit.wrench, limit.forces) for limit in found]
 
 
 AZIMUTHS_DEG = (0.0, 22.5, 45.0, 67.5)
 AT_AZIMUTHS = [f", at {azimuth:g} deg" for azimuth in AZIMUTHS_DEG]
-SIDES = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
+PLACE_SIGNS = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
 """Signs of the places of four contacts, two on each of two opposite faces."""
 SLIP_TOLERANCE = 0.005
 """Largest error of the load at which a box slips, relative to the load that statics predicts."""
@@ -150,50 +150,50 @@ CREEP_LIMIT = 1e-4
 it."""
 CREEP_SHARE = 0.2
 """Largest share of a hold's displacement threshold that creep may use up."""
-SHARE = 0.8
+SHARE_HELD = 0.8
 """Load on the tetrahedron, relative to the largest load that it resists."""
 HIDDEN_LIMIT = 0.01
 """Largest force that may act without a threshold noticing it, relative to the largest normal force.
 It is ten times what the usual thresholds let pass."""
-NEAR = 0.01
+NEAR_CRITICAL = 0.01
 """Distance from the critical friction, relative to it, at which a hold must tell whether the object
 stays."""
 BLOW_UP = 1e14
 """Each part of a load that no simulation survives [N, N m]."""
 
 
-def _incline(case: ClosureCase) -> list[Check]:
+def _incline(case: ClosureCase) -> list[GateCheck]:
     """Let a box weigh on four rigid supports, pull it at their level, and check when it slides."""
     body = case.body("box")
     length, width, height = np.ptp(body.vertices, axis=0)
     contacts = [
         Contact(np.array([s * length / 4, t * width / 4, -height / 2]), np.array([0, 0, 1.0]))
-        for s, t in SIDES
+        for s, t in PLACE_SIGNS
     ]
     rigid = replace(case.setup, fingers=replace(case.setup.fingers, drive="rigid"))
     weight = case.setup.fingers.max_normal_force_n
-    resting = Load(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
+    resting = TrialLoad(np.array([0, 0, -weight, 0, 0, 0.0]), np.zeros((4, 3)))
     bench = Bench(rigid.scene(body, contacts, case.friction))
     rig = Rig(bench, case.setup, case.friction, resting, None, whole=True)
     pulls = [case.friction * weight * np.array([*way, 0.0]) for way in _ways()]
     torques = [np.cross([0.0, 0.0, -height / 2], pull) for pull in pulls]  # so that it cannot tip
     limits = [
-        Load(resting.wrench + np.concatenate([pull, torque]), resting.forces)
+        TrialLoad(resting.wrench + np.concatenate([pull, torque]), resting.forces)
         for pull, torque in zip(pulls, torques, strict=True)
     ]
     name = "slope at which a box slides, over friction"
     return _slips(name, bisected_limits(rig, limits), AT_AZIMUTHS)
 
 
-def _pulled_box(case: ClosureCase) -> list[Check]:
+def _pulled_box(case: ClosureCase) -> list[GateCheck]:
     """Pull a box that fingers hold on two opposite faces, and check when it slips."""
     body = case.body("box")
     length, width, _ = np.ptp(body.vertices, axis=0)
     rig = _held_across(case, body, length, width / 4)
     forces, largest = rig.idle.forces, 4.0 * case.friction * case.push
     limits = [
-        Load(np.array([0, *(largest * way), 0, 0, 0]), forces - np.array([0, *(largest * way / 4)]))
-        for way in _ways()
+        TrialLoad(np.array([0, *pull, 0, 0, 0]), forces - np.array([0, *(pull / 4)]))
+        for pull in [largest * way for way in _ways()]
     ]
     return _by_both("pull at which a held box slips, over 4 mu N", rig, limits, AT_AZIMUTHS)
 
@@ -202,12 +202,12 @@ def _held_across(case: ClosureCase, body: Polyhedron, length: float, lever: floa
     """Squeeze a box on the two faces across x, with fingers a lever from their middles."""
     contacts = [
         Contact(np.array([s * length / 2, t * lever, 0.0]), np.array([-s, 0.0, 0.0]))
-        for s, t in SIDES
+        for s, t in PLACE_SIGNS
     ]
     return case.squeezed(body, contacts, case.push * stacked(contacts)[1], case.friction)
 
 
-def _twisted_box(case: ClosureCase) -> list[Check]:
+def _twisted_box(case: ClosureCase) -> list[GateCheck]:
     """Twist a box that soft fingers hold on two opposite faces, and check when it turns."""
     friction, soft = case.friction, case.setup.physics.torsion_m
     if not soft:
@@ -220,9 +220,9 @@ def _twisted_box(case: ClosureCase) -> list[Check]:
     each = math.hypot(friction * lever, soft)
     # a point of the limit surface: sliding and turning as fast as one rigid body does
     slides = case.push * friction**2 * lever / each
-    limit = Load(
+    limit = TrialLoad(
         np.array([0, 0, 0, 4.0 * case.push * each, 0, 0]),
-        rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in SIDES]),
+        rig.idle.forces - np.array([[0.0, 0.0, t * slides] for _, t in PLACE_SIGNS]),
     )
     name = "twist at which a held box turns, over 4 N sqrt((mu a)^2 + mu_t^2)"
     return _by_both(name, rig, [limit], [""])
@@ -233,13 +233,17 @@ def _ways() -> list[Array]:
     return list(np.column_stack([np.cos(turns), np.sin(turns)]))
 
 
-def _by_both(name: str, rig: Rig, limits: Sequence[Load], ways: Sequence[str]) -> list[Check]:
+def _by_both(
+    name: str, rig: Rig, limits: Sequence[TrialLoad], ways: Sequence[str]
+) -> list[GateCheck]:
     """Find the loads at which a box slips by holds and by ramps."""
     held, ramped = bisected_limits(rig, limits), ramped_limits(rig, limits)
     return [*_slips(f"{name}, by holds", held, ways), *_slips(f"{name}, by ramps", ramped, ways)]
 
 
-def _slips(name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str]) -> list[Check]:
+def _slips(
+    name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str]
+) -> list[GateCheck]:
     """Compare the loads at which a box slips with those of statics, one check per direction."""
     return [
         near(f"{name}{way}", at and at.share, SLIP_TOLERANCE)
@@ -247,7 +251,7 @@ def _slips(name: str, found: Sequence[SimulatedLimit | None], ways: Sequence[str
     ]
 
 
-def _offset_fingers(case: ClosureCase) -> list[Check]:
+def _offset_fingers(case: ClosureCase) -> list[GateCheck]:
     """Offset two fingers on each of two opposite faces, and check at which friction they let go."""
     body = case.body("box")
     length, _, distance = np.ptp(body.vertices, axis=0)
@@ -256,7 +260,7 @@ def _offset_fingers(case: ClosureCase) -> list[Check]:
     shift = 0.5 * critical * distance + gap
     contacts = [
         Contact(np.array([s * shift + t * gap, 0.0, s * distance / 2]), np.array([0.0, 0.0, -s]))
-        for s, t in SIDES
+        for s, t in PLACE_SIGNS
     ]
     places = stacked(contacts)
     bench = Bench(case.setup.scene(body, contacts, critical))
@@ -273,15 +277,15 @@ def _offset_fingers(case: ClosureCase) -> list[Check]:
     name = "friction at which offset fingers let go, over h / w"
     return [
         near(f"{name}, by releases", released and released / critical, SLIP_TOLERANCE),
-        near(f"{name}, by holds", held and sum(held) / (2.0 * critical), NEAR),
+        near(f"{name}, by holds", held and sum(held) / (2.0 * critical), NEAR_CRITICAL),
     ]
 
 
-def _creep(rig: Rig, limits: Sequence[Load]) -> Check:
+def _creep(rig: Rig, limits: Sequence[TrialLoad]) -> GateCheck:
     """Check how fast a held object creeps under a part of the loads that it resists."""
     speeds, protocol = list[float](), rig.setup.hold
     # the mean speed in the second half; NaN if the trial is not valid
-    for trace in rig.traced(rig.holds([part(rig.idle, limit, SHARE) for limit in limits])):
+    for trace in rig.traced(rig.holds([part(rig.idle, limit, SHARE_HELD) for limit in limits])):
         half = len(trace.times_s) // 2
         if trace.health.fault or not half:
             speeds.append(math.nan)
@@ -291,10 +295,10 @@ def _creep(rig: Rig, limits: Sequence[Load]) -> Check:
     # the maximum is NaN if one speed is
     speed = float(np.abs(speeds).max()) / rig.bench.scene.layout.grasp_size_m
     most = min(CREEP_LIMIT, CREEP_SHARE * protocol.hold_threshold / protocol.hold_s)
-    return Check("creep under load, in grasp sizes per second", speed, 0.0, most)
+    return GateCheck("creep under load, in grasp sizes per second", speed, 0.0, most)
 
 
-def _hidden(rig: Rig) -> Check:
+def _hidden(rig: Rig) -> GateCheck:
     """Check how large a force may be before the displacement thresholds notice it."""
     layout, setup = rig.bench.scene.layout, rig.setup
     threshold = max(
@@ -304,16 +308,16 @@ def _hidden(rig: Rig) -> Check:
     hidden = layout.drive.stiffness_n_per_m * threshold * layout.grasp_size_m
     share = hidden / setup.fingers.max_normal_force_n
     name = "force hidden below the thresholds, over the largest normal force"
-    return Check(name, share, 0.0, HIDDEN_LIMIT)
+    return GateCheck(name, share, 0.0, HIDDEN_LIMIT)
 
 
-def _blow_up(rig: Rig) -> Check:
+def _blow_up(rig: Rig) -> GateCheck:
     """Check the simulator's clock after a load so large that numbers overflow."""
-    (trace,) = rig.traced(rig.holds([Load(np.full(6, BLOW_UP), rig.idle.forces)]))
+    (trace,) = rig.traced(rig.holds([TrialLoad(np.full(6, BLOW_UP), rig.idle.forces)]))
     seen = not trace.health.finite or trace.health.warnings > 0
     error = trace.health.clock_error_s if seen else math.nan
     name = "simulated less stepped time after a blow-up, in seconds"
-    return Check(name, error, -CLOCK_SLACK_S, CLOCK_SLACK_S)
+    return GateCheck(name, error, -CLOCK_SLACK_S, CLOCK_SLACK_S)
 
 
 GAP_LIMIT = 1e-9
@@ -326,14 +330,14 @@ LOW, LOW_GAP_LIMIT = 0.05, 1e-7
 difference between the two solvers there, in grasp sizes: a hundredth of the finest threshold. Usual
 solvers differ by 2e-8 at most, on a millimetre. Solvers under which boxes of that size were seen to
 let go far above their critical friction, implicit integrators among them, differ by 4e-5."""
-LIGHT = 1e-3
+LIGHT_PUSH = 1e-3
 """Normal force of the two fingers that hardly push, relative to that of the others."""
-ABOVE = (1.01, 1.05, 2.0)
+RELEASED_ABOVE = (1.01, 1.05, 2.0)
 """Frictions at which the box is released, relative to the friction that it needs; it stays at
 each."""
 
 
-def solver_gaps(case: ClosureCase) -> tuple[Check, Check]:
+def solver_gaps(case: ClosureCase) -> tuple[GateCheck, GateCheck]:
     """Compare motions under the chosen solver with motions under one that iterates to the end."""
     physics = replace(
         case.setup.physics, solver="Newton", jacobian="dense", tolerance=1e-18, iterations=300,
@@ -347,8 +351,8 @@ def solver_gaps(case: ClosureCase) -> tuple[Check, Check]:
     here, there = ([held, released], [low]) if case.friction >= LOW else ([held], [released, low])
     name = "motion that a solver to the last digit changes"
     return (
-        Check(name, _gap(here), 0.0, GAP_LIMIT),
-        Check(f"{name}, at friction {LEAST_OFFSET:g}", _gap(there), 0.0, LOW_GAP_LIMIT),
+        GateCheck(name, _gap(here), 0.0, GAP_LIMIT),
+        GateCheck(f"{name}, at friction {LEAST_OFFSET:g}", _gap(there), 0.0, LOW_GAP_LIMIT),
     )
 
 
@@ -360,7 +364,7 @@ def _gap(pairs: Sequence[Sequence[Array]]) -> float:
 def _held(case: ClosureCase) -> Array:
     """Simulate the held tetrahedron; return joint positions (trials, n, q) in grasp sizes."""
     rig, limits = tetrahedron(case)
-    return _in_sizes(rig, rig.holds([part(rig.idle, limit, SHARE) for limit in limits]))
+    return _in_sizes(rig, rig.holds([part(rig.idle, limit, SHARE_HELD) for limit in limits]))
 
 
 def _in_sizes(rig: Rig, trials: Sequence[Schedule]) -> Array:
@@ -385,25 +389,25 @@ def _released(case: ClosureCase, needed: float) -> Array:
         *(Contact(np.array([0.13 * height, s * width / 2, 0.07 * height]), np.array([0.0, -s, 0.0]))
           for s in (-1.0, 1.0)),
     ]  # fmt: skip
-    pushes = np.array([1.0, 1.0, LIGHT, LIGHT])[:, None] * stacked(contacts)[1]
+    pushes = np.array([1.0, 1.0, LIGHT_PUSH, LIGHT_PUSH])[:, None] * stacked(contacts)[1]
     pushes[:2, 0] = needed * np.array([1.0, -1.0])
     box = case.squeezed(body, contacts, case.push * pushes, needed)
     settling = case.setup.friction.settling_friction * needed
-    return _in_sizes(box, box.releases(settling, [above * needed for above in ABOVE]))
+    return _in_sizes(box, box.releases(settling, [above * needed for above in RELEASED_ABOVE]))
 
 
-MANY_FACED, FINGERS = "random-100-1", 20
+MANY_FACED, FINGERS_AT_ONCE = "random-100-1", 20
 """An example mesh with many faces, and how many fingertips touch it at a time."""
 
 
-def surface_touches(case: ClosureCase) -> tuple[Check, Check]:
+def surface_touches(case: ClosureCase) -> tuple[GateCheck, GateCheck]:
     """Check how fingertips that are put a little into a mesh with many faces touch them."""
     body, found = case.body(MANY_FACED), list[tuple[Array, Array, float]]()
     contacts = [Contact(face.centroid, face.normal) for face in body.faces]
     rigid = replace(case.setup.fingers, drive="rigid", indentation=0.0)
     depth = DEPTH * body.radius
-    for start in range(0, len(contacts), FINGERS):
-        group, setup = contacts[start : start + FINGERS], replace(case.setup, fingers=rigid)
+    for start in range(0, len(contacts), FINGERS_AT_ONCE):
+        group, setup = contacts[start : start + FINGERS_AT_ONCE], replace(case.setup, fingers=rigid)
         size = setup.scene(body, group, 1.0).layout.grasp_size_m
         setup = replace(setup, fingers=replace(rigid, indentation=depth / size))
         scene, faces = setup.scene(body, group, 1.0), stacked(group)[1]

@@ -27,7 +27,7 @@ from sim_validate.engine.stepping import Bench
 
 
 @declared
-class Check(Declared):
+class GateCheck(Declared):
     """One figure measured in simulation, and the interval in which it must lie."""
 
     name: str
@@ -52,7 +52,7 @@ class Check(Declared):
 class Gate(Declared):
     """The results of checking a version of MuJoCo on cases with known answers."""
 
-    checks: tuple[Check, ...]
+    checks: tuple[GateCheck, ...]
     mujoco: str
 
     @computed_field
@@ -65,7 +65,7 @@ class Gate(Declared):
 class KnownCase(Protocol):
     """Settings with which a simulator is measured on cases with known answers."""
 
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[GateCheck, ...]:
         """Measure all figures."""
         ...
 
@@ -93,9 +93,9 @@ def two_digits(value: float) -> float:
     return float(f"{value:.1e}")
 
 
-def near(name: str, ratio: float | None, tolerance: float) -> Check:
+def near(name: str, ratio: float | None, tolerance: float) -> GateCheck:
     """Check that a measured figure, over the known one, is one; None if it was not measured."""
-    return Check(name, math.nan if ratio is None else ratio, 1.0 - tolerance, 1.0 + tolerance)
+    return GateCheck(name, math.nan if ratio is None else ratio, 1.0 - tolerance, 1.0 + tolerance)
 
 
 def sized(name: str, radius_m: float) -> Polyhedron:
@@ -148,7 +148,7 @@ def untouching(bench: Bench[Scene], edges_m: Sequence[float] = ()) -> tuple[str,
 
 def touch_checks(
     normals: Array, faces: Array, depths: Array, where: str = ""
-) -> tuple[Check, Check]:
+) -> tuple[GateCheck, GateCheck]:
     """Check contacts' normals beside those of their faces, and depths over the right ones.
 
     Figures are the largest errors; NaN where a fingertip has no contact, or several.
@@ -157,6 +157,6 @@ def touch_checks(
     normal = f"angle between a contact's normal and its face's{where}"
     depth = f"error of a contact's depth, relative to it{where}"
     return (
-        Check(normal, float(np.max(turned)), 0.0, NORMAL_ERROR),
-        Check(depth, float(np.max(off)), 0.0, DEPTH_ERROR),
+        GateCheck(normal, float(np.max(turned)), 0.0, NORMAL_ERROR),
+        GateCheck(depth, float(np.max(off)), 0.0, DEPTH_ERROR),
     )

@@ -12,6 +12,7 @@ the trial's number or name, so a larger deviation only scales them.
 
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,7 @@ def drawn_errors(count: int, seed: int, off_by: OffBy) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pose:
+class ObjectPose:
     """Where the object lies, against its planned place in the hand."""
 
     moved: Array
@@ -94,7 +95,7 @@ def disturbed(
     shift, turn = noise.shift * body.radius * rng.normal(size=3), rng.normal(size=3)
     slipperiness, heaviness = rng.normal(size=2)
     leaning = math.radians(noise.normal_deg) * rng.normal(size=(len(grasp.contacts), 2))
-    pose = Pose(shift, turned_by(math.radians(noise.turn_deg) * turn))
+    pose = ObjectPose(shift, turned_by(math.radians(noise.turn_deg) * turn))
     points, ways = pose.seen(grasp.positions - center, grasp.normals)
     found = [
         _landing(body, face, point, way)
@@ -164,7 +165,7 @@ class Balls:
     room_m: float
     """Length of the way to the planned places; a ball that meets nothing stops as far beyond."""
 
-    def met(self, poses: tuple[Pose, ...]) -> Array:
+    def met(self, poses: Sequence[ObjectPose]) -> Array:
         """Return how far balls go until they meet the object in each pose, (poses, k) [m]."""
         lines = [pose.seen(self.starts, self.ways) for pose in poses]
         starts, ways = (np.array(each) for each in zip(*lines, strict=True))

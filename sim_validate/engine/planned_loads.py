@@ -22,7 +22,7 @@ from grasp_core.quality.wrench_limits import (
     weakest_from,
 )
 from grasp_core.values import Contact
-from sim_validate.engine.schedules import Load, part
+from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.setup import AXIS_NAMES, RANDOM, WEAKEST, Agenda, Setup
 
 NO_PUSH = 1e-9
@@ -34,10 +34,10 @@ class PlannedLoad:
     """One wrench that a grasp is tested with, and what the analysis predicts about it."""
 
     name: str
-    load: Load
+    load: TrialLoad
     """The wrench that is applied, and the finger forces planned for it."""
     predicted_limit: float
-    limit: Load
+    limit: TrialLoad
     """The wrench at its predicted limit, and the finger forces that balance it."""
     required_friction: float
     """The friction coefficient that the planned forces need, with the torques of soft contacts."""
@@ -69,7 +69,7 @@ class LoadPlanner:
         """Find the largest multiple of a wrench that is resisted."""
         return limit_of(self.resisted, wrench)
 
-    def planned(self, idle: Load, agenda: Agenda) -> tuple[PlannedLoad, ...]:
+    def planned(self, idle: TrialLoad, agenda: Agenda) -> tuple[PlannedLoad, ...]:
         """Plan all wrenches to test, in order: along axes, weakest, random, the user's own."""
         share = self.setup.hold.load_share
         relative = [
@@ -80,7 +80,7 @@ class LoadPlanner:
         return (*relative, *self.as_they_are(idle, own))
 
     def as_they_are(
-        self, idle: Load, wrenches: Sequence[tuple[str, Array]]
+        self, idle: TrialLoad, wrenches: Sequence[tuple[str, Array]]
     ) -> tuple[PlannedLoad, ...]:
         """Plan finger forces for wrenches that are applied as given, not at a share of a limit."""
         resisted = self.resisted
@@ -88,16 +88,16 @@ class LoadPlanner:
             self._load(name, limit_of(resisted, wrench), 1.0, idle) for name, wrench in wrenches
         )
 
-    def _load(self, name: str, found: WrenchLimit, multiple: float, idle: Load) -> PlannedLoad:
+    def _load(self, name: str, found: WrenchLimit, multiple: float, idle: TrialLoad) -> PlannedLoad:
         """Plan a multiple of a wrench, with forces between those at rest and those at the limit.
 
         The friction that they need is the largest ratio of a tangential to a normal force.
         """
         wrench = to_digits(multiple * found.wrench)
         predicted = found.limit / multiple
-        limit = Load(predicted * wrench, to_digits(found.forces))
+        limit = TrialLoad(predicted * wrench, to_digits(found.forces))
         share = 1.0 / predicted if predicted > 0.0 else 0.0
-        load = Load(wrench, part(idle, limit, share).forces if share else idle.forces)
+        load = TrialLoad(wrench, part(idle, limit, share).forces if share else idle.forces)
         positions, normals = stacked(self.contacts)
         along, across = normal_and_tangential(load.forces, normals)
         pushing = along > NO_PUSH * along.max()

@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_core.arrays import Array
 from scenes.mujoco.closure_scene import Layout, Scene
-from sim_validate.engine.schedules import Load, Schedule, Thresholds, samples, smooth
+from sim_validate.engine.schedules import Schedule, Thresholds, TrialLoad, samples, smooth
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench, Motion
 from sim_validate.engine.traces import EarlyEnds, Trace, traces
@@ -40,7 +40,7 @@ class Rig:
     setup: Setup
     friction: float
     """The friction at which the object is to be held."""
-    idle: Load
+    idle: TrialLoad
     """The load without a wrench: only the forces that squeeze the object."""
     closed: Motion | None
     """The motion of the fingers while they closed; None for rigid fingers, which do not move."""
@@ -51,7 +51,7 @@ class Rig:
     known (see `traces`)."""
 
     def holds(
-        self, loads: Sequence[Load], settling_frictions: Sequence[float] | None = None
+        self, loads: Sequence[TrialLoad], settling_frictions: Sequence[float] | None = None
     ) -> list[Schedule]:
         """Schedule a hold under each load."""
         protocol, size = self.setup.hold, self.bench.scene.layout.grasp_size_m
@@ -68,7 +68,7 @@ class Rig:
         ]
 
     def ramps(
-        self, limits: Sequence[Load], shares: tuple[float, float]
+        self, limits: Sequence[TrialLoad], shares: tuple[float, float]
     ) -> tuple[list[Schedule], Array]:
         """Schedule a slow rise of each load from one share to another, loaded to it as in a hold.
 
@@ -176,7 +176,7 @@ def squeezed(
 ) -> Rig:  # fmt: skip
     """Close the fingers of a compiled scene on the unloaded object."""
     high = settling_friction or setup.hold.settling_friction * friction
-    opened, idle = Load(np.zeros(6), np.zeros_like(forces)), Load(np.zeros(6), forces)
+    opened, idle = TrialLoad(np.zeros(6), np.zeros_like(forces)), TrialLoad(np.zeros(6), forces)
     shares = smooth(samples(setup.hold.squeeze_s, bench.sample_s))
     closing = Schedule.between(opened, idle, shares, (high, high), len(shares), len(shares))
     (closed,) = bench.simulated([closing.told(bench.scene.layout)])

@@ -35,7 +35,7 @@ class Thresholds:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Load:
+class TrialLoad:
     """An external wrench with the contact forces planned to balance it."""
 
     wrench: Array
@@ -68,8 +68,8 @@ class Schedule:
 
     @staticmethod
     def between(
-        start: Load, end: Load, shares: Array, frictions: tuple[float, float], watched: int,
-        resting: int, answer: Thresholds | None = None,
+        start: TrialLoad, end: TrialLoad, shares: Array, frictions: tuple[float, float],
+        watched: int, resting: int, answer: Thresholds | None = None,
     ) -> "Schedule":  # fmt: skip
         """Schedule shares of the way between loads; friction falls where watching begins."""
         friction = np.where(np.arange(len(shares)) < watched, *frictions)
@@ -83,8 +83,8 @@ MOST_PLANNED = 2.0
 same."""
 
 
-def part(idle: Load, limit: Load, share: float) -> Load:
+def part(idle: TrialLoad, limit: TrialLoad, share: float) -> TrialLoad:
     """Return a share of a wrench, with forces between those without load and those at the limit."""
     planned = min(float(share), MOST_PLANNED)
     wrench = idle.wrench + share * (limit.wrench - idle.wrench)
-    return Load(wrench, (1.0 - planned) * idle.forces + planned * limit.forces)
+    return TrialLoad(wrench, (1.0 - planned) * idle.forces + planned * limit.forces)

@@ -18,20 +18,20 @@ from grasp_core.declared import Declared, declared
 from grasp_core.errors import NoForcesError, SolverError, UndecidedError
 from grasp_core.forces.contact_forces import even_forces
 from grasp_core.kinds import OrInfinity
-from scenes.mujoco.closure_scene import SQUEEZE, Scene
-from scenes.mujoco_options import HARD, Softness
+from scenes.mujoco.closure_scene import GENTLE_SQUEEZE, Scene
+from scenes.mujoco_options import HARD_TIPS, Softness
 from sim_validate.engine.rig import squeezed
 from sim_validate.engine.setup import Setup
 from sim_validate.engine.stepping import Bench
 from sim_validate.settings import FrictionProtocol
 
-ABOVE = (5e-4, 1e-3, 2e-3, 3e-3)
+PLANNED_ABOVE = (5e-4, 1e-3, 2e-3, 3e-3)
 """Excess of the friction that forces are planned for, relative to the critical friction. The values
 are tried in turn. The simulated critical friction is too high by the same excess."""
-LEAST_PUSH = 1e-3
+LEAST_PUSHING = 1e-3
 """Least normal force that counts as pushing, relative to the largest one. With less than half of
 it, boxes were seen to turn up to 9 % above their critical friction."""
-TILT = 2e-3
+TILT_ALLOWED = 2e-3
 """Largest displacement at which the object still counts as staying, relative to the grasp size
 times the critical friction. A tilt of the object acts like that much additional friction; servos
 hide a force imbalance of five times as much, in largest normal forces."""
@@ -60,10 +60,10 @@ def released_friction(
     # The excess is relative, so a prediction of zero needs a friction to be relative to.
     least = max(predicted, 0.5 * protocol.least_friction)
     forces = forces_just_above(positions, normals, least, setup.physics)
-    forces *= SQUEEZE * setup.fingers.max_normal_force_n
+    forces *= GENTLE_SQUEEZE * setup.fingers.max_normal_force_n
     rig = replace(squeezed(bench, setup, forces, predicted, high).at_rest(high), whole=whole)
 
-    share = min(protocol.threshold, TILT * max(predicted, protocol.least_friction))
+    share = min(protocol.threshold, TILT_ALLOWED * max(predicted, protocol.least_friction))
 
     def stays(frictions: list[float]) -> list[bool | None]:
         threshold = share * bench.scene.layout.grasp_size_m
@@ -97,21 +97,21 @@ def bisected(
 
 
 def forces_just_above(
-    positions: Array, normals: Array, critical: float, physics: Softness = HARD
+    positions: Array, normals: Array, critical: float, physics: Softness = HARD_TIPS
 ) -> Array:
     """Find balanced forces that need almost the critical friction, (k, 3), largest push 1 N.
 
-    Every finger pushes enough with them, or they are for the largest friction in `ABOVE`.
+    Every finger pushes enough with them, or they are for the largest friction in `PLANNED_ABOVE`.
     """
     forces = None
-    for above in ABOVE:
+    for above in PLANNED_ABOVE:
         try:
             forces = even_forces(
                 positions, normals, (1.0 + above) * critical, torsion_m=physics.torsion_m
             )
         except (NoForcesError, SolverError):
             continue
-        if np.einsum("ki,ki->k", forces, normals).min() >= LEAST_PUSH:
+        if np.einsum("ki,ki->k", forces, normals).min() >= LEAST_PUSHING:
             break
     if forces is None:
         raise UndecidedError(

@@ -21,12 +21,12 @@ import numpy as np
 from grasp_core.arrays import Array, Indices
 from grasp_core.declared import Declared, declared
 from sim_validate.engine.rig import Rig
-from sim_validate.engine.schedules import Load, part
+from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.traces import Trace, holds
 
 LATER = 8.0
 """Displacement at the second reading of a ramp, relative to the first; 8 = 2 cubed."""
-HELD, SLID, UNKNOWN = 1, 0, -1
+STAYS, LETS_GO, UNSURE = 1, 0, -1
 
 
 @declared
@@ -39,11 +39,11 @@ class SimulatedLimit(Declared):
     """Best estimate of where the object lets go: a ramp's threshold, or a bisection's middle."""
 
 
-def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
+def ramped_limits(rig: Rig, limits: Sequence[TrialLoad]) -> tuple[SimulatedLimit | None, ...]:
     """Find by slowly rising loads the shares of the limits at which the object lets go."""
     threshold = rig.setup.limit.ramp_threshold * rig.bench.scene.layout.grasp_size_m
 
-    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+    def search(chosen: Sequence[TrialLoad], span: float) -> list[SimulatedLimit | None]:
         rises, shares = rig.ramps(chosen, (1.0 - span, 1.0 + span))
         return [_onset(trace, shares, threshold) for trace in rig.traced(rises)]
 
@@ -52,8 +52,8 @@ def ramped_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | No
 
 def _in_some_span(
     rig: Rig,
-    limits: Sequence[Load],
-    search: Callable[[Sequence[Load], float], Sequence[SimulatedLimit | None]],
+    limits: Sequence[TrialLoad],
+    search: Callable[[Sequence[TrialLoad], float], Sequence[SimulatedLimit | None]],
 ) -> tuple[SimulatedLimit | None, ...]:
     """Search near each predicted limit first, then in wider intervals; None if nothing is found."""
     found: dict[int, SimulatedLimit] = {}
@@ -84,21 +84,21 @@ def _onset(trace: Trace, shares: Array, threshold: float) -> SimulatedLimit | No
     return SimulatedLimit(lower=float(lower), upper=float(after), share=float(at))
 
 
-def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | None, ...]:
+def bisected_limits(rig: Rig, limits: Sequence[TrialLoad]) -> tuple[SimulatedLimit | None, ...]:
     """Find the shares of the limits at which the object lets go, by bisection."""
 
-    def search(chosen: Sequence[Load], span: float) -> list[SimulatedLimit | None]:
+    def search(chosen: Sequence[TrialLoad], span: float) -> list[SimulatedLimit | None]:
         held, let_go = np.full(len(chosen), 1.0 - span), np.full(len(chosen), 1.0 + span)
-        inside = (_ends(rig, chosen, held) == HELD) & (_ends(rig, chosen, let_go) == SLID)
+        inside = (_ends(rig, chosen, held) == STAYS) & (_ends(rig, chosen, let_go) == LETS_GO)
         for _ in range(rig.setup.limit.rounds):
             open_places = np.flatnonzero(inside)
             if not open_places.size:
                 break
             middle = 0.5 * (held + let_go)[open_places]
             ends = _ends(rig, [chosen[int(place)] for place in open_places], middle)
-            held[open_places[ends == HELD]] = middle[ends == HELD]
-            let_go[open_places[ends == SLID]] = middle[ends == SLID]
-            inside[open_places[ends == UNKNOWN]] = False
+            held[open_places[ends == STAYS]] = middle[ends == STAYS]
+            let_go[open_places[ends == LETS_GO]] = middle[ends == LETS_GO]
+            inside[open_places[ends == UNSURE]] = False
         return [
             SimulatedLimit(float(low), float(high), float(0.5 * (low + high))) if found else None
             for low, high, found in zip(held, let_go, inside, strict=True)
@@ -107,9 +107,9 @@ def bisected_limits(rig: Rig, limits: Sequence[Load]) -> tuple[SimulatedLimit | 
     return _in_some_span(rig, limits, search)
 
 
-def _ends(rig: Rig, limits: Sequence[Load], shares: Array) -> Indices:
-    """Tell whether shares of loads hold: `HELD`, `SLID`, or `UNKNOWN` if a trial is not valid."""
+def _ends(rig: Rig, limits: Sequence[TrialLoad], shares: Array) -> Indices:
+    """Tell whether shares of loads hold: `STAYS`, `LETS_GO`, or `UNSURE` of an invalid trial."""
     loads = [part(rig.idle, limit, share) for limit, share in zip(limits, shares, strict=True)]
     layout, protocol = rig.bench.scene.layout, rig.setup.hold
     ends = [holds(trace, layout, protocol) for trace in rig.traced(rig.holds(loads))]
-    return np.array([UNKNOWN if end is None else int(end) for end in ends])
+    return np.array([UNSURE if end is None else int(end) for end in ends])

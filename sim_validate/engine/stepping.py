@@ -30,11 +30,11 @@ STATE = (
 """Parts of a state, which lie in the order of their bits."""
 CLOCK = 0
 """Place of the time in a state."""
-FREE, PALM = 6, 12
+OBJECT_END, PALM_END = 6, 12
 """Joint velocities up to the end of the object's, and up to the end of the palm's."""
-FEWEST = 2
+FEWEST_SIMULATIONS = 2
 """Fewest trials that room is made for: one to close the fingers, and most controls have two."""
-CHUNK = 5
+CLOSURE_STEPS = 5
 """Simulation steps per sample of a closure trial."""
 CLOCK_SLACK_S = 1e-9
 """Largest clock error that counts as rounding [s]: simulated time is a sum of equal steps, and a
@@ -182,7 +182,7 @@ class Bench(Generic[AnyScene]):
 
     def __init__(
         self, scene: AnyScene, *, threads: int = 1, timeout_s: float = math.inf,
-        chunk: int = CHUNK, step_s: float | None = None, kept: Sequence[str] = (),
+        chunk: int = CLOSURE_STEPS, step_s: float | None = None, kept: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self.scene, self.threads, self.chunk, self.kept = scene, threads, chunk, kept
         self.deadline = time.monotonic() + timeout_s
@@ -308,7 +308,7 @@ class Bench(Generic[AnyScene]):
         """Return the simulations of trials at their starts; they are made only once."""
         count = len(trials)
         if self.batch is None or self.batch.nsim < count:
-            self.batch = batch.Batch(self.model, max(count, FEWEST), self.threads)
+            self.batch = batch.Batch(self.model, max(count, FEWEST_SIMULATIONS), self.threads)
             self.frictions = None
         self.batch.reset(np.arange(count), stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         if self.frictions is not None:
@@ -321,7 +321,7 @@ class Bench(Generic[AnyScene]):
                 joints[trial] = each.joints
             if each.velocity is not None:
                 speeds[trial, :3] += each.velocity
-                speeds[trial, FREE : FREE + 3] += each.velocity
+                speeds[trial, OBJECT_END : OBJECT_END + 3] += each.velocity
         return self.batch
 
     def _field(self, sims: batch.Batch, name: str) -> Array:
@@ -341,7 +341,7 @@ class Bench(Generic[AnyScene]):
         views = {
             "wrenches": self._field(sims, "xfrc_applied").reshape(sims.nsim, -1, 6)[:, self.body],
             "commands": self._field(sims, "ctrl"),
-            "palm": self._field(sims, "qfrc_applied")[:, FREE:PALM],
+            "palm": self._field(sims, "qfrc_applied")[:, OBJECT_END:PALM_END],
             "mocap": sims.state[:, moved],
         }
         if any(each.friction is not None for each in trials):

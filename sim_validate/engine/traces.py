@@ -306,14 +306,14 @@ SAFETY = 2.0
 """Factor on bounds of motions and forces, for what the linear model leaves out."""
 USABLE = 0.5
 """Largest share of a threshold that an object may use up, bounds included, to count as held."""
-SETTLED = 0.01
+SETTLED_MOTION = 0.01
 """Bound of the motion to come, relative to the threshold, at which an object has settled before
 friction is lowered. The servos' forces are then within some 1e-4 of those at rest, in largest
 normal forces, which is less than thresholds let pass."""
-WATCHED = 3
+LEAST_WATCHED_SAMPLES = 3
 """Least number of samples for which an object is watched after friction was lowered. A contact that
 must slip begins to in the first step."""
-SAME = 1e-6
+SIZE_SLACK = 1e-6
 """Difference of two sizes that is rounding, relative to them."""
 
 
@@ -391,7 +391,7 @@ class EarlyEnds:
         """Tell whether nothing that counts can come while friction is high, (n,)."""
         if self.springs is None or reach is None:
             return np.zeros(len(places), dtype=np.bool_)
-        calm = self.springs.further(reach) <= SETTLED * self.thresholds.watched_m
+        calm = self.springs.further(reach) <= SETTLED_MOTION * self.thresholds.watched_m
         calm &= samples >= self.resting[places]
         if calm.any():
             friction = self.frictions[places, samples]
@@ -414,7 +414,7 @@ class EarlyEnds:
         if near.any():
             moved = displaced(joints[near, :7], starts[near], self.layout)
             lost[near] = (moved >= limits.watched_m) | (began[near] + moved >= limits.total_m)
-        seen = samples - self.watched[places] + 1 >= WATCHED
+        seen = samples - self.watched[places] + 1 >= LEAST_WATCHED_SAMPLES
         if springs is None or reach is None or not seen.any():
             return lost
         left_s = self.sample_s * (self.frictions.shape[1] - 1 - samples)
@@ -487,6 +487,6 @@ def _springs(layout: Layout) -> _Springs | None:
     # contacts must be hard, and as far from their closest axis as the layout's grasp size
     if not layout.has_springs or layout.softness.is_soft:
         return None
-    if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SAME):
+    if grasp_size(layout.contacts) < layout.grasp_size_m * (1.0 - SIZE_SLACK):
         return None
     return _Springs(layout)

@@ -27,7 +27,7 @@ from grasp_core.execution.loads import GRAVITY_M_PER_S2
 from scenes.mujoco.mjcf_text import quaternion
 from scenes.settings import SAMPLE_S
 from sim_validate.engine import schedules
-from sim_validate.engine.misplacement import Pose
+from sim_validate.engine.misplacement import ObjectPose
 from sim_validate.engine.schedules import smooth
 
 
@@ -77,7 +77,7 @@ class Drive(Rows):
     """Share of the trial's load that is applied, (n,)."""
     velocity: Array
     """Velocity at which hand and object start, (3,) [m/s]."""
-    pose: Pose | None = None
+    pose: ObjectPose | None = None
     """Where the object lies at the start; None for its planned place."""
     reached: Array | None = None
     """Displacements of the fingertips along their springs at the start, (k, 3) [m], from where

@@ -27,7 +27,7 @@ Where (1) leaves a cone, a contact slides while the fingers close, and that coun
 
 import importlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -48,39 +48,42 @@ from grasp_core.objects.shells import solid_angles
 from grasp_core.solvers.ties import first_best, largest_first
 from scenes.mujoco.held_scene import HeldLayout
 from scenes.mujoco.mjcf_text import quaternion, rotations
-from scenes.mujoco.scene_text import TOUCH
-from sim_validate.engine.misplacement import MEETS, Balls, Pose, drawn_errors, turned_by
+from scenes.mujoco.scene_text import TOUCH_DEPTH
+from sim_validate.engine.misplacement import MEETS, Balls, ObjectPose, drawn_errors, turned_by
 from sim_validate.execution import paths
 from sim_validate.execution.paths import Drive, Table
 from sim_validate.execution.simulate import SLID, HeldBench, HeldMotion, outcome
 from sim_validate.execution.verdict import ExecutionControl, Skipped
 from sim_validate.settings import ExecutionSettings, TrialKind
 
-ROOM = 1.5
+ROOM_TO_COME = 1.5
 """Distance from which fingertips come, relative to how far points of the object can have moved."""
 
 
-def misplaced_poses(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[Pose, ...]:
+def misplaced_poses(layout: HeldLayout, off_m: Array, off_rad: Array) -> tuple[ObjectPose, ...]:
     """Return poses of the object that is off by translations and turns, (count, 3) each."""
     turned = [rotations(to_digits(turned_by(turning))[None])[0] for turning in off_rad]
     return tuple(
-        Pose(to_digits(way, layout.radius_m), quaternion(rotation))
+        ObjectPose(to_digits(way, layout.radius_m), quaternion(rotation))
         for way, rotation in zip(off_m, turned, strict=True)
     )
 
 
-def tips_met(layout: HeldLayout, poses: tuple[Pose, ...], off_m: float, off_rad: float) -> Array:
+def tips_met(
+    layout: HeldLayout, poses: Sequence[ObjectPose], off_m: float, off_rad: float
+) -> Array:
     """Return where fingertips stop, from their planned places along springs, (poses, k, 3) [m]."""
-    ways, room = layout.frames[:, :, 0], ROOM * (off_m + off_rad * layout.radius_m)
+    ways, room = layout.frames[:, :, 0], ROOM_TO_COME * (off_m + off_rad * layout.radius_m)
     balls = Balls(
         layout.vertices, layout.triangles, layout.radius_m,
-        layout.tip_radius_m - TOUCH * layout.radius_m, layout.tip_centers - room * ways, ways, room,
+        layout.tip_radius_m - TOUCH_DEPTH * layout.radius_m, layout.tip_centers - room * ways, ways,
+        room,
     )  # fmt: skip
     back = (balls.met(poses) - room)[..., None] * ways
     return np.einsum("kij,pki->pkj", layout.axes, back)
 
 
-def closed_there(layout: HeldLayout, pose: Pose, tips: Array) -> bool | None:
+def closed_there(layout: HeldLayout, pose: ObjectPose, tips: Array) -> bool | None:
     """Decide whether fingertips that stop as `tips_met` says hold a moved object in force closure.
 
     None where it is too close to decide.
@@ -95,9 +98,9 @@ def closed_there(layout: HeldLayout, pose: Pose, tips: Array) -> bool | None:
     return decide(ContactCones.at(arms[0], normals / gaps[:, None], layout.friction)).closed
 
 
-FLAT = 1e-6
+FACET_SLACK = 1e-6
 """Difference of normals, and of offsets in object radii, up to which facets are one face."""
-CLEAR = 0.01
+TABLE_GAP = 0.01
 """Least gap between fingertips and the table, in object radii."""
 
 
@@ -123,8 +126,8 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
     for first in range(len(normals)):
         if first not in left:
             continue
-        alike = (np.abs(normals - normals[first]).max(axis=1) <= FLAT) & (
-            np.abs(offsets - offsets[first]) <= FLAT
+        alike = (np.abs(normals - normals[first]).max(axis=1) <= FACET_SLACK) & (
+            np.abs(offsets - offsets[first]) <= FACET_SLACK
         )
         own = [facet for facet in np.flatnonzero(alike) if facet in left]
         left -= set(own)
@@ -142,13 +145,13 @@ def rests(body: Polyhedron) -> tuple[Rest, ...]:
 def resting(body: Polyhedron, tips: Array, radii: Array) -> Rest | None:
     """Return the likeliest rest in which no fingertip meets the table; None if there is none."""
     for rest in rests(body):
-        if (tips @ rest.down + radii).max() <= rest.height - CLEAR * body.radius:
+        if (tips @ rest.down + radii).max() <= rest.height - TABLE_GAP * body.radius:
             return rest
     return None
 
 
-AXES = ("x", "y", "z")
-SIDES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
+AXIS_LETTERS = ("x", "y", "z")
+SIGNED_AXES = tuple((sign, axis) for axis in range(3) for sign in (1.0, -1.0))
 """Sign and axis of the six directions of stops and knocks."""
 OF_NO_SIZE: dict[TrialKind, str] = {"shake": "shake_g", "knock": "knock_n_s"}
 """Setting whose zero leaves no trial of a kind."""
@@ -210,15 +213,15 @@ def _lift(body: Polyhedron, layout: HeldLayout, settings: ExecutionSettings) -> 
 
 def _shakes(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     size = GRAVITY_M_PER_S2 * settings.shake_g
-    sizes = np.repeat([size, size / layout.radius_m], len(AXES))
-    names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXES]
+    sizes = np.repeat([size, size / layout.radius_m], len(AXIS_LETTERS))
+    names = [f"shake {how} {axis}" for how in ("along", "about") for axis in AXIS_LETTERS]
     for name, axis in zip(names, np.diag(sizes), strict=True):
         drive = paths.shake(layout.gravity, axis, settings.shake_hz)
         yield Trial("shake", name, drive, 0, weighing=paths.WEIGHING)
 
 
 def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
-    for sign, axis in SIDES:
+    for sign, axis in SIGNED_AXES:
         way = sign * np.eye(3)[axis]
         drive = paths.stop(layout.gravity, way, settings.stop_m_per_s2, settings.stop_from_m_per_s)
         yield Trial("stop", f"stop {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -226,7 +229,7 @@ def _stops(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
 
 def _knocks(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Trial]:
     """Yield knocks along both sides of each axis, half the object's radius beside its middle."""
-    for sign, axis in SIDES:
+    for sign, axis in SIGNED_AXES:
         point = 0.5 * layout.radius_m * np.eye(3)[(axis + 1) % 3]
         drive = paths.knock(layout.gravity, sign * settings.impulse_n_s * np.eye(3)[axis], point)
         yield Trial("knock", f"knock {_side(sign, axis)}", drive, 0, weighing=paths.WEIGHING)
@@ -249,11 +252,11 @@ def _misplaced(layout: HeldLayout, settings: ExecutionSettings) -> Iterator[Tria
 
 
 def _side(sign: float, axis: int) -> str:
-    return f"{'+' if sign > 0.0 else '-'}{AXES[axis]}"
+    return f"{'+' if sign > 0.0 else '-'}{AXIS_LETTERS[axis]}"
 
 
-FRICTION = 0.9
-SQUEEZE = 0.9
+WEAK_FRICTION = 0.9
+WEAK_SQUEEZE = 0.9
 """Friction and squeeze of the controls, relative to the trials'."""
 SURE = 1.25
 """Load of a control, relative to that at which the analysis says that it slips: fingertips that
@@ -310,10 +313,11 @@ def weaker_grips(best: BestSqueeze, layout: HeldLayout) -> Iterator[Weaker]:
     """Yield the weaker grips of a chosen squeeze, with their loads."""
     grip, load = best.grip, slipping_load(best)
     all_push = np.ones(len(grip.friction))
-    little = replace(grip, friction=FRICTION * grip.friction)
-    yield Weaker(f"friction {FRICTION:g}", little.friction, all_push, _sure(little, load) * load)
-    loose, pushing = grip.squeezed(SQUEEZE * grip.squeeze), SQUEEZE * all_push
-    yield Weaker(f"squeeze {SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
+    little = replace(grip, friction=WEAK_FRICTION * grip.friction)
+    name = f"friction {WEAK_FRICTION:g}"
+    yield Weaker(name, little.friction, all_push, _sure(little, load) * load)
+    loose, pushing = grip.squeezed(WEAK_SQUEEZE * grip.squeeze), WEAK_SQUEEZE * all_push
+    yield Weaker(f"squeeze {WEAK_SQUEEZE:g}", grip.friction, pushing, _sure(loose, load) * load)
     strongest = first_best(layout.pushes.max(axis=1))
     others_push = all_push.copy()
     others_push[strongest] = 0.0

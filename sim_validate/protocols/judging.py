@@ -48,7 +48,7 @@ from sim_validate.execution.execute import given_contacts
 from sim_validate.hands.dexgraspbench import RecordedReach, hand_file, recorded_postures
 from sim_validate.hands.trials import hand_setup, require_faithful_hands
 from sim_validate.kit.own_faults import OWN_FAULTS
-from sim_validate.protocols.published import PROTOCOLS, Passing, PublishedProtocol, Run
+from sim_validate.protocols.published import PROTOCOLS, Passing, ProtocolRun, PublishedProtocol
 from sim_validate.protocols.verdict import Judgement, OurVerdict, RunVerdict
 
 
@@ -217,9 +217,9 @@ def our_verdict(
     return OurVerdict(True, True, margin, "")
 
 
-CHUNK = 10
+PUBLISHED_STEPS = 10
 """Simulation steps per sample: DexGraspBench moves its commands every ten steps."""
-FREE = 7
+POSE_END = 7
 """Coordinates of the object's free joint, which come first."""
 
 
@@ -232,7 +232,7 @@ class Timeline(Told):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Glance:
     """The object at a look, and how many fingers touch it."""
 
     pose: Array
@@ -244,9 +244,9 @@ def their_verdict(
     protocol: PublishedProtocol, scene: TestedScene, threads: int = 1
 ) -> tuple[RunVerdict, ...]:
     """Simulate all runs of a test and judge each."""
-    bench = Bench(scene, threads=threads, chunk=CHUNK, kept=("state",))
+    bench = Bench(scene, threads=threads, chunk=PUBLISHED_STEPS, kept=("state",))
     begun = np.concatenate([IDENTITY_POSE, scene.opened if protocol.close_s else scene.shut])
-    root = FREE * bench.moves_as_told  # where one moves as told, its pose comes first
+    root = POSE_END * bench.moves_as_told  # where one moves as told, its pose comes first
     runs = [
         replace(run, mocap=run.commands[:, :root] if root else None,
                 commands=run.commands[:, root:], joints=begun)
@@ -258,19 +258,19 @@ def their_verdict(
     )
 
 
-def looked(bench: Bench[TestedScene], motion: Motion, looks: Sequence[int]) -> list[Look]:
+def looked(bench: Bench[TestedScene], motion: Motion, looks: Sequence[int]) -> list[Glance]:
     """Look at the object after some samples of a motion."""
     (states,), fingers = motion.kept, bench.scene.fingers
     met = bench.touching([states[sample] for sample in looks])
     return [
-        Look(motion.joints[sample, :FREE], sum(not names.isdisjoint(own) for own in fingers))
+        Glance(motion.joints[sample, :POSE_END], sum(not names.isdisjoint(own) for own in fingers))
         for sample, names in zip(looks, met, strict=True)
     ]
 
 
-def timeline(protocol: PublishedProtocol, scene: TestedScene, run: Run) -> Timeline:
+def timeline(protocol: PublishedProtocol, scene: TestedScene, run: ProtocolRun) -> Timeline:
     """Lay out one run: closing, squeezing, then its steps."""
-    sample_s = CHUNK * scene.physics.timestep
+    sample_s = PUBLISHED_STEPS * scene.physics.timestep
     closing = _closing(protocol, scene, sample_s)
     counts = [samples(step.seconds, sample_s) for step in run]
     begins = np.cumsum([len(closing), *counts]).tolist()
@@ -298,7 +298,7 @@ def _closing(protocol: PublishedProtocol, scene: TestedScene, sample_s: float) -
     return np.vstack(parts)
 
 
-def _wrenches(run: Run, counts: list[int], scene: TestedScene, sample_s: float) -> Array:
+def _wrenches(run: ProtocolRun, counts: list[int], scene: TestedScene, sample_s: float) -> Array:
     """Return forces of the steps with what the palm's motion adds: (1), (n, 6)."""
     forces, paths, angles = list[Array](), [np.zeros((1, 3))], [np.zeros(1)]
     for part, count in zip(run, counts, strict=True):
@@ -322,7 +322,7 @@ def _acceleration(path: Array, sample_s: float) -> Array:
     return (speeds - before) / sample_s
 
 
-def judged_run(number: int, looks: Sequence[Look], fault: str, passing: Passing) -> RunVerdict:
+def judged_run(number: int, looks: Sequence[Glance], fault: str, passing: Passing) -> RunVerdict:
     """Judge one run at its looks, up to the first that does not pass."""
     moved, turned, seen, reason = 0.0, 0.0, list[int](), fault
     for look in looks:

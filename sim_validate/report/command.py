@@ -27,7 +27,7 @@ from scenes.drawing.pictures import Drawing
 from scenes.mujoco.closure_scene import Scene, build_scene, write_scene
 from scenes.mujoco.mjcf_text import IDENTITY_POSE
 from scenes.settings import FingerSettings
-from sim_validate.closure.replaying import Recorded, Replayed, Wanted, recorded_in, replayed
+from sim_validate.closure.replaying import Recorded, Replayed, WantedTrial, recorded_in, replayed
 from sim_validate.datasets.open_dataset import MANIFEST, recorded_in_dataset
 from sim_validate.engine.setup import with_planned_radius
 from sim_validate.kit import command_flags
@@ -167,7 +167,9 @@ def replay_trial(command: command_flags.Replay, reporter: Reporter) -> int:
         )
     source = command.source
     read = recorded_in_dataset if (source / MANIFEST).is_file() else recorded_in
-    recorded = read(source, Wanted(command.grasp, command.control, command.trial, command.grasps))
+    recorded = read(
+        source, WantedTrial(command.grasp, command.control, command.trial, command.grasps)
+    )
     found = replayed(recorded, command.wrench)
     said = recorded.outcome_of(found.name)
     _show(recorded, found, said, reporter)

@@ -25,7 +25,7 @@ from grasp_core.quality.wrench_limits import WrenchBody, limit_of
 from scenes.mujoco_options import PhysicsSettings
 from sim_validate.closure.controls import negative_controls, try_control
 from sim_validate.engine.rig import squeezed
-from sim_validate.engine.schedules import Load, part
+from sim_validate.engine.schedules import TrialLoad, part
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulated_friction import released_friction
 from sim_validate.engine.simulated_limits import bisected_limits, ramped_limits
@@ -103,7 +103,7 @@ def limiting_loads(case, setup, count, seed):
     scale = np.array([1.0] * 3 + [body.radius] * 3)
     drawn = np.random.default_rng(seed).normal(size=(count, 6)) * scale
     limits = [limit_of(resisted, wrench) for wrench in drawn]
-    return [Load(limit.limit * limit.wrench, limit.forces) for limit in limits]
+    return [TrialLoad(limit.limit * limit.wrench, limit.forces) for limit in limits]
 
 
 def examine(case):

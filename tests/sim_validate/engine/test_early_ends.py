@@ -17,7 +17,7 @@ from sim_validate.engine.schedules import Thresholds, part
 from sim_validate.engine.setup import Agenda, Setup
 from sim_validate.engine.simulated_friction import forces_just_above
 from sim_validate.engine.stepping import Bench
-from sim_validate.engine.traces import USABLE, WATCHED, EarlyEnds, judge
+from sim_validate.engine.traces import LEAST_WATCHED_SAMPLES, USABLE, EarlyEnds, judge
 from sim_validate.settings import HoldProtocol
 from tests.marks import more
 from tests.sim_validate.engine.test_traces import pose
@@ -180,7 +180,7 @@ def test_a_trial_ends_once_it_was_watched_where_nothing_can_change_the_answer(
     change(joints, speeds, looking)
     samples = range(LAST_OF_SETTLING, LAST_OF_SETTLING + 6)
     said = [look(looking, sample, joints, speeds)[1] for sample in samples]
-    assert said == [False] * WATCHED + [ended] * (6 - WATCHED)
+    assert said == [False] * LEAST_WATCHED_SAMPLES + [ended] * (6 - LEAST_WATCHED_SAMPLES)
 
 
 def test_a_change_of_speed_keeps_a_trial_going(looking):

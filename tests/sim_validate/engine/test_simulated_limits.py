@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim_validate.engine.schedules import MOST_PLANNED, Load, part
+from sim_validate.engine.schedules import MOST_PLANNED, TrialLoad, part
 from sim_validate.engine.simulated_limits import bisected_limits, ramped_limits
 from tests.sim_validate.rigs import grasps, imbalance, limiting_loads, rig_of
 
@@ -31,8 +31,9 @@ def test_a_limit_that_is_not_where_it_is_predicted_is_found_farther_away_or_not_
     body, (grasp, *_) = grasps("random-12-1", 0.5, 1)
     rig = rig_of(body, grasp, 0.5)
     (limit,) = limiting_loads(body, grasp, 0.5, 1)
+    idle = rig.idle.forces
     wrong = [
-        Load(factor * limit.wrench, rig.idle.forces + factor * (limit.forces - rig.idle.forces))
+        TrialLoad(factor * limit.wrench, idle + factor * (limit.forces - idle))
         for factor in (0.95, 1.05, 0.75, 1.3, 0.33, 3.0)
     ]
     for method in (ramped_limits, bisected_limits):

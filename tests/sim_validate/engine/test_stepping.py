@@ -11,8 +11,8 @@ import grasp_core as gc
 from grasp_core.arrays import to_digits
 from scenes.mujoco.silent_mujoco import unlogged
 from sim_validate.engine import stepping
-from sim_validate.engine.schedules import Load, part
-from sim_validate.engine.stepping import CHUNK, Bench, compiled
+from sim_validate.engine.schedules import TrialLoad, part
+from sim_validate.engine.stepping import CLOSURE_STEPS, Bench, compiled
 from sim_validate.engine.traces import Outcome, judge
 from sim_validate.settings import HoldProtocol
 from tests.sim_validate.rigs import limiting_loads
@@ -42,7 +42,7 @@ def plain_loop(scene, schedule, start):
         data.ctrl[:] = pushes.ravel() / layout.drive.stiffness_n_per_m
         data.xfrc_applied[model.body("object").id] = wrench
         model.geom_friction[touching, 0] = friction
-        mujoco.mj_step(model, data, nstep=CHUNK)
+        mujoco.mj_step(model, data, nstep=CLOSURE_STEPS)
         rows.append(data.qpos.copy())
     return np.array(rows)
 
@@ -74,9 +74,9 @@ def test_trials_without_frictions_have_the_scenes_after_trials_that_changed_them
 
 def test_a_good_hold_beside_a_blow_up_is_judged_on_its_own(held):
     _, _, rig = held
-    still = Load(np.zeros(6), rig.idle.forces)
+    still = TrialLoad(np.zeros(6), rig.idle.forces)
     layout = rig.bench.scene.layout
-    together = rig.traced(rig.holds([still, Load(np.full(6, 1e14), rig.idle.forces), still]))
+    together = rig.traced(rig.holds([still, TrialLoad(np.full(6, 1e14), rig.idle.forces), still]))
     assert abs(together[1].health.clock_error_s) < 1e-9  # it is reported, and not reset
     outcomes = [judge(found, layout, HoldProtocol()).outcome for found in together]
     assert outcomes == [Outcome.HELD, Outcome.DIVERGED, Outcome.HELD]
